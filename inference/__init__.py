@@ -1,0 +1,1 @@
+"""From readings to knowledge: estimates, posteriors, ambiguity."""

@@ -1,0 +1,1 @@
+"""From knowledge to clients: HTTP, streams, command line."""

@@ -1,0 +1,1 @@
+"""What light does, and what a sensor reads."""
