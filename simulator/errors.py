@@ -1,0 +1,59 @@
+"""The exceptions of the project.
+
+::
+
+    HybridTofError
+    ├── InvalidInputError   (also ValueError)  input that breaks a rule; names every offending field
+    └── RefusedError        valid input for which there is no answer, with the reason and the remedy
+"""
+
+from dataclasses import dataclass
+
+__all__ = ["HybridTofError", "InvalidInputError", "Problem", "RefusedError"]
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One broken rule.
+
+    Attributes
+    ----------
+    pointer : str
+        JSON pointer (RFC 6901) of the offending field; "" is the whole document.
+    message : str
+        What is wrong, for a person.
+    """
+
+    pointer: str
+    message: str
+
+
+class HybridTofError(Exception):
+    """Base of every exception that the project raises on purpose."""
+
+
+class InvalidInputError(HybridTofError, ValueError):
+    """Input that breaks a rule.
+
+    Parameters
+    ----------
+    *problems : Problem
+        At least one; all that were found.
+    """
+
+    def __init__(self, *problems: Problem) -> None:
+        self.problems = problems
+        super().__init__("; ".join(f"{p.pointer or '/'}: {p.message}" for p in problems))
+
+    @classmethod
+    def at(cls, pointer: str, message: str) -> "InvalidInputError":
+        """Build the error of a single field."""
+        return cls(Problem(pointer, message))
+
+    def below(self, prefix: str) -> "InvalidInputError":
+        """Return the same error with every pointer below ``prefix``."""
+        return InvalidInputError(*(Problem(prefix + p.pointer, p.message) for p in self.problems))
+
+
+class RefusedError(HybridTofError):
+    """Valid input for which an honest answer does not exist (the message has reason and remedy)."""

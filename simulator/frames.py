@@ -1,0 +1,180 @@
+"""Frames: two readings each, with what else a sensor may deliver."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import numpy as np
+import pydantic
+from numpy.typing import ArrayLike, NDArray
+
+from simulator.errors import InvalidInputError, Problem
+from simulator.sensor import Sensor
+from simulator.validated import Validated
+
+__all__ = ["FrameColumns", "Frames", "frames_from_columns"]
+
+Array = NDArray[np.float64]
+Column = Annotated[list[float], pydantic.Field(max_length=2_000_000)]
+
+
+class FrameColumns(Validated):
+    """Frames as columns, the form in which clients send them (contract, "Frames")."""
+
+    time_s: Column | None = None
+    w1: Column | None = None
+    w2: Column | None = None
+    i: Column | None = None
+    q: Column | None = None
+    dw1_dt: Column | None = None
+    dw2_dt: Column | None = None
+    di_dt: Column | None = None
+    dq_dt: Column | None = None
+    gain: Annotated[list[Annotated[float, pydantic.Field(gt=0)]], pydantic.Field()] | None = None
+    object_present: list[bool] | None = None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Frames:
+    """Frames of one sensor, checked: equal lengths, at least one frame, everything finite.
+
+    Attributes
+    ----------
+    readings : ndarray, shape (n, 2)
+        w1, w2 or i, q [reading units].
+    time_s : ndarray, shape (n,), optional
+        Times [s], in any order.
+    derivatives : ndarray, shape (n, 2), optional
+        Time derivatives of the readings [reading units / s], measured by the sensor.
+    gain : ndarray, shape (n,), optional
+        Factor of each frame on the sensor's gain: it scales the signals of object and background,
+        not crosstalk, which is given in reading units.
+    object_present : ndarray of bool, shape (n,), optional
+        False where the scene is known to hold no object.
+    """
+
+    readings: Array
+    time_s: Array | None = None
+    derivatives: Array | None = None
+    gain: Array | None = None
+    object_present: NDArray[np.bool_] | None = None
+
+    def __len__(self) -> int:
+        return int(self.readings.shape[0])
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Where an object may be, shape (n,)."""
+        if self.object_present is None:
+            return np.ones(len(self), dtype=bool)
+        return self.object_present
+
+    def select(self, index: Any) -> "Frames":
+        """Return the frames that a numpy index of the first axis selects."""
+        parts = {
+            field.name: None if (part := getattr(self, field.name)) is None else part[index]
+            for field in dataclasses.fields(self)
+        }
+        return Frames(**parts)
+
+    def to_columns(self, sensor: Sensor) -> dict[str, list[float] | list[bool]]:
+        """Return the columns of the contract, those that are present."""
+        first, second = sensor.columns
+        columns: dict[str, Any] = {} if self.time_s is None else {"time_s": self.time_s}
+        columns |= {first: self.readings[:, 0], second: self.readings[:, 1]}
+        if self.derivatives is not None:
+            columns[f"d{first}_dt"] = self.derivatives[:, 0]
+            columns[f"d{second}_dt"] = self.derivatives[:, 1]
+        if self.gain is not None:
+            columns["gain"] = self.gain
+        if self.object_present is not None:
+            columns["object_present"] = self.object_present
+        return {name: column.tolist() for name, column in columns.items()}
+
+
+def frames_from_columns(
+    sensor: Sensor, columns: "FrameColumns | Mapping[str, ArrayLike | None]"
+) -> Frames:
+    """Check columns against a sensor and against one another.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        Decides which columns are readings.
+    columns : FrameColumns or mapping
+        Columns by their name in the contract, each of length n.
+
+    Returns
+    -------
+    Frames
+        The frames.
+
+    Raises
+    ------
+    InvalidInputError
+        A pointer for each column that is missing, unknown, of another length, not numeric, not
+        finite, empty, or (gain) not positive.
+    """
+    if isinstance(columns, FrameColumns):
+        columns = {name: getattr(columns, name) for name in columns.model_fields_set}
+    given = {name: column for name, column in columns.items() if column is not None}
+    first, second = sensor.columns
+    slopes = (f"d{first}_dt", f"d{second}_dt")
+    allowed = {"time_s", first, second, *slopes, "gain", "object_present"}
+    problems = [
+        Problem(f"/{name}", f"is not a column of a {sensor.kind} sensor")
+        for name in given
+        if name not in allowed
+    ]
+    needed = [first, second] + (list(slopes) if any(name in given for name in slopes) else [])
+    problems += [Problem(f"/{name}", "is missing") for name in needed if name not in given]
+
+    arrays: dict[str, NDArray[Any]] = {}
+    for name in given:
+        if name not in allowed:
+            continue
+        array, problem = _as_column(name, given[name])
+        arrays[name] = array
+        if problem:
+            problems.append(Problem(f"/{name}", problem))
+    if not problems:
+        n = arrays[first].size
+        if n == 0:
+            problems.append(Problem(f"/{first}", "holds no frame"))
+        problems += [
+            Problem(f"/{name}", f"has {array.size} entries where {first} has {n}")
+            for name, array in arrays.items()
+            if array.size != n
+        ]
+        if "gain" in arrays and np.any(arrays["gain"] <= 0):
+            problems.append(Problem("/gain", "must be positive"))
+    if problems:
+        raise InvalidInputError(*problems)
+    return Frames(
+        readings=np.column_stack([arrays[first], arrays[second]]),
+        time_s=arrays.get("time_s"),
+        derivatives=(
+            np.column_stack([arrays[name] for name in slopes]) if slopes[0] in arrays else None
+        ),
+        gain=arrays.get("gain"),
+        object_present=arrays.get("object_present"),
+    )
+
+
+def _as_column(name: str, values: ArrayLike) -> tuple[NDArray[Any], str | None]:
+    """Return the column as an array, and what is wrong with it."""
+    wanted = bool if name == "object_present" else float
+    array = np.asarray(values)
+    if array.size == 0:
+        return np.empty(0, dtype=wanted), None
+    if array.ndim != 1:
+        return np.empty(0), f"must be one-dimensional, has {array.ndim} dimensions"
+    if wanted is bool:
+        if array.dtype != np.bool_:
+            return array, "must be true or false for each frame"
+        return array, None
+    if array.dtype.kind not in "fiu":
+        return array, "must hold numbers"
+    array = array.astype(np.float64)
+    bad = np.flatnonzero(~np.isfinite(array))
+    return array, f"entry {bad[0]} is not finite" if bad.size else None

@@ -1,0 +1,84 @@
+"""Frozen, strictly validated types, and errors that name the field by its JSON pointer."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+import pydantic
+
+from simulator.errors import InvalidInputError, Problem
+
+__all__ = ["Validated", "parse", "problems_of"]
+
+T = TypeVar("T", bound="Validated")
+
+
+class Validated(pydantic.BaseModel):
+    """Base of the scene language: immutable, no coercion, no unknown fields, nothing non-finite."""
+
+    model_config = pydantic.ConfigDict(
+        frozen=True, strict=True, extra="forbid", allow_inf_nan=False, revalidate_instances="never"
+    )
+
+
+def _pointer(location: Sequence[int | str], data: object, missing: bool) -> str:
+    """Turn a pydantic location into a JSON pointer, without the names of union branches.
+
+    A part is kept if it leads into ``data``, and the last one if it names what is missing.
+    """
+    parts: list[str] = []
+    here: object = data
+    for position, part in enumerate(location):
+        if isinstance(here, Mapping) and part in here:
+            here = here[part]
+        elif isinstance(here, list | tuple) and isinstance(part, int) and part < len(here):
+            here = here[part]
+        elif not (missing and position == len(location) - 1):
+            continue
+        parts.append(str(part).replace("~", "~0").replace("/", "~1"))
+    return "".join("/" + part for part in parts)
+
+
+def problems_of(error: pydantic.ValidationError, data: object) -> tuple[Problem, ...]:
+    """List what pydantic found, one `Problem` for each field and message.
+
+    Parameters
+    ----------
+    error : pydantic.ValidationError
+        The error.
+    data : object
+        The input as plain JSON data, by which union branches are told from fields.
+    """
+    found: dict[Problem, None] = {}
+    for item in error.errors(include_url=False, include_input=False):
+        pointer = _pointer(item["loc"], data, item["type"] == "missing")
+        if item["type"].startswith("union_tag"):
+            pointer += "/" + str(item["ctx"]["discriminator"]).strip("'")
+        # pydantic puts the class of a raised ValueError before its text
+        found[Problem(pointer, item["msg"].removeprefix("Value error, "))] = None
+    return tuple(found)
+
+
+def parse(model: type[T], data: Any) -> T:
+    """Validate plain JSON data.
+
+    Parameters
+    ----------
+    model : type
+        A subclass of `Validated`.
+    data : Any
+        Decoded JSON (dict, list, str, int, float, bool, None).
+
+    Returns
+    -------
+    Validated
+        An instance of ``model``.
+
+    Raises
+    ------
+    InvalidInputError
+        With a pointer for each offending field.
+    """
+    try:
+        return model.model_validate(data)
+    except pydantic.ValidationError as error:
+        raise InvalidInputError(*problems_of(error, data)) from None
