@@ -10,7 +10,7 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 
@@ -19,6 +19,7 @@ __all__ = ["compiled"]
 P = ParamSpec("P")
 R = TypeVar("R")
 
+_config: Any = numba.config  # its attributes are made at import, out of a type checker's sight
 _PACKAGES = ("simulator", "inference")
 _MARK = b"from simulator.compiled import compiled"
 
@@ -53,12 +54,12 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     error-free transformations and tests for nan must survive.
     """
     directory = _cache_directory()
-    previous = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = directory or previous
+    previous = _config.CACHE_DIR
+    _config.CACHE_DIR = directory or previous
     try:
         dispatcher = numba.njit(
             cache=directory is not None, nogil=True, error_model="numpy", fastmath=False
         )(function)
     finally:
-        numba.config.CACHE_DIR = previous
+        _config.CACHE_DIR = previous
     return cast("Callable[P, R]", dispatcher)

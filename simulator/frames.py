@@ -71,7 +71,7 @@ class Frames:
 
     def select(self, index: Any) -> "Frames":
         """Return the frames that a numpy index of the first axis selects."""
-        parts = {
+        parts: dict[str, Any] = {
             field.name: None if (part := getattr(self, field.name)) is None else part[index]
             for field in dataclasses.fields(self)
         }

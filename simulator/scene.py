@@ -168,7 +168,8 @@ class Scene(Validated):
     background: Background | None = None
     range_m: (
         Annotated[
-            Annotated[Prior, pydantic.Tag("independent")] | Annotated[Stroke, pydantic.Tag("stroke")],
+            Annotated[Prior, pydantic.Tag("independent")]
+            | Annotated[Stroke, pydantic.Tag("stroke")],
             pydantic.Discriminator(_kind_of_range),
         ]
         | None

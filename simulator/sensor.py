@@ -9,7 +9,7 @@ from scipy.constants import speed_of_light
 from simulator.errors import InvalidInputError
 from simulator.validated import Validated, problems_of
 
-__all__ = ["Noise", "PulsedSensor", "Sensor", "SineWaveSensor", "parse_sensor"]
+__all__ = ["Noise", "PulsedSensor", "Sensor", "SineWaveSensor", "instrument", "parse_sensor"]
 
 Positive = Annotated[float, pydantic.Field(gt=0)]
 NonNegative = Annotated[float, pydantic.Field(ge=0)]
@@ -145,3 +145,13 @@ def parse_sensor(data: object) -> Sensor:
         return _adapter.validate_python(data)
     except pydantic.ValidationError as error:
         raise InvalidInputError(*problems_of(error, data)) from None
+
+
+def instrument(sensor: Sensor) -> tuple[float, tuple[float, float] | None]:
+    """Return r0 [m] and, of a sine wave, (k [rad/m], phase offset [rad]), as the kernels take them.
+
+    A pulse has no wave (None), and a sine wave does not read r0.
+    """
+    if isinstance(sensor, PulsedSensor):
+        return sensor.r0, None
+    return 0.0, (sensor.wave_number, sensor.phase_offset_rad)

@@ -26,11 +26,13 @@ def _pointer(location: Sequence[int | str], data: object, missing: bool) -> str:
     A part is kept if it leads into ``data``, and the last one if it names what is missing.
     """
     parts: list[str] = []
-    here: object = data
+    here: Any = data
     for position, part in enumerate(location):
-        if isinstance(here, Mapping) and part in here:
-            here = here[part]
-        elif isinstance(here, list | tuple) and isinstance(part, int) and part < len(here):
+        if isinstance(here, Mapping):
+            leads = part in here
+        else:
+            leads = isinstance(here, list | tuple) and isinstance(part, int) and part < len(here)
+        if leads:
             here = here[part]
         elif not (missing and position == len(location) - 1):
             continue

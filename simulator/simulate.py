@@ -1,0 +1,194 @@
+"""Seeded simulation of frames from a scene, a sensor and a trajectory."""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from simulator.compiled import compiled
+from simulator.frames import Frames
+from simulator.parameters import Terms, parameters_of
+from simulator.readings import background_readings, covariance, object_readings
+from simulator.scene import Scene
+from simulator.sensor import Sensor, instrument
+from simulator.trajectories import RadialTrajectory, SampledTrajectory
+
+__all__ = ["Simulation", "mean_readings", "simulate"]
+
+Array = NDArray[np.float64]
+Pair = tuple[float, float]
+
+# correlation length of the model discrepancy in log r (design: about 1)
+DISCREPANCY_LENGTH = 1.0
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Simulation:
+    """Frames with the truth behind them.
+
+    Attributes
+    ----------
+    frames : Frames
+        What the sensor delivers.
+    range_m : ndarray, shape (n,)
+        True ranges [m]; nan where the scene is empty.
+    parameters : dict of str to float
+        Values of the scene's unknowns, by scene path, that were drawn from their priors.
+    """
+
+    frames: Frames
+    range_m: Array
+    parameters: dict[str, float]
+
+
+@compiled
+def _frame_moments(
+    ranges: Array,
+    factor: Array,
+    gain: float,
+    r0: float,
+    wave: Pair | None,
+    shape: tuple[float, float, float],
+    crosstalk: Pair | None,
+    background: tuple[float, float, float, float] | None,
+    read: Pair,
+    shot: float | None,
+    relative: float | None,
+) -> Array:
+    """Mean and covariance of every frame: columns mean 1, mean 2, var 1, var 2, cov."""
+    out = np.empty((ranges.size, 5))
+    for i in range(ranges.size):
+        o1, o2 = 0.0, 0.0
+        if np.isfinite(ranges[i]):
+            strength = gain * shape[0] * shape[2] * factor[i]
+            o1, o2 = object_readings(ranges[i], r0, wave, strength, shape[0], shape[1])
+        m1, m2 = o1, o2
+        if background is not None:
+            b1, b2 = background_readings(ranges[i], r0, wave, background)
+            m1, m2 = m1 + b1, m2 + b2
+        if crosstalk is not None:
+            m1, m2 = m1 + crosstalk[0], m2 + crosstalk[1]
+        v1, v2, v12 = covariance(read, shot, relative, wave is None, (m1, m2), (o1, o2))
+        out[i, 0], out[i, 1] = m1, m2
+        out[i, 2], out[i, 3], out[i, 4] = v1, v2, v12
+    return out
+
+
+def _moments(sensor: Sensor, terms: Terms, ranges: Array, factor: Array) -> Array:
+    c0, c1, c2 = terms.object[0].tolist()
+    noise = sensor.noise
+    r0, wave = instrument(sensor)
+    return _frame_moments(
+        ranges,
+        factor,
+        sensor.gain,
+        r0,
+        wave,
+        (c0, c1, c2),
+        None if terms.crosstalk is None else tuple(terms.crosstalk[0].tolist()),
+        None if terms.background is None else tuple(terms.background[0].tolist()),
+        noise.read,
+        noise.shot or None,
+        noise.relative or None,
+    )
+
+
+def mean_readings(sensor: Sensor, terms: Terms, ranges: Array) -> Array:
+    """Return noise-free readings of an object at given ranges.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The sensor.
+    terms : Terms
+        Physical values; the first parameter vector is used.
+    ranges : ndarray, shape (n,)
+        Ranges [m]; inf or nan where there is no object.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        w1, w2 or i, q [reading units].
+    """
+    ranges = np.where(np.isfinite(ranges), ranges, np.inf)
+    return _moments(sensor, terms, ranges, np.ones(ranges.size))[:, :2]
+
+
+def _discrepancy(rng: np.random.Generator, ranges: Array, sd: float) -> Array:
+    """Draw factors exp(delta(log r)), delta a Gaussian process with Matern 5/2 covariance."""
+    logs = np.log(ranges[np.isfinite(ranges)])
+    if logs.size == 0:
+        return np.ones(ranges.size)
+    knots = np.linspace(logs.min() - 1e-9, logs.max() + 1e-9, 200)
+    lag = np.sqrt(5.0) * np.abs(knots[:, None] - knots[None, :]) / DISCREPANCY_LENGTH
+    kernel = (1.0 + lag + lag**2 / 3.0) * np.exp(-lag)
+    # a smooth kernel is singular to rounding: the square root is taken from its eigenvalues
+    values, vectors = linalg.eigh(kernel)
+    path = sd * vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(knots.size))
+    finite = np.where(np.isfinite(ranges), ranges, np.exp(knots[0]))
+    return np.asarray(np.exp(np.interp(np.log(finite), knots, path)))
+
+
+def simulate(
+    sensor: Sensor,
+    scene: Scene,
+    trajectory: RadialTrajectory | SampledTrajectory,
+    seed: int | np.random.Generator,
+) -> Simulation:
+    """Simulate frames.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        Its noise is added; readings are cut at its full scale.
+    scene : Scene
+        Unknowns are drawn once from their priors.
+    trajectory : RadialTrajectory or SampledTrajectory
+        True ranges, used as they are; a scene's ``range_m`` plays no part.
+    seed : int or numpy.random.Generator
+        Source of randomness; the same seed gives the same frames.
+
+    Returns
+    -------
+    Simulation
+        Frames and truth.
+
+    Raises
+    ------
+    InvalidInputError
+        Where `check_scene` refuses the scene.
+    """
+    rng = np.random.default_rng(seed)
+    parameters = parameters_of(sensor, scene)
+    z = parameters.sample(rng, 1)
+    natural = parameters.natural(z)[0]
+    ranges = trajectory.ranges()
+    factor = np.ones(ranges.size)
+    present = None
+    if isinstance(trajectory, SampledTrajectory):
+        if trajectory.amplitude is not None:
+            factor = np.asarray(trajectory.amplitude)
+        if trajectory.object_present is not None:
+            present = np.asarray(trajectory.object_present)
+            ranges = np.where(present, ranges, np.inf)
+    if scene.discrepancy is not None:
+        factor = factor * _discrepancy(rng, ranges, scene.discrepancy)
+    moments = _moments(sensor, parameters.terms(z), ranges, factor)
+    readings = moments[:, :2] + _noise(rng, moments[:, 2], moments[:, 3], moments[:, 4])
+    if sensor.full_scale is not None:
+        limit = np.asarray(sensor.full_scale)
+        readings = np.clip(readings, -limit, limit)
+    frames = Frames(readings, time_s=trajectory.times(), object_present=present)
+    truth = np.where(np.isfinite(ranges), ranges, np.nan)
+    return Simulation(frames, truth, dict(zip(parameters.names, natural.tolist(), strict=True)))
+
+
+def _noise(rng: np.random.Generator, first: Array, second: Array, cross: Array) -> Array:
+    """Draw noise of given variances and covariance, shape (n, 2)."""
+    normal = rng.standard_normal((first.size, 2))
+    slope = cross / np.sqrt(first)
+    rest = np.sqrt(np.maximum(second - slope * slope, 0.0))
+    return np.column_stack(
+        [np.sqrt(first) * normal[:, 0], slope * normal[:, 0] + rest * normal[:, 1]]
+    )

@@ -1,0 +1,101 @@
+"""Trajectories: the true range of every frame, and when it was taken."""
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+import pydantic
+from numpy.typing import NDArray
+
+from simulator.validated import Validated
+
+__all__ = ["RadialTrajectory", "SampledTrajectory", "Trajectory"]
+
+Positive = Annotated[float, pydantic.Field(gt=0)]
+MAX_FRAMES = 1_000_000
+
+
+class SampledTrajectory(Validated):
+    """Ranges as a list.
+
+    Attributes
+    ----------
+    range_m : list of float
+        True range of every frame [m].
+    time_s : list of float, optional
+        Times [s].
+    amplitude : list of float, optional
+        Factor on the object's c2 in every frame: an object that turns or crosses the field of
+        view at a fixed range.
+    object_present : list of bool, optional
+        False where the scene is empty.
+    """
+
+    range_m: Annotated[list[Positive], pydantic.Field(min_length=1, max_length=MAX_FRAMES)]
+    time_s: list[float] | None = None
+    amplitude: list[Positive] | None = None
+    object_present: list[bool] | None = None
+
+    @pydantic.model_validator(mode="after")
+    def _equal_lengths(self) -> "SampledTrajectory":
+        n = len(self.range_m)
+        for name in ("time_s", "amplitude", "object_present"):
+            column = getattr(self, name)
+            if column is not None and len(column) != n:
+                raise ValueError(f"{name} has {len(column)} entries where range_m has {n}")
+        return self
+
+    def ranges(self) -> NDArray[np.float64]:
+        """Return the ranges [m], shape (n,)."""
+        return np.asarray(self.range_m)
+
+    def times(self) -> NDArray[np.float64] | None:
+        """Return the times [s], shape (n,), or None."""
+        return None if self.time_s is None else np.asarray(self.time_s)
+
+
+class RadialTrajectory(Validated):
+    """Straight towards the sensor or away from it.
+
+    Attributes
+    ----------
+    from_m, to_m : float
+        First and last range [m].
+    frames : int
+        Number of frames.
+    spacing : "linear" or "log"
+        Whether the range or its logarithm grows evenly.
+    duration_s : float, optional
+        Time from the first to the last frame [s]; left out: 0.01 s a frame.
+    """
+
+    kind: Literal["radial"] = "radial"
+    from_m: Positive
+    to_m: Positive
+    frames: Annotated[int, pydantic.Field(ge=1, le=MAX_FRAMES)]
+    spacing: Literal["linear", "log"] = "linear"
+    duration_s: Positive | None = None
+
+    def ranges(self) -> NDArray[np.float64]:
+        """Return the ranges [m], shape (n,)."""
+        if self.spacing == "log":
+            logs = np.linspace(math.log(self.from_m), math.log(self.to_m), self.frames)
+            return np.exp(logs)
+        return np.linspace(self.from_m, self.to_m, self.frames)
+
+    def times(self) -> NDArray[np.float64]:
+        """Return the times [s], shape (n,)."""
+        duration = 0.01 * (self.frames - 1) if self.duration_s is None else self.duration_s
+        return np.linspace(0.0, duration, self.frames)
+
+
+def _kind(value: object) -> str:
+    named = isinstance(value, dict) and "kind" in value
+    return "radial" if named or isinstance(value, RadialTrajectory) else "sampled"
+
+
+Trajectory = Annotated[
+    Annotated[SampledTrajectory, pydantic.Tag("sampled")]
+    | Annotated[RadialTrajectory, pydantic.Tag("radial")],
+    pydantic.Discriminator(_kind),
+]
