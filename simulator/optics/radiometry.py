@@ -1,0 +1,358 @@
+"""Flux, effective distance and phasor of a surface: the interface to the quadrature.
+
+Everything is per Phi0 A_D [1/m^2], so that a sensor's gain turns it into readings.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.constants import speed_of_light
+
+from simulator.compiled import compiled
+from simulator.errors import InvalidInputError
+from simulator.optics import charts
+from simulator.optics.brdf import pack_material
+from simulator.optics.charts import build_chart
+from simulator.optics.detectors import Detector
+from simulator.optics.emitters import Emitter, Narrow, pack_pattern
+from simulator.optics.quadrature import COMPONENTS, GAUSS_KRONROD, gauss_rule, integrate
+from simulator.optics.surfaces import Disk, Plane, Rectangle, Shell, Sphere, pack_surface
+
+__all__ = [
+    "Light",
+    "Modulation",
+    "Status",
+    "observe",
+    "observe_batch",
+    "observe_shell",
+    "shadow",
+]
+
+Array = NDArray[np.float64]
+Status = Literal["lit", "edge_on", "opposite_faces", "out_of_view", "underflow"]
+AnySurface = Rectangle | Disk | Plane | Sphere
+
+_STATUS: dict[int, Status] = {
+    charts.LIT: "lit",
+    charts.EDGE_ON: "edge_on",
+    charts.OPPOSITE: "opposite_faces",
+    charts.OUT_OF_VIEW: "out_of_view",
+}
+_REASON: dict[Status, str] = {
+    "lit": "",
+    "edge_on": "emitter or detector lies in the plane of the surface, which is seen edge-on",
+    "opposite_faces": "emitter and detector see opposite faces of the surface",
+    "out_of_view": "no part of the surface is in front of both emitter and detector",
+    "underflow": "what the surface returns is below the smallest number",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Modulation:
+    """What a sensor does to light in time.
+
+    Attributes
+    ----------
+    frequency_hz : float, optional
+        f of a sine wave.
+    pulse_width_s : float, optional
+        T_p of a pulse.
+    """
+
+    frequency_hz: float | None = None
+    pulse_width_s: float | None = None
+
+    @property
+    def wave_number(self) -> float:
+        """k = 4 pi f / c [rad/m], 0 without a sine wave."""
+        return 4 * math.pi * (self.frequency_hz or 0.0) / speed_of_light
+
+    @property
+    def r0(self) -> float:
+        """c T_p / 2 [m], 0 without a pulse."""
+        return 0.5 * speed_of_light * (self.pulse_width_s or 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """What one surface returns, per Phi0 A_D.
+
+    Attributes
+    ----------
+    flux : float
+        Phi / (Phi0 A_D) [1/m^2].
+    distance_m : float
+        Effective distance of a long pulse, the flux-weighted mean of (r_i + r_o)/2 (3.2) [m]; nan
+        where there is no light.
+    late : float
+        int min(r/r0, 1) dPhi (2.33 with its erratum); nan without a pulse.
+    phasor : complex
+        int exp(j k r) dPhi (3.19 with its erratum); nan without a sine wave.
+    error : float
+        Estimated relative error of the flux.
+    status : str
+        "lit", or why the flux is zero.
+    """
+
+    flux: float
+    distance_m: float
+    late: float
+    phasor: complex
+    error: float
+    status: Status
+
+    @property
+    def reason(self) -> str:
+        """Why the flux is zero; empty where it is not."""
+        return _REASON[self.status]
+
+    def phase_distance_m(self, modulation: Modulation) -> float:
+        """Return the effective distance of a sine wave, arg(phasor)/k in [0, 2 pi/k) [m]."""
+        k = modulation.wave_number
+        if not k > 0 or self.flux == 0:
+            return math.nan
+        return (math.atan2(self.phasor.imag, self.phasor.real) % (2 * math.pi)) / k
+
+    def pulse_distance_m(self, modulation: Modulation) -> float:
+        """Return the effective distance of a pulse, r0 late/flux, at most r0 [m]."""
+        if not modulation.r0 > 0 or self.flux == 0:
+            return math.nan
+        return modulation.r0 * self.late / self.flux
+
+
+@compiled
+def _observe_many(
+    surfaces: Array,
+    head: Array,
+    table: Array,
+    materials: Array,
+    backdrop: Array | None,
+    signal: Array,
+    rules: tuple[Array, Array],
+    tolerance: float,
+) -> tuple[Array, Array, Array]:
+    count = surfaces.shape[0]
+    values = np.zeros((count, COMPONENTS))
+    errors = np.zeros(count)
+    states = np.zeros((count, 2), dtype=np.int64)
+    late = 1.0 / signal[1] if signal[1] > 0.0 else 0.0
+    for i in range(count):
+        status, chart, region, marks = build_chart(
+            surfaces[i], head, materials[i], late, backdrop
+        )
+        states[i, 0] = status
+        if status != 0:
+            continue
+        here = signal.copy()
+        here[2] = 1.0 / math.hypot(chart[15], math.hypot(chart[16], chart[17]))
+        if surfaces.shape[1] == 0 and backdrop is not None:
+            here[2] = 1.0 / backdrop[3]
+        value, error, rays = integrate(
+            chart, head, table, materials[i], backdrop, here, rules, region, marks, tolerance
+        )
+        values[i] = value
+        values[i, 1] /= here[2]
+        errors[i] = error
+        states[i, 1] = rays
+        if rays == 0:
+            states[i, 0] = 3
+    return values, errors, states
+
+
+def _pack_head(emitter: Emitter, detector: Detector) -> tuple[Array, Array]:
+    pattern, table = pack_pattern(emitter.pattern)
+    head = np.concatenate(
+        [emitter.position_m, emitter.aim, detector.position_m, detector.normal, pattern]
+    )
+    return head, table
+
+
+def _pack_shell(shell: Shell, emitter: Emitter, detector: Detector) -> Array:
+    centre = np.array(shell.centre_m)
+    position_e, position_d = np.array(emitter.position_m), np.array(detector.position_m)
+    for position, name in ((position_e, "emitter"), (position_d, "detector")):
+        if float(np.linalg.norm(position - centre)) >= shell.radius_m:
+            raise InvalidInputError.at("/background/radius_m", f"the {name} lies outside the shell")
+    return np.concatenate(
+        [position_d - centre, [shell.radius_m], centre - position_e, pack_material(shell.material)]
+    )
+
+
+def _rules(points: int | None) -> tuple[Array, Array]:
+    if points is None:
+        return GAUSS_KRONROD, GAUSS_KRONROD
+    rule = gauss_rule(points)
+    return rule, rule
+
+
+def _lights(values: Array, errors: Array, states: Array, modulation: Modulation) -> list[Light]:
+    lights = []
+    for value, error, (state, _) in zip(values, errors, states, strict=True):
+        if state == charts.INSIDE:
+            raise InvalidInputError.at("/surface", "emitter or detector lies inside the sphere")
+        flux = float(value[0])
+        status = _STATUS[int(state)]
+        if status == "lit" and flux == 0.0:
+            status = "underflow"
+        lights.append(
+            Light(
+                flux=flux,
+                distance_m=float(value[1]) / flux if flux > 0 else math.nan,
+                late=float(value[2]) if modulation.r0 > 0 else math.nan,
+                phasor=(
+                    complex(value[3], value[4])
+                    if modulation.wave_number > 0
+                    else complex(math.nan, math.nan)
+                ),
+                error=float(error) / flux if flux > 0 else 0.0,
+                status=status,
+            )
+        )
+    return lights
+
+
+def observe_batch(
+    surfaces: Sequence[AnySurface],
+    emitter: Emitter | None = None,
+    detector: Detector | None = None,
+    modulation: Modulation | None = None,
+    *,
+    tolerance: float = 1e-11,
+    points: int | None = None,
+) -> list[Light]:
+    """Return what each of several surfaces would send on its own.
+
+    Parameters
+    ----------
+    surfaces : sequence of Rectangle, Disk, Plane or Sphere
+        Surfaces, or one surface at several poses.
+    emitter, detector : optional
+        Defaults: a uniform emitter and a detector at the origin, along +z.
+    modulation : Modulation, optional
+        Default: neither pulse nor sine wave; flux and distance only.
+    tolerance : float
+        Relative, of the flux.
+    points : int, optional
+        A fixed Gauss rule of that many points a piece instead of adaptive quadrature.
+
+    Returns
+    -------
+    list of Light
+        One for each surface.
+
+    Raises
+    ------
+    InvalidInputError
+        If emitter or detector lies inside a sphere.
+    """
+    emitter, detector = emitter or Emitter(), detector or Detector()
+    modulation = modulation or Modulation()
+    if not surfaces:
+        return []
+    if isinstance(emitter.pattern, Narrow):
+        from simulator.optics.narrow import observe_narrow
+
+        return [observe_narrow(s, emitter, detector, modulation) for s in surfaces]
+    rows = np.vstack([pack_surface(s) for s in surfaces])
+    materials = np.vstack([pack_material(s.material) for s in surfaces])
+    values = np.zeros((len(surfaces), COMPONENTS))
+    errors = np.zeros(len(surfaces))
+    states = np.full((len(surfaces), 2), -1, dtype=np.int64)
+    signal = np.array(
+        [modulation.wave_number, 1.0 / modulation.r0 if modulation.r0 > 0 else 0.0, 1.0]
+    )
+    head, table = _pack_head(emitter, detector)
+    values, errors, states = _observe_many(
+        rows, head, table, materials, None, signal, _rules(points), tolerance
+    )
+    return _lights(values, errors, states, modulation)
+
+
+def observe(
+    surface: AnySurface,
+    emitter: Emitter | None = None,
+    detector: Detector | None = None,
+    modulation: Modulation | None = None,
+    *,
+    tolerance: float = 1e-11,
+    points: int | None = None,
+) -> Light:
+    """Return what a surface sends to the detector; see `observe_batch`."""
+    return observe_batch(
+        [surface], emitter, detector, modulation, tolerance=tolerance, points=points
+    )[0]
+
+
+def _backdrop_sums(
+    rows: Array,
+    shell: Shell,
+    emitter: Emitter,
+    detector: Detector,
+    modulation: Modulation,
+    tolerance: float,
+) -> list[Light]:
+    if isinstance(emitter.pattern, Narrow):
+        raise InvalidInputError.at(
+            "/emitter/pattern", "a narrow beam lights one point, not a background"
+        )
+    head, table = _pack_head(emitter, detector)
+    signal = np.array(
+        [modulation.wave_number, 1.0 / modulation.r0 if modulation.r0 > 0 else 0.0, 1.0]
+    )
+    backdrop = _pack_shell(shell, emitter, detector)
+    materials = np.tile(pack_material(shell.material), (rows.shape[0], 1))
+    values, errors, states = _observe_many(
+        rows, head, table, materials, backdrop, signal, _rules(None), tolerance
+    )
+    return _lights(values, errors, states, modulation)
+
+
+def observe_shell(
+    shell: Shell,
+    emitter: Emitter | None = None,
+    detector: Detector | None = None,
+    modulation: Modulation | None = None,
+    *,
+    tolerance: float = 1e-11,
+) -> Light:
+    """Return what the bare shell sends: the background without an object (3.27).
+
+    Raises
+    ------
+    InvalidInputError
+        If emitter or detector lies outside the shell.
+    """
+    emitter, detector = emitter or Emitter(), detector or Detector()
+    modulation = modulation or Modulation()
+    return _backdrop_sums(np.empty((1, 0)), shell, emitter, detector, modulation, tolerance)[0]
+
+
+def shadow(
+    surface: AnySurface,
+    shell: Shell,
+    emitter: Emitter | None = None,
+    detector: Detector | None = None,
+    modulation: Modulation | None = None,
+    *,
+    tolerance: float = 1e-11,
+) -> Light:
+    """Return what a surface hides of the shell: the integral over its silhouette (3.28).
+
+    Raises
+    ------
+    InvalidInputError
+        If emitter and detector are not at one point: a shell point is then dark where either of
+        two silhouettes covers it, which is not the integral over one.
+    """
+    emitter, detector = emitter or Emitter(), detector or Detector()
+    modulation = modulation or Modulation()
+    if emitter.position_m != detector.position_m:
+        raise InvalidInputError.at(
+            "/background", "the exact shadow needs emitter and detector at one point"
+        )
+    rows = pack_surface(surface)[None, :]
+    return _backdrop_sums(rows, shell, emitter, detector, modulation, tolerance)[0]
