@@ -1,0 +1,62 @@
+"""The application: routes, shared state, start and end."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.metadata import version
+
+import anyio
+from fastapi import FastAPI
+
+from inference.posterior import fold as posterior_fold
+from service import openapi, problems
+from service.job_store import MemoryJobStore
+from service.jobs import Fold, Jobs
+from service.process_pool import ProcessPool
+from service.routes import estimates, health, posteriors, simulations, techniques
+from service.settings import Settings
+from service.state import State
+
+__all__ = ["create_app"]
+
+
+def create_app(settings: Settings | None = None, fold: Fold = posterior_fold) -> FastAPI:
+    """Make an application of its own: nothing is shared between two of them.
+
+    Parameters
+    ----------
+    settings : Settings, optional
+        Left out: the defaults; the environment is read by the caller.
+    fold : Fold, optional
+        How posteriors are computed.
+
+    Returns
+    -------
+    FastAPI
+        An ASGI application; jobs run between its start and its end (ASGI lifespan).
+    """
+    settings = settings or Settings()
+    pool = ProcessPool(settings.workers)
+    jobs = Jobs(fold, MemoryJobStore(settings.max_jobs), pool, running=settings.workers)
+    state = State(settings, jobs, anyio.CapacityLimiter(settings.threads))
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        await jobs.start()
+        try:
+            yield
+        finally:
+            await jobs.close()
+
+    app = FastAPI(
+        title="hybridtof",
+        version=version("hybridtof"),
+        description="Distance from hybrid intensity/time-of-flight sensors. SI units throughout.",
+        lifespan=lifespan,
+        redirect_slashes=False,
+    )
+    app.state.shared = state
+    problems.install(app)
+    openapi.install(app)
+    for module in (estimates, posteriors, simulations, techniques, health):
+        app.include_router(module.router)
+    return app

@@ -1,0 +1,61 @@
+"""The service's own exceptions.
+
+::
+
+    HybridTofError                     (simulator.errors)
+    ├── InvalidInputError
+    ├── RefusedError
+    └── ServiceError
+        ├── MalformedError             the body or a header cannot be read at all
+        ├── BodyTooLargeError
+        ├── UnsupportedMediaTypeError
+        ├── NotFoundError
+        ├── IdempotencyError           a key was used before with another request
+        ├── BusyError                  the service takes no more work now
+        └── WorkerDiedError            a task killed every worker that ran it
+"""
+
+from simulator.errors import HybridTofError
+
+__all__ = [
+    "BodyTooLargeError",
+    "BusyError",
+    "IdempotencyError",
+    "MalformedError",
+    "NotFoundError",
+    "ServiceError",
+    "UnsupportedMediaTypeError",
+    "WorkerDiedError",
+]
+
+
+class ServiceError(HybridTofError):
+    """Base of what can go wrong between a client and the layers below."""
+
+
+class MalformedError(ServiceError):
+    """The body is not JSON, or a header or query parameter cannot be read."""
+
+
+class BodyTooLargeError(ServiceError):
+    """The body has more bytes than the service accepts."""
+
+
+class UnsupportedMediaTypeError(ServiceError):
+    """The body is declared to be something else than JSON."""
+
+
+class NotFoundError(ServiceError):
+    """There is no such resource."""
+
+
+class IdempotencyError(ServiceError):
+    """An idempotency key came before with another request."""
+
+
+class BusyError(ServiceError):
+    """The service takes no more work at present."""
+
+
+class WorkerDiedError(ServiceError):
+    """A task ended the process that ran it, every time it was tried."""

@@ -1,0 +1,122 @@
+"""Estimates as JSON text, columnwise: a dictionary a frame costs more than the estimate itself.
+
+Frames of one kind (same status, reason, number of roots, near a fold or not) have the same JSON
+but for their numbers, so each kind is one template that is filled from columns of number texts.
+"""
+
+import json
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import pydantic_core
+from numpy.typing import NDArray
+
+from inference.estimates import Estimates, Status, TechniqueResult
+
+__all__ = ["encode_estimates"]
+
+Array = NDArray[np.float64]
+
+
+def encode_estimates(estimates: Estimates) -> bytes:
+    """Return the body of ``POST /v1/estimates``.
+
+    Parameters
+    ----------
+    estimates : Estimates
+        Results for n frames each.
+
+    Returns
+    -------
+    bytes
+        JSON as in the contract; null where a number is not available.
+    """
+    results = ", ".join(_technique(result) for result in estimates.results)
+    left_out = [{"technique": item.name, "reason": item.reason} for item in estimates.left_out]
+    head = json.dumps(estimates.chosen)
+    text = f'{{"chosen": {head}, "results": [{results}], "left_out": {json.dumps(left_out)}}}'
+    return text.encode("ascii")
+
+
+def _technique(result: TechniqueResult) -> str:
+    parameters = None if result.parameters is None else dict(result.parameters)
+    return (
+        f'{{"technique": {json.dumps(result.technique)}, "frames": [{", ".join(_frames(result))}], '
+        f'"parameters": {json.dumps(parameters, allow_nan=False)}, '
+        f'"runtime_s": {json.dumps(result.runtime_s, allow_nan=False)}}}'
+    )
+
+
+def _texts(column: Array) -> list[str]:
+    """JSON texts of numbers, "null" for what is not finite."""
+    if column.size == 0:
+        return []
+    text: str = pydantic_core.to_json(column.tolist(), inf_nan_mode="null").decode("ascii")
+    return text[1:-1].split(",")
+
+
+def _kinds(result: TechniqueResult) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """Yield, for each kind of frame, one of its frames and the indices of all."""
+    near = result.near_fold.astype(np.int64)
+    code = result.status.astype(np.int64)
+    code = code * len(result.reasons) + result.reason
+    code = (code * (result.roots_m.shape[1] + 1) + result.root_count) * 2 + near
+    if result.range_bounds_m is not None:
+        code = code * 2 + np.isfinite(result.range_bounds_m).all(axis=1)
+    order = np.argsort(code, kind="stable")
+    borders = np.flatnonzero(np.diff(code[order])) + 1
+    for index in np.split(order, borders):
+        yield int(index[0]), index
+
+
+def _frames(result: TechniqueResult) -> Sequence[str]:
+    """JSON text of every frame."""
+    n = result.status.size
+    frames = np.empty(n, dtype=object)
+    if n == 0:
+        return []
+    extra: list[tuple[str, Array]] = []
+    if result.power_law is not None:
+        extra.append(("power_law", result.power_law))
+    if result.zeta is not None:
+        extra.append(("zeta", result.zeta))
+    for first, index in _kinds(result):
+        count = int(result.root_count[first])
+        columns = [result.roots_m[index, k] for k in range(count)]
+        columns += [result.roots_sd_m[index, k] for k in range(count)]
+        columns += [values[index] for _, values in extra]
+        if result.range_bounds_m is not None and np.isfinite(result.range_bounds_m[first]).all():
+            columns += [result.range_bounds_m[index, k] for k in (0, 1)]
+        template = _template(result, first, count, [name for name, _ in extra])
+        texts = [_texts(np.asarray(column, dtype=float)) for column in columns]
+        if texts:
+            frames[index] = list(map(template.format, *texts))
+        else:
+            frames[index] = template.format()
+    return frames.tolist()
+
+
+def _template(result: TechniqueResult, first: int, count: int, extra: Sequence[str]) -> str:
+    """Format string of one kind of frame; columns are numbered as in `_frames`."""
+    status = Status(int(result.status[first]))
+    unique = status is Status.UNIQUE and count == 1
+    members = {
+        "status": f'"{status.name.lower()}"',
+        "range_m": "{0}" if unique else "null",
+        "sd_m": f"{{{count}}}" if unique else "null",
+        "roots_m": "[" + ", ".join(f"{{{k}}}" for k in range(count)) + "]",
+        "roots_sd_m": "[" + ", ".join(f"{{{count + k}}}" for k in range(count)) + "]",
+        "near_fold": "true" if result.near_fold[first] else "false",
+    }
+    reason = result.reasons[int(result.reason[first])]
+    if reason:
+        members["reason"] = json.dumps(reason).replace("{", "{{").replace("}", "}}")
+    position = 2 * count
+    for name in extra:
+        members[name] = f"{{{position}}}"
+        position += 1
+    if result.range_bounds_m is not None:
+        known = np.isfinite(result.range_bounds_m[first]).all()
+        members["range_bounds_m"] = f"[{{{position}}}, {{{position + 1}}}]" if known else "null"
+    body = ", ".join(f'"{name}": {value}' for name, value in members.items())
+    return "{{" + body + "}}"

@@ -1,0 +1,214 @@
+"""Every refusal as RFC 9457 ``application/problem+json``: the one place that maps errors to HTTP.
+
+========================== ====== =====================================================
+exception                  status meaning
+========================== ====== =====================================================
+InvalidInputError          422    JSON that breaks a rule; ``errors`` names every field
+RefusedError               422    valid input for which no honest answer exists
+IdempotencyError           422    the key came before with another request
+MalformedError             400    not JSON, or an unreadable header or query parameter
+NotFoundError              404
+BodyTooLargeError          413
+UnsupportedMediaTypeError  415
+BusyError                  503    with ``Retry-After``
+========================== ====== =====================================================
+
+A refusal is 422 and not 409: it depends on the request alone, not on the state of a resource.
+"""
+
+import json
+import logging
+import uuid
+from collections.abc import Mapping, Sequence
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import Response
+from pydantic import BaseModel
+from starlette.exceptions import HTTPException
+
+from service.errors import (
+    BodyTooLargeError,
+    BusyError,
+    IdempotencyError,
+    MalformedError,
+    NotFoundError,
+    UnsupportedMediaTypeError,
+)
+from service.strict_json import escape
+from simulator.errors import HybridTofError, InvalidInputError, Problem, RefusedError
+
+__all__ = [
+    "MEDIA_TYPE",
+    "ErrorItem",
+    "ProblemDetails",
+    "describe",
+    "install",
+    "problem_responses",
+]
+
+MEDIA_TYPE = "application/problem+json"
+_TYPE = "urn:hybridtof:problem:"
+# a client with a thousand mistakes is helped by the first hundred
+_MAX_ERRORS = 100
+_MAX_TEXT = 400
+
+_log = logging.getLogger("hybridtof")
+
+
+class ErrorItem(BaseModel):
+    """One offending field."""
+
+    pointer: str
+    detail: str
+
+
+class ProblemDetails(BaseModel):
+    """RFC 9457 problem details with a JSON pointer for each offending field."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    errors: list[ErrorItem]
+
+
+_KINDS: Mapping[type[HybridTofError], tuple[HTTPStatus, str, str]] = {
+    InvalidInputError: (HTTPStatus(422), "invalid-input", "The input breaks a rule"),
+    RefusedError: (HTTPStatus(422), "refused", "There is no honest answer to this input"),
+    IdempotencyError: (HTTPStatus(422), "idempotency", "The idempotency key was used before"),
+    MalformedError: (HTTPStatus.BAD_REQUEST, "malformed", "The request cannot be read"),
+    NotFoundError: (HTTPStatus.NOT_FOUND, "not-found", "There is no such resource"),
+    BodyTooLargeError: (HTTPStatus(413), "too-large", "The body is too large"),
+    UnsupportedMediaTypeError: (
+        HTTPStatus.UNSUPPORTED_MEDIA_TYPE,
+        "media-type",
+        "The body must be JSON",
+    ),
+    BusyError: (HTTPStatus.SERVICE_UNAVAILABLE, "busy", "The service takes no more work now"),
+}
+
+
+def _shorten(text: str) -> str:
+    return text if len(text) <= _MAX_TEXT else text[: _MAX_TEXT - 1] + "…"
+
+
+def _details(
+    status: int, slug: str, title: str, detail: str, problems: Sequence[Problem] = ()
+) -> dict[str, Any]:
+    errors = [
+        {"pointer": _shorten(p.pointer), "detail": _shorten(p.message)}
+        for p in problems[:_MAX_ERRORS]
+    ]
+    return {
+        "type": _TYPE + slug,
+        "title": title,
+        "status": int(status),
+        "detail": _shorten(detail),
+        "errors": errors,
+    }
+
+
+def describe(error: HybridTofError) -> dict[str, Any]:
+    """Return an exception as problem details.
+
+    Parameters
+    ----------
+    error : HybridTofError
+        Anything of the exception tree.
+
+    Returns
+    -------
+    dict
+        Members of `ProblemDetails`; status 500 for an exception that is not in the table.
+    """
+    status, slug, title = next(
+        (kind for cls, kind in _KINDS.items() if isinstance(error, cls)),
+        (HTTPStatus.INTERNAL_SERVER_ERROR, "internal", "The service failed"),
+    )
+    problems = error.problems if isinstance(error, InvalidInputError) else ()
+    detail = str(error)
+    if len(problems) > 1:
+        detail = f"{len(problems)} fields break a rule; {detail}"
+    return _details(status, slug, title, detail, problems)
+
+
+def _response(details: Mapping[str, Any], headers: Mapping[str, str] | None = None) -> Response:
+    # ASCII, so that whatever a client wrote into a field's name can be said back
+    body = json.dumps(details, allow_nan=False).encode("ascii")
+    return Response(body, details["status"], headers, MEDIA_TYPE)
+
+
+async def _on_known(_: Request, error: Exception) -> Response:
+    assert isinstance(error, HybridTofError)  # noqa: S101 (registered for this class alone)
+    details = describe(error)
+    headers = {"Retry-After": "5"} if isinstance(error, BusyError) else None
+    if details["status"] == HTTPStatus.INTERNAL_SERVER_ERROR:
+        return await _on_unknown(_, error)
+    return _response(details, headers)
+
+
+async def _on_http(_: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)  # noqa: S101
+    status = HTTPStatus(error.status_code)
+    slug = status.phrase.lower().replace(" ", "-")
+    details = _details(status, slug, status.phrase, str(error.detail))
+    return _response(details, error.headers)
+
+
+async def _on_parameters(_: Request, error: Exception) -> Response:
+    """Path, query and header parameters that FastAPI itself checks."""
+    assert isinstance(error, RequestValidationError)  # noqa: S101
+    problems = [
+        Problem("/" + "/".join(escape(str(part)) for part in item["loc"]), item["msg"])
+        for item in error.errors()
+    ]
+    return _response(describe(InvalidInputError(*problems)))
+
+
+async def _on_unknown(_: Request, error: Exception) -> Response:
+    reference = uuid.uuid4().hex
+    _log.error("internal error %s", reference, exc_info=error)
+    detail = f"an error of the service itself; its log has it under {reference}"
+    return _response(
+        _details(HTTPStatus.INTERNAL_SERVER_ERROR, "internal", "The service failed", detail)
+    )
+
+
+def install(app: FastAPI) -> None:
+    """Let an application answer every refusal with problem details.
+
+    Parameters
+    ----------
+    app : FastAPI
+        The application.
+    """
+    app.add_exception_handler(HybridTofError, _on_known)
+    app.add_exception_handler(HTTPException, _on_http)
+    app.add_exception_handler(RequestValidationError, _on_parameters)
+    app.add_exception_handler(Exception, _on_unknown)
+
+
+def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """Return what OpenAPI says of the refusals of a route.
+
+    Parameters
+    ----------
+    *statuses : int
+        HTTP status codes.
+
+    Returns
+    -------
+    dict
+        For FastAPI's ``responses``.
+    """
+    schema = {"$ref": f"#/components/schemas/{ProblemDetails.__name__}"}
+    return {
+        status: {
+            "description": HTTPStatus(status).phrase,
+            "content": {MEDIA_TYPE: {"schema": schema}},
+        }
+        for status in statuses
+    }

@@ -1,0 +1,55 @@
+"""Deterministic estimates, at once."""
+
+from typing import Annotated
+
+import anyio.to_thread
+from fastapi import APIRouter, Depends, Request
+from fastapi.responses import Response
+
+from inference.estimate import estimate
+from service.bodies import body_of, openapi_body
+from service.checks import system_with_frames
+from service.estimate_json import encode_estimates
+from service.problems import problem_responses
+from service.schemas import EstimateRequest, EstimatesResponse
+from service.state import state_of
+
+__all__ = ["answer", "router"]
+
+router = APIRouter(prefix="/v1/estimates", tags=["estimates"])
+Body = Annotated[tuple[EstimateRequest, bytes], Depends(body_of(EstimateRequest))]
+
+
+def answer(request: EstimateRequest) -> bytes:
+    """Estimate and encode.
+
+    Parameters
+    ----------
+    request : EstimateRequest
+        Sensor, scene, frames and techniques.
+
+    Returns
+    -------
+    bytes
+        JSON of the contract.
+
+    Raises
+    ------
+    InvalidInputError
+        With pointers into the request.
+    """
+    sensor, scene, frames = system_with_frames(request)
+    return encode_estimates(estimate(sensor, scene, frames, request.techniques))
+
+
+@router.post(
+    "",
+    response_model=None,
+    responses={200: {"model": EstimatesResponse}, **problem_responses(400, 413, 415, 422)},
+    openapi_extra=openapi_body(EstimateRequest),
+)
+async def create(request: Request, body: Body) -> Response:
+    """Return all physical roots of every frame."""
+    limiter = state_of(request).threads
+    content = await anyio.to_thread.run_sync(answer, body[0], limiter=limiter)
+    return Response(content, media_type="application/json")

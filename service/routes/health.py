@@ -1,0 +1,34 @@
+"""Whether the service lives, and whether it takes work."""
+
+from typing import Literal
+
+from fastapi import APIRouter, Request
+from pydantic import BaseModel
+
+from service.errors import BusyError
+from service.problems import problem_responses
+from service.state import state_of
+
+__all__ = ["Health", "router"]
+
+router = APIRouter(prefix="/health", tags=["health"])
+
+
+class Health(BaseModel):
+    """The good answer; the other one is a problem."""
+
+    status: Literal["ok"] = "ok"
+
+
+@router.get("/live")
+async def live() -> Health:
+    """Answer as long as the process can answer at all."""
+    return Health()
+
+
+@router.get("/ready", responses=problem_responses(503))
+async def ready(request: Request) -> Health:
+    """Answer 503 while the service starts or ends."""
+    if not state_of(request).jobs.open:
+        raise BusyError("the service is starting or ending")
+    return Health()

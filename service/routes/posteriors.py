@@ -1,0 +1,122 @@
+"""Posteriors: asked for, watched, cancelled, forgotten."""
+
+import hashlib
+import re
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Header, Query, Request
+from fastapi.responses import JSONResponse, Response
+
+from service.bodies import body_of, openapi_body
+from service.checks import system_with_frames
+from service.errors import MalformedError
+from service.job_store import JobRecord
+from service.problems import problem_responses
+from service.schemas import PosteriorPage, PosteriorRequest, PosteriorResponse
+from service.state import state_of
+
+__all__ = ["router"]
+
+router = APIRouter(prefix="/v1/posteriors", tags=["posteriors"])
+Body = Annotated[tuple[PosteriorRequest, bytes], Depends(body_of(PosteriorRequest))]
+
+_KEY = re.compile(r"[\x21-\x7e]{1,255}")
+_RESULTS = (
+    "verdict",
+    "parameters",
+    "range_m",
+    "identifiability",
+    "fit",
+    "left_out",
+    "runtime",
+)
+
+
+def _brief(record: JobRecord) -> dict[str, Any]:
+    return {
+        "id": record.id,
+        "status": record.status,
+        "method": record.method,
+        "seed": record.seed,
+        "progress": record.progress,
+    }
+
+
+def _full(record: JobRecord) -> dict[str, Any]:
+    body = _brief(record) | dict.fromkeys(_RESULTS) | (record.result or {})
+    return body if record.problem is None else body | {"problem": record.problem}
+
+
+def _key(header: str | None) -> str | None:
+    if header is not None and not _KEY.fullmatch(header):
+        raise MalformedError("Idempotency-Key must be 1 to 255 visible ASCII characters")
+    return header
+
+
+@router.post(
+    "",
+    status_code=202,
+    response_model=None,
+    responses={202: {"model": PosteriorResponse}, **problem_responses(400, 413, 415, 422, 503)},
+    openapi_extra=openapi_body(PosteriorRequest),
+)
+async def create(
+    request: Request,
+    body: Body,
+    idempotency_key: Annotated[str | None, Header()] = None,
+) -> Response:
+    """Start a posterior; the same Idempotency-Key with the same body gives the same one."""
+    key = _key(idempotency_key)
+    asked, raw = body
+    sensor, scene, frames = system_with_frames(asked)
+    record = await state_of(request).jobs.submit(
+        sensor, scene, frames, asked.sampler, key=key, digest=hashlib.sha256(raw).hexdigest()
+    )
+    return JSONResponse(_full(record), 202, {"Location": f"/v1/posteriors/{record.id}"})
+
+
+@router.get(
+    "",
+    response_model=None,
+    responses={200: {"model": PosteriorPage}, **problem_responses(400, 422)},
+)
+async def page(
+    request: Request,
+    cursor: str | None = None,
+    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+) -> Response:
+    """List posteriors, the newest first; ``next_cursor`` is null on the last page."""
+    if cursor is not None and not re.fullmatch(r"[0-9]{1,18}", cursor):
+        raise MalformedError("the cursor is not one that this service gave")
+    after = None if cursor is None else int(cursor)
+    records = await state_of(request).jobs.page(after, limit + 1)
+    more = str(records[limit - 1].sequence) if len(records) > limit else None
+    return JSONResponse({"items": [_brief(r) for r in records[:limit]], "next_cursor": more})
+
+
+@router.get(
+    "/{job_id}",
+    response_model=None,
+    responses={200: {"model": PosteriorResponse}, **problem_responses(404)},
+)
+async def get(request: Request, job_id: str) -> Response:
+    """Return a posterior as it stands."""
+    return JSONResponse(_full(await state_of(request).jobs.get(job_id)))
+
+
+@router.post(
+    "/{job_id}/cancel",
+    status_code=202,
+    response_model=None,
+    responses={202: {"model": PosteriorResponse}, **problem_responses(404)},
+)
+async def cancel(request: Request, job_id: str) -> Response:
+    """End a posterior after the chunk that runs; it keeps what it has. One that ended stays."""
+    return JSONResponse(_full(await state_of(request).jobs.cancel(job_id)), 202)
+
+
+@router.delete("/{job_id}", status_code=204, response_model=None, responses=problem_responses(404))
+async def delete(request: Request, job_id: str) -> Response:
+    """Forget a posterior, running or not."""
+    await state_of(request).jobs.delete(job_id)
+    return Response(status_code=204)

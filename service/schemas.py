@@ -1,0 +1,211 @@
+"""Shapes of requests, by which they are validated, and of responses, for OpenAPI."""
+
+from typing import Annotated, Any, Literal
+
+import pydantic
+from inference.posterior.settings import SamplerSettings
+
+from simulator.frames import FrameColumns
+from simulator.scene import Scene
+from simulator.sensor import Sensor
+from simulator.trajectories import Trajectory
+from simulator.validated import Validated
+
+__all__ = [
+    "EstimateRequest",
+    "EstimatesResponse",
+    "FrameEstimate",
+    "LeftOutTechnique",
+    "PosteriorPage",
+    "PosteriorRequest",
+    "PosteriorResponse",
+    "SimulationRequest",
+    "SimulationResponse",
+    "SystemDescription",
+    "TechniqueDescription",
+    "TechniqueEstimates",
+    "TechniquesResponse",
+]
+
+AnySensor = Annotated[Sensor, pydantic.Field(discriminator="kind")]
+# the largest integer that every JSON reader keeps exactly
+Seed = Annotated[int, pydantic.Field(ge=0, le=2**53 - 1)]
+Name = Annotated[str, pydantic.Field(max_length=64)]
+
+
+class SystemDescription(Validated):
+    """A sensor and the scene before it: what every request and every scene file holds."""
+
+    sensor: AnySensor
+    scene: Scene
+
+
+class EstimateRequest(SystemDescription):
+    """Body of ``POST /v1/estimates``."""
+
+    frames: FrameColumns
+    techniques: Annotated[list[Name], pydantic.Field(min_length=1, max_length=64)] | None = None
+
+
+class PosteriorRequest(SystemDescription):
+    """Body of ``POST /v1/posteriors``."""
+
+    frames: FrameColumns
+    sampler: SamplerSettings = SamplerSettings()
+
+
+class SimulationRequest(SystemDescription):
+    """Body of ``POST /v1/simulations``; a seed that is left out is drawn and returned."""
+
+    trajectory: Trajectory
+    seed: Seed | None = None
+
+
+class FrameEstimate(pydantic.BaseModel):
+    """One technique's answer for one frame."""
+
+    status: Literal["unique", "ambiguous", "none", "saturated"]
+    range_m: float | None
+    sd_m: float | None
+    roots_m: list[float]
+    roots_sd_m: list[float | None]
+    near_fold: bool
+    reason: str | None = None
+    range_bounds_m: tuple[float, float] | None = None
+    power_law: float | None = None
+    zeta: float | None = None
+
+
+class TechniqueEstimates(pydantic.BaseModel):
+    """One technique's answer."""
+
+    technique: str
+    frames: list[FrameEstimate]
+    parameters: dict[str, Any] | None
+    runtime_s: float
+
+
+class LeftOutTechnique(pydantic.BaseModel):
+    """A technique that was not used, and why."""
+
+    technique: str
+    reason: str
+
+
+class EstimatesResponse(pydantic.BaseModel):
+    """Answer of ``POST /v1/estimates``."""
+
+    chosen: str | None
+    results: list[TechniqueEstimates]
+    left_out: list[LeftOutTechnique]
+
+
+class _Progress(pydantic.BaseModel):
+    steps: int
+    target: int
+    ess: float | None
+    rhat: float | None
+    eta_s: float | None
+
+
+class _Verdict(pydantic.BaseModel):
+    converged: bool
+    reasons: list[str]
+
+
+class _Parameter(pydantic.BaseModel):
+    mean: float
+    sd: float
+    q05: float
+    q50: float
+    q95: float
+    ess_bulk: float | None
+    ess_tail: float | None
+    rhat: float | None
+    mcse_mean: float | None
+
+
+class _Mode(pydantic.BaseModel):
+    range_m: float
+    weight: float
+
+
+class _Ranges(pydantic.BaseModel):
+    q05: list[float]
+    q50: list[float]
+    q95: list[float]
+    mean: list[float]
+    sd: list[float]
+    modes: list[list[_Mode]]
+
+
+class _Identifiability(pydantic.BaseModel):
+    parameter: str
+    status: Literal["identified", "weak", "not_identified"]
+    contraction: float | None
+    reason: str
+
+
+class _Fit(pydantic.BaseModel):
+    p_value: float | None
+    misfit: bool
+
+
+class _LeftOutTerm(pydantic.BaseModel):
+    term: str
+    reason: str
+
+
+class _Runtime(pydantic.BaseModel):
+    wall_s: float
+    cpu_s: float
+    likelihood_calls: int
+    k_hat: float | None
+
+
+class _Posterior(pydantic.BaseModel):
+    id: str
+    status: Literal["queued", "running", "done", "cancelled", "failed"]
+    method: str
+    seed: int
+    progress: _Progress | None
+
+
+class PosteriorResponse(_Posterior):
+    """Answer of ``GET /v1/posteriors/{id}``; what is not known yet is null."""
+
+    verdict: _Verdict | None
+    parameters: dict[str, _Parameter] | None
+    range_m: _Ranges | None
+    identifiability: list[_Identifiability] | None
+    fit: _Fit | None
+    left_out: list[_LeftOutTerm] | None
+    runtime: _Runtime | None
+    problem: dict[str, Any] | None = None
+
+
+class PosteriorPage(pydantic.BaseModel):
+    """Answer of ``GET /v1/posteriors``: the newest first."""
+
+    items: list[_Posterior]
+    next_cursor: str | None
+
+
+class SimulationResponse(pydantic.BaseModel):
+    """Answer of ``POST /v1/simulations``."""
+
+    frames: dict[str, list[float] | list[bool]]
+    truth: dict[str, Any]
+    seed: int
+
+
+class TechniqueDescription(pydantic.BaseModel):
+    """What a technique needs and what it costs."""
+
+    name: str
+
+
+class TechniquesResponse(pydantic.BaseModel):
+    """Answer of ``GET /v1/techniques``."""
+
+    techniques: list[TechniqueDescription]

@@ -1,0 +1,74 @@
+"""Settings of the service, from environment variables ``HYBRIDTOF_<NAME>``."""
+
+import os
+from collections.abc import Mapping
+from typing import Annotated
+
+import pydantic
+
+from simulator.errors import InvalidInputError, Problem
+
+__all__ = ["PREFIX", "Settings"]
+
+PREFIX = "HYBRIDTOF_"
+Count = Annotated[int, pydantic.Field(ge=1)]
+
+
+class Settings(pydantic.BaseModel):
+    """What an operator may choose.
+
+    Attributes
+    ----------
+    workers : int
+        Processes for posteriors, each of one thread.
+    threads : int
+        Threads for estimates and simulations.
+    max_body_bytes : int
+        Largest request body: a million frames of six columns need about 128 MiB.
+    max_jobs : int
+        Posteriors that are kept; finished ones make room for new ones, the oldest first.
+    shutdown_s : float
+        How long open requests may take to end after SIGTERM [s].
+    """
+
+    model_config = pydantic.ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    workers: Count = pydantic.Field(default_factory=lambda: os.cpu_count() or 1)
+    threads: Count = 2
+    max_body_bytes: Count = 128 * 2**20
+    max_jobs: Count = 1000
+    shutdown_s: Annotated[float, pydantic.Field(ge=0, le=10)] = 5.0
+
+    @classmethod
+    def from_environment(cls, environment: Mapping[str, str]) -> "Settings":
+        """Read the settings from environment variables.
+
+        Parameters
+        ----------
+        environment : mapping
+            Such as ``os.environ``; variables without the prefix are not looked at.
+
+        Returns
+        -------
+        Settings
+            Defaults where nothing is said.
+
+        Raises
+        ------
+        InvalidInputError
+            For an unknown variable with the prefix and for a value that does not fit, each
+            named.
+        """
+        given = {
+            name.removeprefix(PREFIX).lower(): value
+            for name, value in environment.items()
+            if name.startswith(PREFIX)
+        }
+        try:
+            return cls.model_validate(given)
+        except pydantic.ValidationError as error:
+            problems = [
+                Problem(f"/{PREFIX}{str(item['loc'][0]).upper()}", item["msg"])
+                for item in error.errors(include_url=False, include_input=False)
+            ]
+            raise InvalidInputError(*problems) from None

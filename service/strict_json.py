@@ -1,0 +1,191 @@
+"""JSON in, strictly: nothing is dropped, coerced or followed into the depths silently."""
+
+import json
+import math
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from service.errors import MalformedError
+from simulator.errors import InvalidInputError, Problem
+
+__all__ = ["MAX_DEPTH", "MAX_ENTRIES", "SHORT", "check_bulk", "decode", "escape"]
+
+# no document of this project is nested deeper than about eight levels
+MAX_DEPTH = 32
+# a list or an object longer than this is a column of numbers or of booleans, or it is wrong
+SHORT = 64
+MAX_ENTRIES = 2_000_000
+
+_TOKENS = re.compile(rb'"(?:[^"\\]|\\.)*"|[\[\]{}]', re.DOTALL)
+# more digits than any 64-bit integer has: such a number is read as the float that it is close to
+_MAX_DIGITS = 19
+
+
+class _Repeated(dict[str, Any]):
+    """An object in which ``name`` came more than once."""
+
+    name: str
+
+
+def _integer(digits: str) -> int | float:
+    return int(digits) if len(digits) <= _MAX_DIGITS else float(digits)
+
+
+def _members(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    members = dict(pairs)
+    if len(members) == len(pairs):
+        return members
+    repeated = _Repeated(members)
+    seen: set[str] = set()
+    for name, _ in pairs:
+        if name in seen:
+            repeated.name = name
+        seen.add(name)
+    return repeated
+
+
+_decoder = json.JSONDecoder(object_pairs_hook=_members, parse_int=_integer)
+
+
+def escape(name: str) -> str:
+    """Escape a member's name for a JSON pointer (RFC 6901)."""
+    return name.replace("~", "~0").replace("/", "~1")
+
+
+def _too_deep(raw: bytes) -> bool:
+    # counting bytes costs nothing and settles every ordinary document
+    if raw.count(b"[") + raw.count(b"{") <= MAX_DEPTH:
+        return False
+    depth = 0
+    for token in _TOKENS.finditer(raw):
+        if token[0] in (b"[", b"{"):
+            depth += 1
+            if depth > MAX_DEPTH:
+                return True
+        elif token[0] in (b"]", b"}"):
+            depth -= 1
+    return False
+
+
+def _walk(value: Any, pointer: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield every container with its pointer, without entering columns."""
+    if isinstance(value, dict):
+        yield pointer, value
+        for name, member in value.items():
+            yield from _walk(member, f"{pointer}/{escape(name)}")
+    elif isinstance(value, list):
+        yield pointer, value
+        if len(value) <= SHORT:
+            for index, entry in enumerate(value):
+                yield from _walk(entry, f"{pointer}/{index}")
+
+
+def decode(raw: bytes) -> Any:
+    """Read one JSON document.
+
+    ``NaN`` and infinities are read, so that validation can name the field that holds them; no
+    type of this project accepts them.
+
+    Parameters
+    ----------
+    raw : bytes
+        UTF-8.
+
+    Returns
+    -------
+    Any
+        dict, list, str, int, float, bool or None.
+
+    Raises
+    ------
+    MalformedError
+        Where it is not JSON, not UTF-8, or nested deeper than `MAX_DEPTH`.
+    InvalidInputError
+        Where a member's name is repeated in an object, or a string is not Unicode text: one of
+        two values would be dropped, or could not be repeated to the client.
+    """
+    if not raw.strip():
+        raise MalformedError("the document is empty; it must be JSON")
+    try:
+        text = raw.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise MalformedError(f"the document is not UTF-8 at byte {error.start}") from None
+    if _too_deep(raw):
+        raise MalformedError(f"the document is nested deeper than {MAX_DEPTH} levels")
+    try:
+        value = _decoder.decode(text)
+    except json.JSONDecodeError as error:
+        message = f"not JSON: {error.msg} at line {error.lineno}, column {error.colno}"
+        raise MalformedError(message) from None
+    for pointer, container in _walk(value):
+        if isinstance(container, _Repeated):
+            where = f"{pointer}/{escape(container.name)}"
+            raise InvalidInputError.at(where, "the member is repeated")
+    if b"\\u" in raw:
+        _check_text(value)
+    return value
+
+
+def _check_text(value: Any) -> None:
+    """Refuse lone surrogates, which JSON can spell and UTF-8 cannot."""
+    for pointer, container in _walk(value):
+        entries = [*container, *container.values()] if isinstance(container, dict) else container
+        for entry in entries:
+            if isinstance(entry, str) and not entry.isascii():
+                try:
+                    entry.encode()
+                except UnicodeEncodeError:
+                    message = "holds text with a lone surrogate"
+                    raise InvalidInputError.at(pointer, message) from None
+
+
+def check_bulk(value: Any) -> None:
+    """Check what is long before a validator reports on each of a million entries.
+
+    Parameters
+    ----------
+    value : Any
+        Decoded JSON.
+
+    Raises
+    ------
+    InvalidInputError
+        For a list of more than `SHORT` entries that is not all finite numbers or all booleans
+        (the first offending entry is named), for one of more than `MAX_ENTRIES`, and for an
+        object of more than `SHORT` members.
+    """
+    problems = []
+    for pointer, container in _walk(value):
+        if len(container) <= SHORT:
+            continue
+        if isinstance(container, dict):
+            problems.append(Problem(pointer, f"has more than {SHORT} members"))
+        elif len(container) > MAX_ENTRIES:
+            problems.append(Problem(pointer, f"has more than {MAX_ENTRIES} entries"))
+        elif (index := _first_odd(container)) is not None:
+            wanted = "true or false" if isinstance(container[0], bool) else "a finite number"
+            problems.append(Problem(f"{pointer}/{index}", f"must be {wanted}"))
+        if len(problems) == SHORT:
+            break
+    if problems:
+        raise InvalidInputError(*problems)
+
+
+def _first_odd(column: list[Any]) -> int | None:
+    """Index of the first entry that does not fit a column of numbers or of booleans."""
+    types = set(map(type, column))
+    if types == {bool}:
+        return None
+    numbers = types <= {int, float}
+    if numbers and all(map(math.isfinite, column)):
+        return None
+    boolean = isinstance(column[0], bool)
+    for index, entry in enumerate(column):
+        if boolean:
+            fits = isinstance(entry, bool)
+        else:
+            fits = type(entry) in (int, float) and math.isfinite(entry)
+        if not fits:
+            return index
+    return None

@@ -1,0 +1,91 @@
+"""What runs in a worker process: task after task, until its pipe closes.
+
+Nothing heavy is imported here, so that the process is there at once; a task brings its own imports
+when it is unpickled.
+"""
+
+import pickle
+import signal
+import time
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from typing import Any, TypeVar
+
+__all__ = ["THREAD_VARIABLES", "timed", "work"]
+
+T = TypeVar("T")
+
+# numerical libraries read these when they are imported: one thread a process
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+)
+
+
+def work(pipe: "Connection[object, object]") -> None:
+    """Run tasks from a pipe and send back ``(True, result)`` or ``(False, exception)``.
+
+    Parameters
+    ----------
+    pipe : Connection
+        Delivers ``(function, arguments)``; its end ends the process, also when the parent died.
+    """
+    # the parent decides when a worker ends: a Ctrl-C or a SIGTERM to the group is not for us
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    while True:
+        try:
+            task = pipe.recv()
+        except (EOFError, OSError):
+            return
+        except Exception as error:
+            answer: tuple[bool, object] = (False, _portable(error))
+        else:
+            answer = _run(task)
+        try:
+            pipe.send(answer)
+        except (BrokenPipeError, ConnectionError):
+            return
+        except Exception as error:
+            pipe.send((False, _portable(error)))
+
+
+def _run(task: Any) -> tuple[bool, object]:
+    function, arguments = task
+    try:
+        return True, function(*arguments)
+    except Exception as error:
+        return False, _portable(error)
+
+
+def _portable(error: Exception) -> Exception:
+    """Return an exception that survives the pipe: not each can be made anew from its arguments."""
+    try:
+        pickle.loads(pickle.dumps(error))  # noqa: S301 (made one line above)
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error
+
+
+def timed(function: Callable[..., T], *arguments: Any) -> tuple[T, float]:
+    """Run a function and measure it.
+
+    Parameters
+    ----------
+    function : callable
+        What to run.
+    *arguments
+        Its arguments.
+
+    Returns
+    -------
+    tuple
+        The result, and the processor time of this process [s].
+    """
+    before = time.process_time()
+    result = function(*arguments)
+    return result, time.process_time() - before
