@@ -1,0 +1,116 @@
+"""Real-time estimates: readings in, all physical ranges out, at once."""
+
+import dataclasses
+import time
+from collections.abc import Sequence
+
+from inference.estimates import Estimates, LeftOut, TechniqueResult
+from inference.plan import obstacle, plan
+from inference.realtime.known import known_of
+from inference.realtime.registry import ELSEWHERE, TECHNIQUES
+from inference.realtime.technique import Task
+from simulator.errors import InvalidInputError, Problem
+from simulator.frames import Frames
+from simulator.scene import Scene, check_scene
+from simulator.sensor import Sensor
+
+__all__ = ["all_roots", "estimate"]
+
+
+def estimate(
+    sensor: Sensor, scene: Scene, frames: Frames, techniques: Sequence[str] | None = None
+) -> Estimates:
+    """Estimate the range of every frame.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The sensor.
+    scene : Scene
+        What is known of the scene; only known numbers and the supports of priors are used.
+    frames : Frames
+        The readings.
+    techniques : sequence of str, optional
+        Names in the contract; left out, the plan chooses one.
+
+    Returns
+    -------
+    Estimates
+        One result for each technique asked for that the scene can serve, in that order.
+
+    Raises
+    ------
+    InvalidInputError
+        With pointers relative to the request: ``/scene/...``, ``/techniques/i`` for an unknown
+        name, ``/frames/time_s`` for times that do not increase where a derivative is asked for.
+    """
+    try:
+        check_scene(sensor, scene)
+    except InvalidInputError as error:
+        raise error.below("/scene") from None
+    choice = plan(sensor, scene, frames)
+    if techniques is None:
+        names = () if choice.chosen is None else (choice.chosen,)
+        results = tuple(_run(sensor, scene, frames, name) for name in names)
+        return Estimates(choice.chosen, results, choice.left_out)
+    problems = [
+        Problem(f"/techniques/{i}", f"{name!r} is not a technique")
+        for i, name in enumerate(techniques)
+        if name not in TECHNIQUES and name not in ELSEWHERE
+    ]
+    if problems:
+        raise InvalidInputError(*problems)
+    known = known_of(scene)
+    served: list[TechniqueResult] = []
+    left_out = {item.name: item for item in choice.left_out if item.name not in techniques}
+    if choice.chosen is not None and choice.chosen not in techniques:
+        left_out[choice.chosen] = LeftOut(choice.chosen, "was not asked for")
+    for name in dict.fromkeys(techniques):
+        reason = ELSEWHERE.get(name)
+        if reason is None:
+            reason = obstacle(TECHNIQUES[name], sensor, scene, known, frames)
+        if reason is None:
+            served.append(_run(sensor, scene, frames, name))
+        else:
+            left_out[name] = LeftOut(name, reason)
+    return Estimates(choice.chosen, tuple(served), tuple(left_out.values()))
+
+
+def _run(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> TechniqueResult:
+    start = time.perf_counter()
+    result = TECHNIQUES[name].solve(Task(sensor, scene, frames, known_of(scene)))
+    return dataclasses.replace(result, runtime_s=time.perf_counter() - start)
+
+
+def all_roots(
+    technique: str, sensor: Sensor, scene: Scene, frames: Frames, high_m: float | None = None
+) -> TechniqueResult:
+    """Return every positive solution of a technique's equation, without physical filters.
+
+    Parameters
+    ----------
+    technique : str
+        Its name.
+    sensor, scene, frames
+        As for `estimate`.
+    high_m : float, optional
+        Upper end of the interval searched [m], in place of the technique's own.
+
+    Returns
+    -------
+    TechniqueResult
+        A phase that noise puts below zero keeps its aliases here.
+
+    Raises
+    ------
+    InvalidInputError
+        At ``/technique`` if it is unknown or the scene cannot serve it.
+    """
+    if technique not in TECHNIQUES:
+        raise InvalidInputError.at("/technique", f"{technique!r} is not a real-time technique")
+    known = known_of(scene)
+    reason = obstacle(TECHNIQUES[technique], sensor, scene, known, frames)
+    if reason is not None:
+        raise InvalidInputError.at("/technique", reason)
+    task = Task(sensor, scene, frames, known, physical=False, high_m=high_m)
+    return TECHNIQUES[technique].solve(task)

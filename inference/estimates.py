@@ -1,0 +1,110 @@
+"""What the estimators return: for every frame all physical roots, a status and a reason."""
+
+import dataclasses
+import enum
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Estimates", "LeftOut", "Status", "TechniqueResult"]
+
+Array = NDArray[np.float64]
+
+
+class Status(enum.IntEnum):
+    """What a frame's readings say; in JSON the lower-case name."""
+
+    UNIQUE = 0
+    AMBIGUOUS = 1
+    NONE = 2
+    SATURATED = 3
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class TechniqueResult:
+    """One technique's answer for n frames.
+
+    Attributes
+    ----------
+    technique : str
+        Its name in the contract.
+    status : ndarray of uint8, shape (n,)
+        `Status` of each frame.
+    roots_m : ndarray, shape (n, m)
+        All physical roots, ascending, padded with nan; m >= 1 is the largest count [m].
+    roots_sd_m : ndarray, shape (n, m)
+        First-order standard deviations [m]; nan where the linearisation does not hold.
+    root_count : ndarray of int, shape (n,)
+        Number of roots of each frame.
+    near_fold : ndarray of bool, shape (n,)
+        Whether the noise could merge, part or remove a pair of roots.
+    reason : ndarray of uint8, shape (n,)
+        Index into ``reasons``; 0 says nothing.
+    reasons : tuple of str
+        The reasons that occur, ``reasons[0] == ""``.
+    range_bounds_m : ndarray, shape (n, 2), optional
+        Bounds where the object is unknown (differential) [m], nan where there are none.
+    power_law, zeta : ndarray, shape (n,), optional
+        Exponent b of Phi ~ r^b and distortion 1 + 1/b, nan where unavailable; only of techniques
+        that see motion.
+    parameters : mapping, optional
+        What a technique of many frames found besides the ranges.
+    runtime_s : float
+        Time that the technique took [s].
+    """
+
+    technique: str
+    status: NDArray[np.uint8]
+    roots_m: Array
+    roots_sd_m: Array
+    root_count: NDArray[np.intp]
+    near_fold: NDArray[np.bool_]
+    reason: NDArray[np.uint8]
+    reasons: tuple[str, ...]
+    range_bounds_m: Array | None = None
+    power_law: Array | None = None
+    zeta: Array | None = None
+    parameters: Mapping[str, Any] | None = None
+    runtime_s: float = 0.0
+
+    def __len__(self) -> int:
+        return int(self.status.size)
+
+    @property
+    def range_m(self) -> Array:
+        """The range where it is unique, else nan; shape (n,) [m]."""
+        return np.where(self.status == Status.UNIQUE, self.roots_m[:, 0], np.nan)
+
+    @property
+    def sd_m(self) -> Array:
+        """Standard deviation of the unique range, else nan; shape (n,) [m]."""
+        return np.where(self.status == Status.UNIQUE, self.roots_sd_m[:, 0], np.nan)
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class LeftOut:
+    """A technique that was not used, and why."""
+
+    name: str
+    reason: str
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Estimates:
+    """Results of the techniques that the scene can serve, and why the others are left out.
+
+    Attributes
+    ----------
+    chosen : str or None
+        The technique that the plan prefers; None if the scene serves none.
+    results : tuple of TechniqueResult
+        In the order asked for.
+    left_out : tuple of LeftOut
+        Every other technique.
+    """
+
+    chosen: str | None
+    results: tuple[TechniqueResult, ...]
+    left_out: tuple[LeftOut, ...]

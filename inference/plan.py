@@ -1,0 +1,106 @@
+"""Which real-time technique a scene needs, and why the others are left out."""
+
+import dataclasses
+
+from inference.estimates import LeftOut
+from inference.realtime.known import Known, known_of
+from inference.realtime.registry import ELSEWHERE, TECHNIQUES
+from inference.realtime.technique import Technique
+from simulator.frames import Frames
+from simulator.scene import Scene
+from simulator.sensor import Sensor
+
+__all__ = ["Plan", "obstacle", "plan"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """The technique that a scene needs.
+
+    Attributes
+    ----------
+    chosen : str or None
+        The cheapest technique that is immune to what the scene has; None if there is none.
+    left_out : tuple of LeftOut
+        Every other technique of the contract with its reason.
+    """
+
+    chosen: str | None
+    left_out: tuple[LeftOut, ...]
+
+
+def _plural(paths: list[str]) -> str:
+    return paths[0] if len(paths) == 1 else ", ".join(paths[:-1]) + " and " + paths[-1]
+
+
+def obstacle(
+    technique: Technique, sensor: Sensor, scene: Scene, known: Known, frames: Frames | None
+) -> str | None:
+    """Return why a technique cannot serve a scene, None if it can.
+
+    Parameters
+    ----------
+    technique : Technique
+        The technique.
+    sensor, scene : Sensor, Scene
+        The request.
+    known : Known
+        The scene's known numbers.
+    frames : Frames, optional
+        Left out: frames with times are supposed.
+    """
+    if sensor.kind not in technique.kinds:
+        return "a sine wave has no late window"
+    if technique.differential:
+        if scene.motion == "static":
+            return "needs motion: the scene's range does not change"
+        if frames is not None and frames.derivatives is None:
+            if frames.time_s is None:
+                return "needs derivative columns, or time_s to form differences"
+            if len(frames) < 2:
+                return "needs derivative columns, or at least two frames to form differences"
+    if known.crosstalk is None and "crosstalk" not in technique.immune_to:
+        state = "optional" if "crosstalk" in scene.optional_terms else "unknown"
+        return f"is not immune to crosstalk, and the scene's is {state}"
+    if scene.background is None:
+        if technique.uses_background:
+            return "is made for a background, and the scene states none"
+    elif "background" not in technique.immune_to:
+        return "is not immune to the scene's background"
+    missing = [path for path in technique.needs if not known.has(path)]
+    if missing:
+        return f"needs {_plural(missing)} as known numbers"
+    return None
+
+
+def plan(sensor: Sensor, scene: Scene, frames: Frames | None = None) -> Plan:
+    """Choose the cheapest technique that is immune to what the scene has.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The sensor.
+    scene : Scene
+        The scene.
+    frames : Frames, optional
+        Whether they hold times or derivatives; left out, times are supposed.
+
+    Returns
+    -------
+    Plan
+        The choice, and the reason against each other technique.
+    """
+    known = known_of(scene)
+    obstacles = {
+        name: obstacle(technique, sensor, scene, known, frames)
+        for name, technique in TECHNIQUES.items()
+    }
+    able = [name for name, reason in obstacles.items() if reason is None]
+    chosen = min(able, key=lambda name: TECHNIQUES[name].cost, default=None)
+    left_out = [
+        LeftOut(name, reason if reason is not None else f"{chosen} serves the scene at less cost")
+        for name, reason in obstacles.items()
+        if name != chosen
+    ]
+    left_out += [LeftOut(name, reason) for name, reason in ELSEWHERE.items()]
+    return Plan(chosen, tuple(left_out))

@@ -1,0 +1,1 @@
+"""One file a technique: readings of a frame to all physical ranges."""

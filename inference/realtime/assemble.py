@@ -1,0 +1,142 @@
+"""From candidate roots to a result: filter, sort, status, reason, standard deviation."""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.estimates import Status, TechniqueResult
+from inference.realtime.net import COMMON_REASONS, SATURATED
+
+__all__ = ["NOISE_BAND", "OUTSIDE", "Candidates", "Outcome", "assemble", "reasons_of"]
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# standard deviations within which noise explains a reading on the wrong side of a limit
+NOISE_BAND = 3.0
+
+AMBIGUOUS = len(COMMON_REASONS)
+FOLD = AMBIGUOUS + 1
+FILTERED = AMBIGUOUS + 2
+OUTSIDE = AMBIGUOUS + 3
+_SHARED_REASONS = (
+    *COMMON_REASONS,
+    "more than one range explains the readings",
+    "noise has merged a pair of roots into none: the range is near a fold",
+    "every solution needs a negative object, or a background below zero or above its strength",
+    "every solution lies outside the ranges of the scene",
+)
+
+
+def reasons_of(*own: str) -> tuple[str, ...]:
+    """Return the reasons of a technique: the shared ones, then its own."""
+    return (*_SHARED_REASONS, *own)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Candidates:
+    """Solutions of a technique's equation, before any filter.
+
+    Attributes
+    ----------
+    roots : ndarray, shape (n, m)
+        Ranges [m], nan-padded, in any order.
+    sd : ndarray, shape (n, m)
+        First-order standard deviations [m].
+    near : ndarray of bool, shape (n, m)
+        Whether noise reaches the fold beside the root, so that ``sd`` does not hold.
+    near_frame : ndarray of bool, shape (n,)
+        Whether noise reaches any fold, with or without a root.
+    """
+
+    roots: Array
+    sd: Array
+    near: Flags
+    near_frame: Flags
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Outcome:
+    """What is decided about candidates.
+
+    Attributes
+    ----------
+    physical : ndarray of bool, shape (n, m)
+        Whether a solution passes the technique's physical filter.
+    support : (float, float)
+        Ranges that the scene allows [m], ends included.
+    reason : ndarray of uint8, shape (n,)
+        Why a frame has no root, as far as the technique can tell from its readings; else 0.
+    reasons : tuple of str
+        The texts.
+    """
+
+    physical: Flags | None
+    support: tuple[float, float]
+    reason: NDArray[np.uint8]
+    reasons: tuple[str, ...]
+
+
+def assemble(
+    name: str, state: NDArray[np.uint8], candidates: Candidates, outcome: Outcome
+) -> TechniqueResult:
+    """Build the result of a technique.
+
+    Parameters
+    ----------
+    name : str
+        The technique.
+    state : ndarray of uint8, shape (n,)
+        What rules frames out, see `net.rule_out`.
+    candidates : Candidates
+        All solutions.
+    outcome : Outcome
+        Filters and reasons.
+
+    Returns
+    -------
+    TechniqueResult
+        Without run time.
+    """
+    with np.errstate(all="ignore"):
+        found = np.isfinite(candidates.roots) & (candidates.roots > 0) & (state == 0)[:, None]
+        slack = 8 * np.finfo(float).eps
+        low, high = outcome.support
+        inside = (candidates.roots >= low * (1 - slack)) & (candidates.roots <= high * (1 + slack))
+        physical = found if outcome.physical is None else found & outcome.physical
+        keep = physical & inside
+        count = np.count_nonzero(keep, axis=1)
+        width = max(int(count.max(initial=0)), 1)
+        roots = np.where(keep, candidates.roots, np.nan)
+        sd = np.where(keep & ~candidates.near & np.isfinite(candidates.sd), candidates.sd, np.nan)
+        if roots.shape[1] > 1:
+            order = np.argsort(roots, axis=1, kind="stable")[:, :width]
+            roots = np.take_along_axis(roots, order, axis=1)
+            sd = np.take_along_axis(sd, order, axis=1)
+    status = np.where(
+        count == 1, Status.UNIQUE, np.where(count > 1, Status.AMBIGUOUS, Status.NONE)
+    ).astype(np.uint8)
+    near = candidates.near_frame & (state == 0)
+    # the most specific reason that holds: the technique's own, then what removed its solutions
+    reason = np.zeros(state.size, dtype=np.uint8)
+    none = count == 0
+    reason[none & ~found.any(axis=1) & near] = FOLD
+    reason[none & found.any(axis=1)] = FILTERED
+    reason[none & physical.any(axis=1)] = OUTSIDE
+    own = none & (outcome.reason > 0) & ~found.any(axis=1) & (reason != FOLD)
+    reason[own] = outcome.reason[own]
+    reason[count > 1] = AMBIGUOUS
+    ruled_out = state > 0
+    reason[ruled_out] = state[ruled_out]
+    status[state == SATURATED] = Status.SATURATED
+    return TechniqueResult(
+        technique=name,
+        status=status,
+        roots_m=roots,
+        roots_sd_m=sd,
+        root_count=count.astype(np.intp),
+        near_fold=near,
+        reason=reason,
+        reasons=outcome.reasons,
+    )

@@ -1,0 +1,254 @@
+"""The curves that real-time techniques invert, one number a frame against the range.
+
+Every technique but background intensity reduces a frame to one number t (two for a ratio that may
+be infinite, or an angle modulo pi) that the curve takes at the right range; the curve depends on
+the scene alone. Lengths are in a unit near sqrt(c0), so that nothing overflows.
+
+========================  ==========================================================  ============
+curve                     value at u                                                  equation
+========================  ==========================================================  ============
+INTENSITY                 c0 / (u^2 Q)                                                4.1
+INTENSITY_W1              c0 / (u Q)                                                  4.4
+DIFFERENTIAL_RATIO        u (3u^2 + 2 c1 u + c0) / (4u^2 + 3 c1 u + 2 c0)             4.68
+DIFFERENTIAL_PHASE        k u - atan2(k u Q, 4u^2 + 3 c1 u + 2 c0), modulo pi         errata, 5
+CANCELLING_RATIO          (1 - u/R) c0 / (u^2 Q)                                      4.73
+CANCELLING_QUADRATURE     sin(k (R - u)) c0 / (u^2 Q)                                 errata, 5
+BOTH_RATIO                d(u Phi + R Phi_bg) / d(Phi + Phi_bg)                       4.83
+BOTH_PHASE                arg d(Phi e^jku + Phi_bg e^jkR), modulo pi                  errata, 5
+========================  ==========================================================  ============
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.realtime.bracketing import next_point
+from simulator.compiled import compiled
+from simulator.object_model import quadratic
+
+__all__ = [
+    "BOTH_PHASE",
+    "BOTH_RATIO",
+    "C0",
+    "C0_SHADOW",
+    "C1",
+    "C1_SHADOW",
+    "CANCELLING_QUADRATURE",
+    "CANCELLING_RATIO",
+    "CONTRAST",
+    "DIFFERENTIAL_PHASE",
+    "DIFFERENTIAL_RATIO",
+    "DISTANCE",
+    "INTENSITY",
+    "INTENSITY_W1",
+    "PARAMETERS",
+    "WAVE",
+    "direction",
+    "slope",
+    "solve_between",
+    "turning",
+    "value",
+]
+
+Array = NDArray[np.float64]
+
+INTENSITY, INTENSITY_W1 = 0, 1
+DIFFERENTIAL_RATIO, DIFFERENTIAL_PHASE = 2, 3
+CANCELLING_RATIO, CANCELLING_QUADRATURE = 4, 5
+BOTH_RATIO, BOTH_PHASE = 6, 7
+
+# places in the vector of parameters; CONTRAST is strength / (gain c2) [1 / length^2]
+C0, C1, DISTANCE, WAVE, C0_SHADOW, C1_SHADOW, CONTRAST = 0, 1, 2, 3, 4, 5, 6
+PARAMETERS = 7
+
+
+@compiled
+def direction(kind: int, u: float, p: Array) -> tuple[float, float]:
+    """Return (denominator, numerator) of a ratio, or the direction of the derivative phasor.
+
+    Divided by the positive factor Phi / u. A phasor is relative to the phase offset.
+    """
+    c0, c1 = float(p[C0]), float(p[C1])
+    q = quadratic(u, c0, c1)
+    b = -2.0 - u * (2.0 * u + c1) / q  # d log Phi / d log u
+    if kind == DIFFERENTIAL_RATIO:
+        return b, u * (1.0 + b)
+    # u dPhi_bg/du over Phi
+    qs = quadratic(u, float(p[C0_SHADOW]), float(p[C1_SHADOW]))
+    rate = float(p[CONTRAST]) * (u * u) * (q / c0)
+    rate *= u * (float(p[C0_SHADOW]) / qs) * ((2.0 * u + float(p[C1_SHADOW])) / qs)
+    if kind == BOTH_RATIO:
+        return b + rate, u * (1.0 + b) + float(p[DISTANCE]) * rate
+    k = float(p[WAVE])
+    # seen from the object's phase, then turned
+    x = b + rate * math.cos(k * (float(p[DISTANCE]) - u))
+    y = k * u + rate * math.sin(k * (float(p[DISTANCE]) - u))
+    cosine, sine = math.cos(k * u), math.sin(k * u)
+    return x * cosine - y * sine, x * sine + y * cosine
+
+
+@compiled
+def turning(kind: int, u: float, p: Array) -> float:
+    """Return u (x y' - y x') of `direction` (x, y): its sign is that of the curve's slope."""
+    c0, c1 = float(p[C0]), float(p[C1])
+    q = quadratic(u, c0, c1)
+    b = -2.0 - u * (2.0 * u + c1) / q
+    # u^2 Phi''/Phi from P''/P: Phi = K/P
+    second = 2.0 * b * b - (u * (12.0 * u + 6.0 * c1) + 2.0 * c0) / q
+    rate = 0.0
+    rate_second = 0.0
+    if kind in (BOTH_RATIO, BOTH_PHASE):
+        c0s, c1s = float(p[C0_SHADOW]), float(p[C1_SHADOW])
+        qs = quadratic(u, c0s, c1s)
+        contrast = float(p[CONTRAST]) * (u * u) * (q / c0)
+        tilt = u * ((2.0 * u + c1s) / qs)
+        rate = contrast * (c0s / qs) * tilt
+        rate_second = contrast * (c0s / qs) * 2.0 * (u * u / qs - tilt * tilt)
+    if kind in (DIFFERENTIAL_RATIO, BOTH_RATIO):
+        # x = u Phi' + .., y = (u Phi)' u + R ..; second derivatives times u
+        x, y = b + rate, u * (1.0 + b) + float(p[DISTANCE]) * rate
+        dx = second + rate_second
+        dy = u * (2.0 * b + second) + float(p[DISTANCE]) * rate_second
+        return x * dy - y * dx
+    k = float(p[WAVE])
+    cosine, sine = math.cos(k * (float(p[DISTANCE]) - u)), math.sin(k * (float(p[DISTANCE]) - u))
+    x = b + rate * cosine
+    y = k * u + rate * sine
+    dx = second - (k * u) * (k * u) + rate_second * cosine
+    dy = 2.0 * k * u * b + rate_second * sine
+    return x * dy - y * dx
+
+
+@compiled
+def value(kind: int, u: float, p: Array) -> float:
+    """Return the curve's value at u; an angle within its branch."""
+    if kind in (BOTH_RATIO, DIFFERENTIAL_RATIO):
+        x, y = direction(kind, u, p)
+        return y / x
+    if kind == BOTH_PHASE:
+        x, y = direction(kind, u, p)
+        return math.atan2(y, x)
+    c0, c1 = float(p[C0]), float(p[C1])
+    q = quadratic(u, c0, c1)
+    if kind == DIFFERENTIAL_PHASE:
+        k = float(p[WAVE])
+        return k * u - math.atan2(k * u * q, u * (4.0 * u + 3.0 * c1) + 2.0 * c0)
+    flux = c0 / q / u
+    if kind == INTENSITY_W1:
+        return flux
+    flux /= u
+    if kind == CANCELLING_RATIO:
+        return (float(p[DISTANCE]) - u) / float(p[DISTANCE]) * flux
+    if kind == CANCELLING_QUADRATURE:
+        return math.sin(float(p[WAVE]) * (float(p[DISTANCE]) - u)) * flux
+    return flux
+
+
+@compiled
+def slope(kind: int, u: float, p: Array) -> float:
+    """Return d value / du."""
+    if kind in (BOTH_RATIO, DIFFERENTIAL_RATIO):
+        x, _ = direction(kind, u, p)
+        return turning(kind, u, p) / u / x / x
+    if kind == BOTH_PHASE:
+        x, y = direction(kind, u, p)
+        return turning(kind, u, p) / u / (x * x + y * y)
+    c0, c1 = float(p[C0]), float(p[C1])
+    q = quadratic(u, c0, c1)
+    b = -2.0 - u * (2.0 * u + c1) / q
+    if kind == DIFFERENTIAL_PHASE:
+        k = float(p[WAVE])
+        bend = (u * (12.0 * u + 6.0 * c1) + 2.0 * c0) / q
+        return k * (k * k * u * u + bend) / (b * b + k * k * u * u)
+    flux = c0 / q / u
+    if kind == INTENSITY_W1:
+        return flux * (1.0 + b) / u
+    flux /= u
+    if kind == CANCELLING_RATIO:
+        return flux * (b * (float(p[DISTANCE]) - u) / u - 1.0) / float(p[DISTANCE])
+    if kind == CANCELLING_QUADRATURE:
+        k = float(p[WAVE])
+        angle = k * (float(p[DISTANCE]) - u)
+        return flux * (b * math.sin(angle) / u - k * math.cos(angle))
+    return flux * b / u
+
+
+@compiled
+def _residual(kind: int, u: float, top: float, bottom: float, p: Array) -> float:
+    """Return a number whose sign is that of value - top/bottom up to a constant factor."""
+    if kind in (BOTH_RATIO, DIFFERENTIAL_RATIO):
+        x, y = direction(kind, u, p)
+        return y * bottom - x * top
+    if kind == BOTH_PHASE:
+        x, y = direction(kind, u, p)
+        cosine, sine = math.cos(top), math.sin(top)
+        return math.atan2(y * cosine - x * sine, x * cosine + y * sine)
+    if kind in (DIFFERENTIAL_PHASE, CANCELLING_QUADRATURE):
+        return value(kind, u, p) - top
+    return math.log(value(kind, u, p) / top)
+
+
+@compiled
+def _guess(kind: int, top: float, bottom: float, p: Array) -> float:
+    """Return a first guess from the limits of near and far ranges."""
+    if kind in (INTENSITY, CANCELLING_RATIO):
+        return min(1.0 / math.sqrt(top), math.sqrt(math.sqrt(float(p[C0]) / top)))
+    if kind == INTENSITY_W1:
+        return min(1.0 / top, (float(p[C0]) / top) ** (1.0 / 3.0))
+    if kind in (DIFFERENTIAL_RATIO, BOTH_RATIO):
+        return 1.6 * abs(top / bottom)
+    if kind == DIFFERENTIAL_PHASE:
+        return 1.6 * top / float(p[WAVE])
+    return 0.0
+
+
+@compiled
+def solve_between(kind: int, low: float, high: float, top: float, bottom: float, p: Array) -> float:
+    """Return the u between two points at which a curve monotone between them takes a value.
+
+    Parameters
+    ----------
+    kind : int
+        The curve.
+    low, high : float
+        Ends, 0 < low < high; the value must lie between those at the ends.
+    top, bottom : float
+        The value is top / bottom; bottom = 1 but for ratios.
+    p : ndarray, shape (PARAMETERS,)
+        Parameters.
+    """
+    a, b = low, high
+    fa = _residual(kind, a, top, bottom, p)
+    fb = _residual(kind, b, top, bottom, p)
+    if fa == 0.0 or (fa > 0.0) == (fb > 0.0):  # rounding at an end: the nearer one is the root
+        return a if abs(fa) <= abs(fb) else b
+    x = _guess(kind, top, bottom, p)
+    if low < x < high:
+        # the guess and a point a factor of two beyond the root are a bracket in most cases
+        fx = _residual(kind, x, top, bottom, p)
+        factor = 2.0 if (fx > 0.0) == (fa > 0.0) else 0.5
+        if factor > 1.0:
+            a, fa = x, fx
+        else:
+            b, fb = x, fx
+        x *= factor
+        if low < x < high:
+            fx = _residual(kind, x, top, bottom, p)
+            if (fx > 0.0) == (fa > 0.0):
+                a, fa = x, fx
+            else:
+                b, fb = x, fx
+    c, fc = b, fb
+    for _ in range(400):
+        x, tolerance = next_point(a, b, c, fa, fb, fc)
+        if abs(b - a) <= tolerance or fa == 0.0 or fb == 0.0:
+            break
+        fx = _residual(kind, x, top, bottom, p)
+        if (fx > 0.0) == (fa > 0.0):
+            c, fc = a, fa
+        else:
+            c, fc = b, fb
+            b, fb = a, fa
+        a, fa = x, fx
+    return a if abs(fa) < abs(fb) else b

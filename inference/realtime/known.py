@@ -1,0 +1,116 @@
+"""What a scene states as known numbers, which is all that real-time techniques can use."""
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.realtime import curves
+from simulator.scene import Quantity, Scene, Stroke
+from simulator.sensor import Sensor, SineWaveSensor
+
+__all__ = ["Known", "known_of"]
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Known:
+    """Known numbers by scene path, in the units of the scene.
+
+    Attributes
+    ----------
+    numbers : dict of str to float
+        Such as ``object.c0``, ``background.distance_m``, ``background.shadow.c1``; unknown ones
+        are absent, as are those of optional terms.
+    crosstalk : (float, float) or None
+        What to subtract from the readings; None where it is unknown.
+    support : (float, float)
+        Where the scene's ``range_m`` has mass [m]; (0, inf) where it is not given.
+    """
+
+    numbers: dict[str, float]
+    crosstalk: tuple[float, float] | None
+    support: tuple[float, float]
+
+    def get(self, path: str) -> float:
+        """Return a known number."""
+        return self.numbers[path]
+
+    def has(self, *paths: str) -> bool:
+        """Whether all of these are known."""
+        return all(path in self.numbers for path in paths)
+
+    @property
+    def unit(self) -> float:
+        """Power of two near sqrt(c0) [m]: a unit of length that rounds nothing."""
+        c0 = self.numbers.get("object.c0", 1.0)
+        return 2.0 ** round(0.5 * math.log2(c0))
+
+    def curve_parameters(self, sensor: Sensor) -> Array:
+        """Return the parameters of `curves` in lengths of `unit`; 0 for what is not known.
+
+        Parameters
+        ----------
+        sensor : Sensor
+            Gives the wave number, and the gain in the contrast of background and object.
+        """
+        unit = self.unit
+        p = np.zeros(curves.PARAMETERS)
+        p[curves.C0] = self.numbers.get("object.c0", 0.0) / unit / unit
+        p[curves.C1] = self.numbers.get("object.c1", 0.0) / unit
+        p[curves.DISTANCE] = self.numbers.get("background.distance_m", 0.0) / unit
+        if isinstance(sensor, SineWaveSensor):
+            p[curves.WAVE] = sensor.wave_number * unit
+        p[curves.C0_SHADOW] = self.numbers.get("background.shadow.c0", 0.0) / unit / unit
+        p[curves.C1_SHADOW] = self.numbers.get("background.shadow.c1", 0.0) / unit
+        if self.has("background.strength", "object.c2"):
+            strength = self.get("background.strength") / sensor.gain
+            p[curves.CONTRAST] = strength / self.get("object.c2") * unit * unit
+        return p
+
+
+def known_of(scene: Scene) -> Known:
+    """Collect the known numbers of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene; an optional term may be absent, so that none of its numbers counts as known.
+
+    Returns
+    -------
+    Known
+        The numbers.
+    """
+    quantities: dict[str, Quantity | None] = {
+        "object.c0": scene.object.c0,
+        "object.c1": scene.object.c1,
+        "object.c2": scene.object.c2,
+    }
+    if scene.background is not None:
+        shadow = scene.shadow
+        assert shadow is not None  # noqa: S101  # a background always has a shadow
+        if not scene.background.optional:
+            quantities["background.strength"] = scene.background.strength
+        quantities["background.distance_m"] = scene.background.distance_m
+        quantities["background.shadow.c0"], quantities["background.shadow.c1"] = shadow
+    numbers = {
+        path: float(value) for path, value in quantities.items() if isinstance(value, float | int)
+    }
+    crosstalk: tuple[float, float] | None = (0.0, 0.0)
+    if scene.crosstalk_values is not None:
+        first, second = scene.crosstalk_values
+        crosstalk = None
+        if isinstance(first, float | int) and isinstance(second, float | int):
+            crosstalk = (float(first), float(second))
+        if "crosstalk" in scene.optional_terms:
+            crosstalk = None
+    support = (0.0, math.inf)
+    if isinstance(scene.range_m, Stroke):
+        support = (scene.range_m.low, scene.range_m.high)
+    elif scene.range_m is not None:
+        distribution = scene.range_m.distribution()
+        support = (max(distribution.low, 0.0), distribution.high)
+    return Known(numbers, crosstalk, support)

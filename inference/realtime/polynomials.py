@@ -1,0 +1,95 @@
+"""All real roots of a polynomial of low degree in an interval."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.realtime.bracketing import next_point
+from simulator.compiled import compiled
+
+__all__ = ["horner", "real_roots"]
+
+Array = NDArray[np.float64]
+
+
+@compiled
+def horner(coefficients: Array, count: int, x: float) -> float:
+    """Return the polynomial of the first ``count`` coefficients, highest power first, at x."""
+    total = 0.0
+    for i in range(count):
+        total = total * x + coefficients[i]
+    return total
+
+
+@compiled
+def _bracketed(coefficients: Array, count: int, low: float, high: float) -> float:
+    a, b = low, high
+    fa, fb = horner(coefficients, count, a), horner(coefficients, count, b)
+    c, fc = b, fb
+    for _ in range(300):
+        x, tolerance = next_point(a, b, c, fa, fb, fc)
+        if abs(b - a) <= tolerance or fa == 0.0 or fb == 0.0:
+            break
+        fx = horner(coefficients, count, x)
+        if (fx > 0.0) == (fa > 0.0):
+            c, fc = a, fa
+        else:
+            c, fc = b, fb
+            b, fb = a, fa
+        a, fa = x, fx
+    return a if abs(fa) < abs(fb) else b
+
+
+@compiled
+def real_roots(coefficients: Array, low: float, high: float, out: Array) -> int:
+    """Find every sign change of a polynomial in (low, high).
+
+    The roots of each derivative part the interval into monotone pieces of the one before it, so
+    none is missed; a double root, where the sign does not change, is not reported.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (d + 1,)
+        Highest power first; leading zeros are allowed, all zeros have no roots.
+    low, high : float
+        Open interval, 0 <= low < high.
+    out : ndarray, shape (at least d,)
+        Receives the roots, ascending.
+
+    Returns
+    -------
+    int
+        Number of roots.
+    """
+    degree = coefficients.size - 1
+    derivative = np.empty(degree + 1)
+    previous = np.empty(degree + 2)
+    found = 0
+    for order in range(degree - 1, -1, -1):
+        # coefficients of the derivative of this order
+        count = degree - order + 1
+        for i in range(count):
+            factor = 1.0
+            for j in range(order):
+                factor *= degree - i - j
+            derivative[i] = coefficients[i] * factor
+        previous[0] = low
+        for i in range(found):
+            previous[i + 1] = out[i]
+        previous[found + 1] = high
+        points = found + 2
+        found = 0
+        left = horner(derivative, count, previous[0])
+        for i in range(1, points):
+            right = horner(derivative, count, previous[i])
+            if (left > 0.0 and right <= 0.0) or (left < 0.0 and right >= 0.0):
+                root = previous[i]
+                if right != 0.0:
+                    root = _bracketed(derivative, count, previous[i - 1], previous[i])
+                if low < root < high and math.isfinite(root):
+                    out[found] = root
+                    found += 1
+            if right != 0.0:
+                left = right
+    return found

@@ -1,0 +1,38 @@
+"""Every real-time technique by its name in the contract."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from inference.realtime.background_cancelling import BACKGROUND_CANCELLING
+from inference.realtime.conventional import CONVENTIONAL
+from inference.realtime.intensity import INTENSITY, INTENSITY_W1
+from inference.realtime.technique import Technique
+
+__all__ = ["ELSEWHERE", "TECHNIQUES"]
+
+TECHNIQUES: Mapping[str, Technique] = MappingProxyType(
+    {
+        technique.name: technique
+        for technique in (
+            CONVENTIONAL,
+            INTENSITY,
+            INTENSITY_W1,
+            BACKGROUND_CANCELLING,
+        )
+    }
+)
+
+_MANY = "fits many frames at once, which this version does not do in real time; use a posterior"
+
+# techniques of the contract that are not solved frame by frame, and why they are left out
+ELSEWHERE: Mapping[str, str] = MappingProxyType(
+    {
+        "object_fit": _MANY,
+        "crosstalk_fit": _MANY,
+        "shadow_fit": _MANY,
+        "joint_fit": _MANY,
+        "iterative_differential": _MANY,
+        "iterative_background_cancelling": _MANY,
+        "posterior": "is sampled, not solved in real time: ask for a posterior",
+    }
+)

@@ -1,0 +1,87 @@
+"""The template of a real-time technique."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.estimates import TechniqueResult
+from inference.realtime.known import Known
+from simulator.frames import Frames
+from simulator.scene import Scene
+from simulator.sensor import Sensor
+
+__all__ = ["Kind", "Task", "Technique"]
+
+Array = NDArray[np.float64]
+Kind = Literal["pulsed", "sine_wave"]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Task:
+    """What a technique is given.
+
+    Attributes
+    ----------
+    sensor, scene, frames
+        The request.
+    known : Known
+        The scene's known numbers.
+    physical : bool
+        Whether roots are filtered: the technique's own interval, the scene's ``range_m``, a
+        non-negative object, a background between nothing and its known strength.
+    high_m : float, optional
+        Upper end of the interval searched, in place of the technique's own [m].
+    """
+
+    sensor: Sensor
+    scene: Scene
+    frames: Frames
+    known: Known
+    physical: bool = True
+    high_m: float | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Technique:
+    """One technique: what it needs, what it is immune to, what it costs, how it is solved.
+
+    Attributes
+    ----------
+    name : str
+        Its name in the contract.
+    kinds : tuple of str
+        Sensors that it serves.
+    observables : str
+        What it uses of a frame.
+    needs : tuple of str
+        Scene paths that must be known numbers.
+    immune_to : tuple of "crosstalk", "background"
+        Terms that may be present without being known (Table 4.1).
+    uses_background : bool
+        Whether the scene must have a background.
+    differential : bool
+        Whether it uses derivatives in time.
+    cost : float
+        Time a frame relative to ``conventional``, measured by benchmarks/realtime.py.
+    equations : str
+        Where it comes from.
+    roots : str
+        How many roots it has, and when.
+    solve : callable
+        Task -> TechniqueResult.
+    """
+
+    name: str
+    kinds: tuple[Kind, ...]
+    observables: str
+    needs: tuple[str, ...]
+    immune_to: tuple[str, ...]
+    uses_background: bool
+    differential: bool
+    cost: float
+    equations: str
+    roots: str
+    solve: Callable[[Task], TechniqueResult]
