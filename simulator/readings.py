@@ -14,6 +14,7 @@ __all__ = [
     "background_readings",
     "background_slopes",
     "covariance",
+    "noise_parts",
     "object_readings",
     "object_slopes",
 ]
@@ -107,15 +108,15 @@ def background_slopes(
 
 
 @compiled
-def covariance(
+def noise_parts(
     read: Pair,
     shot: float | None,
     relative: float | None,
     pulsed: bool,
     mean: Pair,
     signal: Pair,
-) -> tuple[float, float, float]:
-    """Return var(first), var(second) and cov(first, second) of a frame's readings.
+) -> tuple[float, float, float, float, float]:
+    """Return independent parts of a frame's noise, from which nothing cancels.
 
     Parameters
     ----------
@@ -123,7 +124,7 @@ def covariance(
         Standard deviations of the read noise.
     shot : float or None
         Variance per mean reading; of a pulse the late photons are part of the whole, so that the
-        covariance is that of the smaller reading.
+        two windows share the variance of the smaller mean.
     relative : float or None
         Standard deviation of a common relative error of the object's signal.
     pulsed : bool
@@ -132,16 +133,36 @@ def covariance(
         Mean readings, everything included.
     signal : (float, float)
         The object's part of them.
+
+    Returns
+    -------
+    (float, float, float, float, float)
+        Own variance of the first and of the second reading, shared variance, and standard
+        deviations of the common relative error in both: the covariance matrix is
+        diag(a1, a2) + k [1 1; 1 1] + s s^T.
     """
-    first, second, cross = read[0] * read[0], read[1] * read[1], 0.0
+    own1, own2, shared = read[0] * read[0], read[1] * read[1], 0.0
     if shot is not None:
-        first += shot * abs(mean[0])
-        second += shot * abs(mean[1])
+        first, second = shot * abs(mean[0]), shot * abs(mean[1])
         if pulsed:
-            cross += shot * min(abs(mean[0]), abs(mean[1]))
+            shared = min(first, second)
+        own1 += first - shared
+        own2 += second - shared
     if relative is not None:
-        share = relative * relative
-        first += share * signal[0] * signal[0]
-        second += share * signal[1] * signal[1]
-        cross += share * signal[0] * signal[1]
-    return first, second, cross
+        return own1, own2, shared, relative * signal[0], relative * signal[1]
+    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
+        return own1, own2, shared, 0.0, 0.0
+
+
+@compiled
+def covariance(
+    read: Pair,
+    shot: float | None,
+    relative: float | None,
+    pulsed: bool,
+    mean: Pair,
+    signal: Pair,
+) -> tuple[float, float, float]:
+    """Return var(first), var(second) and cov(first, second); arguments as for `noise_parts`."""
+    own1, own2, shared, s1, s2 = noise_parts(read, shot, relative, pulsed, mean, signal)
+    return own1 + shared + s1 * s1, own2 + shared + s2 * s2, shared + s1 * s2

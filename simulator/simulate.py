@@ -9,7 +9,7 @@ from scipy import linalg
 from simulator.compiled import compiled
 from simulator.frames import Frames
 from simulator.parameters import Terms, parameters_of
-from simulator.readings import background_readings, covariance, object_readings
+from simulator.readings import background_readings, noise_parts, object_readings
 from simulator.scene import Scene
 from simulator.sensor import Sensor, instrument
 from simulator.trajectories import RadialTrajectory, SampledTrajectory
@@ -56,8 +56,8 @@ def _frame_moments(
     shot: float | None,
     relative: float | None,
 ) -> Array:
-    """Mean and covariance of every frame: columns mean 1, mean 2, var 1, var 2, cov."""
-    out = np.empty((ranges.size, 5))
+    """Return means and noise parts of every frame, shape (n, 7)."""
+    out = np.empty((ranges.size, 7))
     for i in range(ranges.size):
         o1, o2 = 0.0, 0.0
         if np.isfinite(ranges[i]):
@@ -69,9 +69,10 @@ def _frame_moments(
             m1, m2 = m1 + b1, m2 + b2
         if crosstalk is not None:
             m1, m2 = m1 + crosstalk[0], m2 + crosstalk[1]
-        v1, v2, v12 = covariance(read, shot, relative, wave is None, (m1, m2), (o1, o2))
+        parts = noise_parts(read, shot, relative, wave is None, (m1, m2), (o1, o2))
         out[i, 0], out[i, 1] = m1, m2
-        out[i, 2], out[i, 3], out[i, 4] = v1, v2, v12
+        for j in range(5):
+            out[i, 2 + j] = parts[j]
     return out
 
 
@@ -175,7 +176,7 @@ def simulate(
     if scene.discrepancy is not None:
         factor = factor * _discrepancy(rng, ranges, scene.discrepancy)
     moments = _moments(sensor, parameters.terms(z), ranges, factor)
-    readings = moments[:, :2] + _noise(rng, moments[:, 2], moments[:, 3], moments[:, 4])
+    readings = moments[:, :2] + _noise(rng, *moments[:, 2:].T)
     if sensor.full_scale is not None:
         limit = np.asarray(sensor.full_scale)
         readings = np.clip(readings, -limit, limit)
@@ -184,11 +185,15 @@ def simulate(
     return Simulation(frames, truth, dict(zip(parameters.names, natural.tolist(), strict=True)))
 
 
-def _noise(rng: np.random.Generator, first: Array, second: Array, cross: Array) -> Array:
-    """Draw noise of given variances and covariance, shape (n, 2)."""
-    normal = rng.standard_normal((first.size, 2))
-    slope = cross / np.sqrt(first)
-    rest = np.sqrt(np.maximum(second - slope * slope, 0.0))
+def _noise(
+    rng: np.random.Generator, own1: Array, own2: Array, shared: Array, s1: Array, s2: Array
+) -> Array:
+    """Draw noise from its independent parts, shape (n, 2)."""
+    normal = rng.standard_normal((4, own1.size))
+    common = np.sqrt(shared) * normal[2]
     return np.column_stack(
-        [np.sqrt(first) * normal[:, 0], slope * normal[:, 0] + rest * normal[:, 1]]
+        [
+            np.sqrt(own1) * normal[0] + common + s1 * normal[3],
+            np.sqrt(own2) * normal[1] + common + s2 * normal[3],
+        ]
     )

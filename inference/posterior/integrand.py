@@ -1,0 +1,217 @@
+"""The density of one frame along its range: what the collapsed likelihood integrates."""
+
+import math
+
+from simulator.compiled import compiled
+from simulator.readings import (
+    background_readings,
+    background_slopes,
+    noise_parts,
+    object_readings,
+    object_slopes,
+)
+
+__all__ = [
+    "gaussian",
+    "log_integrand",
+    "log_range_density",
+    "log_top",
+    "precision_times",
+    "range_slope",
+    "slope_and_curvature",
+]
+
+Pair = tuple[float, float]
+Triple = tuple[float, float, float]
+Quad = tuple[float, float, float, float]
+Law = tuple[float, float, float, float, float, float, float, float]
+# shape, crosstalk, background, law of the range, r0, wave, read, shot, relative: what the kernels
+# know of a scene and its sensor; what is None does not exist in the machine code
+SceneArguments = tuple[
+    Triple,
+    Pair | None,
+    Quad | None,
+    Law,
+    float,
+    Pair | None,
+    Pair,
+    float | None,
+    float | None,
+]
+
+LOG_2PI = math.log(2 * math.pi)
+
+
+@compiled
+def log_range_density(r: float, u: float, law: Law) -> float:
+    """Return the log prior density of u = log r (`simulator.parameters.Terms.ranges`)."""
+    linear = (r - law[2]) * law[3]
+    logarithmic = (u - law[4]) * law[5]
+    return law[0] + (law[1] + 1.0) * u - 0.5 * (linear * linear + logarithmic * logarithmic)
+
+
+@compiled
+def range_slope(r: float, u: float, law: Law) -> float:
+    """Return the derivative of `log_range_density` along u."""
+    return law[1] + 1.0 - r * (r - law[2]) * law[3] * law[3] - (u - law[4]) * law[5] * law[5]
+
+
+@compiled
+def gaussian(
+    residual: Pair,
+    mean: Pair,
+    signal: Pair,
+    read: Pair,
+    shot: float | None,
+    relative: float | None,
+    pulsed: bool,
+) -> float:
+    """Return the log density of a residual, relative to the top of the read noise's density.
+
+    With independent noise parts determinant and chi-square are sums of squares: a common relative
+    error far above the read noise leaves the matrix near singular, but nothing cancels.
+    """
+    if shot is not None or relative is not None:
+        unit = read[1]
+        own1, own2, shared, s1, s2 = noise_parts(read, shot, relative, pulsed, mean, signal)
+        own1, own2, shared = own1 / unit / unit, own2 / unit / unit, shared / unit / unit
+        s1, s2, e1, e2 = s1 / unit, s2 / unit, residual[0] / unit, residual[1] / unit
+        determinant = _determinant(own1, own2, shared, s1, s2)
+        turned = s2 * e1 - s1 * e2
+        square = own2 * e1 * e1 + own1 * e2 * e2 + shared * (e1 - e2) ** 2 + turned * turned
+        ratio = read[0] / unit
+        return -0.5 * square / determinant - 0.5 * math.log(determinant / ratio / ratio)
+    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
+        e1 = residual[0] / read[0]
+        e2 = residual[1] / read[1]
+        return -0.5 * (e1 * e1 + e2 * e2)
+
+
+@compiled
+def log_top(read: Pair) -> float:
+    """Return the log density of a zero residual under read noise alone."""
+    return -math.log(read[0]) - math.log(read[1]) - LOG_2PI
+
+
+@compiled
+def _determinant(own1: float, own2: float, shared: float, s1: float, s2: float) -> float:
+    """Return the determinant of diag(own1, own2) + shared [1 1; 1 1] + s s^T, a sum of squares."""
+    return (
+        own1 * own2
+        + shared * (own1 + own2)
+        + own2 * s1 * s1
+        + own1 * s2 * s2
+        + shared * (s1 - s2) ** 2
+    )
+
+
+@compiled
+def precision_times(
+    vector: Pair,
+    mean: Pair,
+    signal: Pair,
+    read: Pair,
+    shot: float | None,
+    relative: float | None,
+    pulsed: bool,
+) -> Pair:
+    """Return the inverse covariance times a vector."""
+    if shot is not None or relative is not None:
+        unit = read[1]
+        own1, own2, shared, s1, s2 = noise_parts(read, shot, relative, pulsed, mean, signal)
+        own1, own2, shared = own1 / unit / unit, own2 / unit / unit, shared / unit / unit
+        s1, s2, t1, t2 = s1 / unit, s2 / unit, vector[0] / unit, vector[1] / unit
+        determinant = _determinant(own1, own2, shared, s1, s2)
+        turned = s2 * t1 - s1 * t2
+        return (
+            (own2 * t1 + shared * (t1 - t2) + s2 * turned) / determinant / unit,
+            (own1 * t2 + shared * (t2 - t1) - s1 * turned) / determinant / unit,
+        )
+    else:  # noqa: RET505
+        return vector[0] / read[0] / read[0], vector[1] / read[1] / read[1]
+
+
+@compiled
+def log_integrand(
+    u: float,
+    frame: Triple,
+    shape: Triple,
+    crosstalk: Pair | None,
+    background: Quad | None,
+    law: Law,
+    r0: float,
+    wave: Pair | None,
+    read: Pair,
+    shot: float | None,
+    relative: float | None,
+) -> float:
+    """Return log p(y, u | theta) less `log_top`.
+
+    Parameters
+    ----------
+    u : float
+        log r.
+    frame : (float, float, float)
+        The two readings and the frame's gain factor.
+    shape : (float, float, float)
+        gain c0 c2, c0, c1.
+    crosstalk, background
+        As in `simulator.parameters.Terms`, None where the scene has none.
+    law : tuple
+        Prior of the range.
+    r0, wave, read, shot, relative
+        The sensor, as for `simulator.readings`.
+    """
+    r = math.exp(u)
+    gain = frame[2]
+    o1, o2 = object_readings(r, r0, wave, gain * shape[0], shape[1], shape[2])
+    m1, m2 = o1, o2
+    if background is not None:
+        b1, b2 = background_readings(r, r0, wave, background)
+        m1, m2 = m1 + gain * b1, m2 + gain * b2
+    if crosstalk is not None:
+        m1, m2 = m1 + crosstalk[0], m2 + crosstalk[1]
+    e1, e2 = frame[0] - m1, frame[1] - m2
+    pulsed = wave is None
+    return gaussian((e1, e2), (m1, m2), (o1, o2), read, shot, relative, pulsed) + log_range_density(
+        r, u, law
+    )
+
+
+@compiled
+def slope_and_curvature(
+    u: float,
+    frame: Triple,
+    shape: Triple,
+    crosstalk: Pair | None,
+    background: Quad | None,
+    law: Law,
+    r0: float,
+    wave: Pair | None,
+    read: Pair,
+    shot: float | None,
+    relative: float | None,
+) -> Pair:
+    """Return the slope of `log_integrand` along u and its Gauss-Newton curvature.
+
+    The covariance is held fixed, so that the slope is exact for read noise alone and a guide for
+    the search otherwise; the curvature is never negative.
+    """
+    r = math.exp(u)
+    gain = frame[2]
+    o1, o2 = object_readings(r, r0, wave, gain * shape[0], shape[1], shape[2])
+    t1, t2 = object_slopes(r, r0, wave, gain * shape[0], shape[1], shape[2])
+    m1, m2 = o1, o2
+    if background is not None:
+        b1, b2 = background_readings(r, r0, wave, background)
+        a1, a2 = background_slopes(r, r0, wave, background)
+        m1, m2 = m1 + gain * b1, m2 + gain * b2
+        t1, t2 = t1 + gain * a1, t2 + gain * a2
+    if crosstalk is not None:
+        m1, m2 = m1 + crosstalk[0], m2 + crosstalk[1]
+    e1, e2 = frame[0] - m1, frame[1] - m2
+    p1, p2 = precision_times((t1, t2), (m1, m2), (o1, o2), read, shot, relative, wave is None)
+    return (
+        e1 * p1 + e2 * p2 + range_slope(r, u, law),
+        t1 * p1 + t2 * p2 + law[5] * law[5] + r * r * law[3] * law[3],
+    )

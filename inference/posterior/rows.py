@@ -1,0 +1,61 @@
+"""Rows of arrays as tuples, and None of None, as the kernels take them.
+
+numba types a function that returns a tuple or None as optional, even where the argument decides;
+`overload` chooses the body by the argument's type instead, so that an absent term stays absent.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+from numba import extending
+from numpy.typing import NDArray
+
+from inference.posterior.integrand import Law, Pair, Quad
+from simulator.compiled import compiled
+
+__all__ = ["background_of", "crosstalk_of", "law_of"]
+
+Array = NDArray[np.float64]
+
+
+def crosstalk_of(rows: Array | None, i: int) -> Pair | None:
+    """Return row i as a pair, or None where the scene has no crosstalk."""
+    return None if rows is None else (float(rows[i, 0]), float(rows[i, 1]))
+
+
+def background_of(rows: Array | None, i: int) -> Quad | None:
+    """Return row i as a quadruple, or None where the scene has no background."""
+    if rows is None:
+        return None
+    return float(rows[i, 0]), float(rows[i, 1]), float(rows[i, 2]), float(rows[i, 3])
+
+
+@compiled
+def law_of(rows: Array, i: int) -> Law:
+    """Return row i of the range priors."""
+    return (
+        rows[i, 0],
+        rows[i, 1],
+        rows[i, 2],
+        rows[i, 3],
+        rows[i, 4],
+        rows[i, 5],
+        rows[i, 6],
+        rows[i, 7],
+    )
+
+
+@extending.overload(crosstalk_of, strict=False)
+def _crosstalk_of(rows: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
+    if rows is numba.types.none:
+        return lambda rows, i: None  # noqa: ARG005
+    return lambda rows, i: (rows[i, 0], rows[i, 1])
+
+
+@extending.overload(background_of, strict=False)
+def _background_of(rows: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
+    if rows is numba.types.none:
+        return lambda rows, i: None  # noqa: ARG005
+    return lambda rows, i: (rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3])

@@ -1,0 +1,187 @@
+"""A slow, obvious frame integral: a dense grid, every peak refined, graded quadrature around it."""
+
+import dataclasses
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, special
+
+from simulator.frames import Frames
+from simulator.scene import Scene, parse_scene
+from simulator.sensor import PulsedSensor, Sensor, parse_sensor
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """One frame, and the values of all parameters of a scene in which nothing is unknown."""
+
+    sensor: Sensor
+    scene: Scene
+    c: tuple[float, float, float]
+    crosstalk: tuple[float, float] | None
+    background: tuple[float, float, float, float] | None
+    low: float
+    high: float
+    reading: tuple[float, float]
+
+    @property
+    def frames(self) -> Frames:
+        return Frames(np.array([self.reading]))
+
+
+def _parts(case: Case, u: Array) -> tuple[Array, Array, Array, Array]:
+    """Mean readings of scene and object, written anew from the errata."""
+    r = np.exp(u)
+    c0, c1, c2 = case.c
+    flux = case.sensor.gain * c0 * c2 / (r**2 * ((r + c1 / 2) ** 2 + (c0 - c1**2 / 4)))
+    if isinstance(case.sensor, PulsedSensor):
+        o1, o2 = flux * r / case.sensor.r0, flux
+    else:
+        phase = case.sensor.wave_number * r + case.sensor.phase_offset_rad
+        o1, o2 = flux * np.cos(phase), flux * np.sin(phase)
+    m1, m2 = o1.copy(), o2.copy()
+    if case.background is not None:
+        strength, distance, s0, s1 = case.background
+        visible = strength * (1 - s0 / (r**2 + s1 * r + s0))
+        if isinstance(case.sensor, PulsedSensor):
+            m1 += visible * distance / case.sensor.r0
+            m2 += visible
+        else:
+            angle = case.sensor.wave_number * distance + case.sensor.phase_offset_rad
+            m1 += visible * math.cos(angle)
+            m2 += visible * math.sin(angle)
+    if case.crosstalk is not None:
+        m1 += case.crosstalk[0]
+        m2 += case.crosstalk[1]
+    return m1, m2, o1, o2
+
+
+def log_density(case: Case, u: Array) -> Array:
+    """Log density of (readings, u), the range's prior loguniform on [low, high]."""
+    m1, m2, o1, o2 = _parts(case, u)
+    noise = case.sensor.noise
+    pulsed = isinstance(case.sensor, PulsedSensor)
+    # V = D + s s^T by Sherman-Morrison, D = diag(a) + k ones, in long double
+    e1, e2 = (np.longdouble(y) - m for y, m in zip(case.reading, (m1, m2), strict=True))
+    shared = noise.shot * np.minimum(np.abs(m1), np.abs(m2)) if pulsed else np.zeros_like(m1)
+    d1 = np.longdouble(noise.read[0]) ** 2 + noise.shot * np.abs(m1)
+    d2 = np.longdouble(noise.read[1]) ** 2 + noise.shot * np.abs(m2)
+    inner = d1 * d2 - np.longdouble(shared) ** 2
+    s1, s2 = noise.relative * np.longdouble(o1), noise.relative * np.longdouble(o2)
+    a1, a2 = (d2 * s1 - shared * s2) / inner, (d1 * s2 - shared * s1) / inner  # D^-1 s
+    growth = 1 + s1 * a1 + s2 * a2
+    square = (d2 * e1**2 - 2 * shared * e1 * e2 + d1 * e2**2) / inner
+    square = square - (a1 * e1 + a2 * e2) ** 2 / growth
+    density = -square / 2 - np.log(inner * growth) / 2
+    constant = math.log(2 * math.pi) + math.log(math.log(case.high / case.low))
+    return np.asarray(density - constant, dtype=float)
+
+
+def reference(case: Case, points: int = 20001) -> float:
+    """Log of the frame's integral over u = log r."""
+    low, high = math.log(case.low), math.log(case.high)
+    grid = np.linspace(low, high, points)
+    values = log_density(case, grid)
+    inner = np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] >= values[2:])) + 1
+    ends = [k for k, other in ((0, 1), (points - 1, points - 2)) if values[k] > values[other]]
+    tops = []
+    for k in sorted({*inner.tolist(), *ends}):
+        a, b = grid[max(k - 1, 0)], grid[min(k + 1, points - 1)]
+        found: Any = optimize.minimize_scalar(
+            lambda x: -float(log_density(case, np.array([x]))[0]),
+            bounds=(a, b),
+            method="bounded",
+            options={"xatol": 1e-15},
+        )
+        better = -found.fun > values[k]
+        tops.append((found.x, -found.fun) if better else (grid[k], values[k]))
+    best = max(value for _, value in tops)
+    near = [u for u, value in tops if value > best - 60]
+    # valleys need not be exact: they only divide the interval
+    cuts = [low, *[0.5 * (a + b) for a, b in itertools.pairwise(near)], high]
+    pieces = []
+    for u, a, b in zip(near, cuts[:-1], cuts[1:], strict=True):
+        for end in (a, b):
+            if end == u:
+                continue
+            # graded geometrically away from the top: 16 nodes in each of many panels
+            edges = np.concatenate([[0.0], np.geomspace(1e-13, abs(end - u), 700)])
+            nodes, weights = np.polynomial.legendre.leggauss(16)
+            width = np.diff(edges)[:, None]
+            x = u + math.copysign(1.0, end - u) * (edges[:-1, None] + width * 0.5 * (1 + nodes))
+            terms = log_density(case, x.ravel()) + np.log((0.5 * width * weights).ravel())
+            pieces.append(special.logsumexp(terms))
+    return float(special.logsumexp(pieces))
+
+
+def random_case(rng: np.random.Generator) -> Case:
+    """A random frame, ordinary or extreme."""
+    c0 = 10 ** rng.uniform(-4, 3)
+    c1 = math.sqrt(c0) * (rng.uniform(-1.99, 2) if rng.random() < 0.7 else 10 ** rng.uniform(-1, 2))
+    c2 = 10 ** rng.uniform(-4, 0)
+    shot = rng.random() < 0.3
+    relative = rng.random() < 0.3
+    if rng.random() < 0.5:
+        sensor_data: dict[str, Any] = {
+            "kind": "pulsed",
+            "pulse_width_s": 10 ** rng.uniform(-8, -6.5),
+        }
+    else:
+        sensor_data = {
+            "kind": "sine_wave",
+            "frequency_hz": 10 ** rng.uniform(6, 8),
+            "phase_offset_rad": rng.uniform(-3, 3),
+        }
+    probe = parse_sensor({**sensor_data, "noise": {"read": [1.0, 1.0]}})
+    high = min(20.0, probe.max_range_m if isinstance(probe, PulsedSensor) else 20.0)
+    low = min(0.02, high / 100)
+    r = math.exp(rng.uniform(math.log(low), math.log(high)))
+    flux = c0 * c2 / (r**2 * ((r + c1 / 2) ** 2 + c0 - c1**2 / 4))
+    sigma = flux * 10 ** rng.uniform(-6, 0.5)
+    crosstalk = background = None
+    if rng.random() < 0.4:
+        crosstalk = (flux * rng.normal(), flux * rng.normal())
+    if rng.random() < 0.4:
+        background = (
+            flux * 10 ** rng.uniform(-2, 2),
+            rng.uniform(0.3, 1.0) * high,
+            c0 * 10 ** rng.uniform(-0.5, 0.5),
+            math.sqrt(c0) * rng.uniform(0, 1),
+        )
+    sensor = parse_sensor(
+        {
+            **sensor_data,
+            "noise": {
+                "read": [sigma * 10 ** rng.uniform(-1, 0.5), sigma],
+                "shot": float(sigma**2 / flux * 10 ** rng.uniform(-2, 1)) if shot else 0.0,
+                "relative": float(10 ** rng.uniform(-4, -1)) if relative else 0.0,
+            },
+        }
+    )
+    scene: dict[str, Any] = {"object": {"c0": c0, "c1": c1, "c2": c2}}
+    if crosstalk:
+        scene["crosstalk"] = list(crosstalk)
+    if background:
+        strength, distance, s0, s1 = background
+        scene["background"] = {
+            "strength": strength,
+            "distance_m": distance,
+            "shadow": {"c0": s0, "c1": s1},
+        }
+    scene["range_m"] = {"prior": "loguniform", "low": low, "high": high}
+    case = Case(
+        sensor, parse_scene(scene), (c0, c1, c2), crosstalk, background, low, high, (0.0, 0.0)
+    )
+    m1, m2, _, _ = _parts(case, np.array([math.log(r)]))
+    read = sensor.noise.read
+    spread = 1.0 if rng.random() < 0.8 else 10 ** rng.uniform(0, 3)
+    reading = (
+        float(m1[0] + spread * read[0] * rng.normal()),
+        float(m2[0] + spread * read[1] * rng.normal()),
+    )
+    return dataclasses.replace(case, reading=reading)
