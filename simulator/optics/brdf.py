@@ -106,6 +106,7 @@ def v_cavity(cosine: float, cosine_h: float, cosine_wh: float) -> float:
 @compiled
 def reflect(
     material: Array,
+    at: int,
     cos_i: float,
     cos_o: float,
     cos_h: float,
@@ -116,8 +117,10 @@ def reflect(
 
     Parameters
     ----------
-    material : ndarray, shape (6,)
+    material : ndarray
         As packed by `pack_material`.
+    at : int
+        Where in the array it begins.
     cos_i, cos_o : float
         Cosines of incidence and exit, positive.
     cos_h, tan2_h : float
@@ -125,22 +128,24 @@ def reflect(
     cos_wh : float
         Cosine between either direction and the half vector.
     """
-    value = material[0] * cos_i * cos_o / math.pi
-    if material[1] > 0.0 and cos_h > 0.0:
-        d = beckmann(cos_h, tan2_h, material[2])
+    value = material[at] * cos_i * cos_o / math.pi
+    if material[at + 1] > 0.0 and cos_h > 0.0:
+        m = material[at + 2]
+        d = beckmann(cos_h, tan2_h, m)
         if d > 0.0:
             g = 1.0
-            if material[5] == V_CAVITY:
-                g = min(v_cavity(cos_i, cos_h, cos_wh), v_cavity(cos_o, cos_h, cos_wh))
-            elif material[5] == SMITH:
-                m = material[2]
+            if material[at + 5] == V_CAVITY:
+                g = v_cavity(min(cos_i, cos_o), cos_h, cos_wh)
+            elif material[at + 5] == SMITH:
                 g = 1.0 / (
                     1.0
                     + smith_lambda(1.0 / (cos_i * cos_i) - 1.0, m)
                     + smith_lambda(1.0 / (cos_o * cos_o) - 1.0, m)
                 )
-            f = material[4] if material[3] == 0.0 else fresnel_dielectric(cos_wh, material[4])
-            value += 0.25 * material[1] * d * g * f
+            f = material[at + 4]
+            if material[at + 3] > 0.0:
+                f = fresnel_dielectric(cos_wh, f)
+            value += 0.25 * material[at + 1] * d * g * f
     return value
 
 

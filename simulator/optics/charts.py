@@ -95,6 +95,9 @@ def _flat(surface: Array, head: Array, material: Array, late: float) -> Chart:
         return OPPOSITE, chart, empty, marks
     if height_i == 0.0 or height_o == 0.0:
         return EDGE_ON, chart, empty, marks
+    together = to_e[0] == to_d[0] and to_e[1] == to_d[1] and to_e[2] == to_d[2]
+    plain = head[12] == 0.0 or (head[12] == 1.0 and head[13] == 1.0)
+    chart[31] = 1.0 if together and plain else 0.0
     u, v = chart[1:4], chart[4:7]
     ue, ve, ud, vd = _dot(to_e, u), _dot(to_e, v), _dot(to_d, u), _dot(to_d, v)
     share = height_i / (height_i + height_o)
@@ -145,6 +148,7 @@ def _flat(surface: Array, head: Array, material: Array, late: float) -> Chart:
     lobes = none
     if material[1] > 0.0:
         lobes = np.array([1.5, 4.0, 8.0]) * material[2] * both
+        chart[32] = 1.0 if together and material[0] == 0.0 else 0.0
     features = np.empty((0, 3))
     spread = _spread(head)
     sink = -_dot(head[3:6], chart[7:10])

@@ -37,13 +37,15 @@ UNIFORM, COSINE, LINEAR, RAISED, TABLE = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 @compiled
-def intensity(pattern: Array, table: Array, cosine: float, sine: float) -> float:
+def intensity(pattern: Array, at: int, table: Array, cosine: float, sine: float) -> float:
     """Return I_e / Phi0 [1/sr] at an angle given by its cosine and sine.
 
     Parameters
     ----------
-    pattern : ndarray, shape (4,)
-        Kind, parameter, normalisation, unused; from `pack_pattern`.
+    pattern : ndarray
+        Kind, parameter, normalisation, last angle; from `pack_pattern`.
+    at : int
+        Where in the array they begin.
     table : ndarray, shape (3, n)
         Angles, normalised values and slopes of a measured pattern (Hermite cubics).
     cosine, sine : float
@@ -51,20 +53,20 @@ def intensity(pattern: Array, table: Array, cosine: float, sine: float) -> float
     """
     if cosine <= 0.0:
         return 0.0
-    kind = pattern[0]
+    kind = pattern[at]
     if kind == 0.0:
-        return pattern[2]
+        return pattern[at + 2]
     if kind == 1.0:
-        power = pattern[1]
-        return pattern[2] * (cosine if power == 1.0 else cosine**power)
+        power = pattern[at + 1]
+        return pattern[at + 2] * (cosine if power == 1.0 else cosine**power)
     angle = math.atan2(sine, cosine)
     if kind == 2.0:
-        return pattern[2] * math.atan2(cosine, sine)
+        return pattern[at + 2] * math.atan2(cosine, sine)
     if kind == 3.0:
-        if angle >= pattern[1]:
+        if angle >= pattern[at + 1]:
             return 0.0
-        half = math.cos(0.5 * math.pi * angle / pattern[1])
-        return pattern[2] * half * half
+        half = math.cos(0.5 * math.pi * angle / pattern[at + 1])
+        return pattern[at + 2] * half * half
     if angle < table[0, 0] or angle > table[0, -1]:
         return 0.0
     i = min(max(np.searchsorted(table[0], angle) - 1, 0), table.shape[1] - 2)
@@ -250,7 +252,7 @@ def pack_pattern(pattern: Pattern) -> tuple[Array, Array]:
         total = 0.0
         for low, high in zip(angle[:-1], angle[1:], strict=True):
             nodes = 0.5 * (high - low) * x + 0.5 * (high + low)
-            values = [intensity(raw, table, math.cos(a), math.sin(a)) for a in nodes]
+            values = [intensity(raw, 0, table, math.cos(a), math.sin(a)) for a in nodes]
             total += math.pi * (high - low) * float(np.sum(w * np.sin(nodes) * values))
         table[1:] /= total
         return raw, table
@@ -267,5 +269,5 @@ def radiant_intensity(pattern: Pattern, angle_rad: Vector | Array | float) -> Ar
     """
     packed, table = pack_pattern(pattern)
     angle = np.asarray(angle_rad, dtype=np.float64)
-    values = [intensity(packed, table, math.cos(a), math.sin(a)) for a in angle.ravel()]
+    values = [intensity(packed, 0, table, math.cos(a), math.sin(a)) for a in angle.ravel()]
     return np.array(values).reshape(angle.shape)

@@ -116,7 +116,7 @@ def facet_plate_sums(
             r = math.sqrt(squared)
             cosine = height / r
             tangent2 = max(1.0 / (cosine * cosine) - 1.0, 0.0)
-            part = reflect(material, cosine, cosine, cosine, tangent2, 1.0) * (z / r)
+            part = reflect(material, 0, cosine, cosine, cosine, tangent2, 1.0) * (z / r)
             part *= area / (2.0 * math.pi * squared * squared)
             flux += part
             moment += part * r

@@ -31,7 +31,9 @@ FLAT, SPHERE, SHELL = 0.0, 1.0, 2.0
 
 # head: emitter position 0:3, aim 3:6, detector position 6:9, normal 9:12, pattern 12:16
 # chart: kind 0, axes u 1:4, v 4:7, n 7:10, radius 10, scale 11, base - emitter 12:15,
-#        base - detector 15:18, heights of emitter and detector 18, 19, base - centre 20:23
+#        base - detector 15:18, heights of emitter and detector 18, 19, shell 20:33, of a flat chart
+#        32 is 1 if it has nothing but a lobe about its base, and 31 if emitter and detector are at
+#        one point and the emitter is uniform or Lambertian
 # backdrop: detector - centre 0:3, radius 3, centre - emitter 4:7, material 7:13
 
 
@@ -40,6 +42,7 @@ def light_path(
     head: Array,
     table: Array,
     material: Array,
+    at: int,
     to_emitter: Vector,
     to_detector: Vector,
     normal: Vector,
@@ -52,6 +55,8 @@ def light_path(
     ----------
     head, table, material : ndarray
         Packed emitter and detector, table of the emitter, reflectance.
+    at : int
+        Where in its array the reflectance begins.
     to_emitter, to_detector : (float, float, float)
         The point seen from the emitter and from the detector [m] (P - E and P - D).
     normal : (float, float, float)
@@ -63,7 +68,11 @@ def light_path(
     ex, ey, ez = to_emitter
     dx, dy, dz = to_detector
     ri = math.sqrt(ex * ex + ey * ey + ez * ez)
-    ro = math.sqrt(dx * dx + dy * dy + dz * dz)
+    inverse_i = 1.0 / ri
+    ro, inverse_o = ri, inverse_i
+    if ex != dx or ey != dy or ez != dz:
+        ro = math.sqrt(dx * dx + dy * dy + dz * dz)
+        inverse_o = 1.0 / ro
     along = dx * head[9] + dy * head[10] + dz * head[11]
     ahead = ex * head[3] + ey * head[4] + ez * head[5]
     if height_i <= 0.0 or height_o <= 0.0 or along <= 0.0 or ahead <= 0.0:
@@ -73,15 +82,20 @@ def light_path(
         sx = ey * head[5] - ez * head[4]
         sy = ez * head[3] - ex * head[5]
         sz = ex * head[4] - ey * head[3]
-        sine = math.sqrt(sx * sx + sy * sy + sz * sz) / ri
-    emitted = intensity(head[12:16], table, ahead / ri, sine)
+        sine = math.sqrt(sx * sx + sy * sy + sz * sz) * inverse_i
+    if head[12] == 0.0:  # the plainest pattern is not worth a call
+        emitted = head[14]
+    else:
+        emitted = intensity(head, 12, table, ahead * inverse_i, sine)
     if emitted == 0.0:
         return 0.0, ri, ro
-    cos_i, cos_o = min(height_i / ri, 1.0), min(height_o / ro, 1.0)
-    if material[1] == 0.0:
-        reflected = material[0] * cos_i * cos_o / math.pi
+    cos_i, cos_o = min(height_i * inverse_i, 1.0), min(height_o * inverse_o, 1.0)
+    if material[at + 1] == 0.0:
+        reflected = material[at] * cos_i * cos_o * (1.0 / math.pi)
     else:
-        hx, hy, hz = -ex / ri - dx / ro, -ey / ri - dy / ro, -ez / ri - dz / ro
+        hx = -ex * inverse_i - dx * inverse_o
+        hy = -ey * inverse_i - dy * inverse_o
+        hz = -ez * inverse_i - dz * inverse_o
         length = math.sqrt(hx * hx + hy * hy + hz * hz)
         upward = cos_i + cos_o
         tx = normal[1] * hz - normal[2] * hy
@@ -89,9 +103,9 @@ def light_path(
         tz = normal[0] * hy - normal[1] * hx
         tangent2 = (tx * tx + ty * ty + tz * tz) / (upward * upward)
         reflected = reflect(
-            material, cos_i, cos_o, min(upward / length, 1.0), tangent2, min(0.5 * length, 1.0)
+            material, at, cos_i, cos_o, min(upward / length, 1.0), tangent2, min(0.5 * length, 1.0)
         )
-    return reflected * emitted * (along / ro) / (ri * ri), ri, ro
+    return reflected * emitted * (along * inverse_o) * (inverse_i * inverse_i), ri, ro
 
 
 @compiled
@@ -134,7 +148,8 @@ def hidden_backdrop(
     value, ri, ro = light_path(
         head,
         table,
-        backdrop[7:13],
+        backdrop,
+        7,
         (ex, ey, ez),
         (dx, dy, dz),
         (nx, ny, nz),
@@ -192,6 +207,6 @@ def density(
         hidden, path = hidden_backdrop(head, table, backdrop, dx / ro, dy / ro, dz / ro)
         return hidden * jacobian * height_o / (ro * ro * ro), path
     value, ri, ro = light_path(
-        head, table, material, (ex, ey, ez), (dx, dy, dz), (nx, ny, nz), height_i, height_o
+        head, table, material, 0, (ex, ey, ez), (dx, dy, dz), (nx, ny, nz), height_i, height_o
     )
     return value * jacobian / (ro * ro), 0.5 * (ri + ro)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulator.compiled import compiled
-from simulator.optics.geometry import FLAT, SHELL, SPHERE, density
+from simulator.optics.geometry import FLAT, SHELL, density
 from simulator.optics.regions import ARC, LINE, ray, sectors
 
 __all__ = ["COMPONENTS", "GAUSS_KRONROD", "gauss_rule", "integrate"]
@@ -72,12 +72,8 @@ def gauss_rule(order: int) -> Array:
 
 
 @compiled
-def _error(value: Array, other: Array) -> float:
-    """Return QUADPACK's estimate of the error from the two rules of a pair."""
-    worst = 0.0
-    for i in range(COMPONENTS):
-        worst = max(worst, abs(value[i] - other[i]))
-    size = abs(value[0])
+def _error(worst: float, size: float) -> float:
+    """Return QUADPACK's estimate of the error from the disagreement of the two rules of a pair."""
     if worst == 0.0 or size == 0.0:
         return worst
     return size * min(1.0, (200.0 * worst / size) ** 1.5)
@@ -93,41 +89,80 @@ def _ray_piece(
     signal: Array,
     rule: Array,
     u: Vector,
-    low: float,
-    high: float,
-    value: Array,
-) -> float:
-    """Integrate one piece of a ray into ``value`` and return its error."""
+    work: Array,
+    row: int,
+) -> None:
+    """Integrate the piece of a ray that a row of ``work`` names, and complete the row."""
     scale = chart[11]
+    low, high = work[row, 0], work[row, 1]
     half, middle = 0.5 * (high - low), 0.5 * (high + low)
-    other = np.zeros(COMPONENTS)
-    value[:] = 0.0
+    # Kronrod sums v and Gauss sums g, as scalars: an array for each piece would cost as much
+    # as the integrand
+    v0 = v1 = v2 = v3 = v4 = g0 = g1 = g2 = g3 = g4 = 0.0
+    # diffuse and flat under a uniform or Lambertian emitter at the detector: a third of the cost
+    plain = backdrop is None and chart[0] == FLAT and material[1] == 0.0 and chart[31] > 0.0
+    height = chart[18]
+    share = material[0] * head[14] * (1.0 / math.pi) * height * height
+    see0 = chart[15] * head[9] + chart[16] * head[10] + chart[17] * head[11]
+    see1 = u[0] * head[9] + u[1] * head[10] + u[2] * head[11]
+    shine0 = chart[12] * head[3] + chart[13] * head[4] + chart[14] * head[5]
+    shine1 = u[0] * head[3] + u[1] * head[4] + u[2] * head[5]
     for i in range(rule.shape[1]):
         t = math.tan(middle + half * rule[0, i])
-        f, path = density(chart, head, table, material, backdrop, u, scale * t)
+        if plain:
+            rho = scale * t
+            see, shine = see0 + rho * see1, shine0 + rho * shine1
+            if see <= 0.0 or shine <= 0.0:
+                continue
+            inverse2 = 1.0 / (height * height + rho * rho)
+            inverse = math.sqrt(inverse2)
+            path = 1.0 / inverse
+            f = share * rho * see * inverse2 * inverse2 * inverse2 * inverse
+            if head[12] == 1.0:
+                f *= shine * inverse
+        else:
+            f, path = density(chart, head, table, material, backdrop, u, scale * t)
         if f == 0.0:
             continue
         f *= scale * (1.0 + t * t) * half
         k, g = f * rule[1, i], f * rule[2, i]
-        late = min(path * signal[1], 1.0)
-        value[0] += k
-        other[0] += g
-        value[1] += k * path * signal[2]
-        other[1] += g * path * signal[2]
-        value[2] += k * late
-        other[2] += g * late
+        late, far = min(path * signal[1], 1.0), path * signal[2]
+        v0 += k
+        g0 += g
+        v1 += k * far
+        g1 += g * far
+        v2 += k * late
+        g2 += g * late
         if signal[0] > 0.0:
             c, s = math.cos(signal[0] * path), math.sin(signal[0] * path)
-            value[3] += k * c
-            other[3] += g * c
-            value[4] += k * s
-            other[4] += g * s
-    return _error(value, other)
+            v3 += k * c
+            g3 += g * c
+            v4 += k * s
+            g4 += g * s
+    worst = max(abs(v0 - g0), abs(v1 - g1), abs(v2 - g2), abs(v3 - g3), abs(v4 - g4))
+    work[row, 2] = _error(worst, v0)
+    work[row, 3], work[row, 4], work[row, 5] = v0, v1, v2
+    work[row, 6], work[row, 7] = v3, v4
 
 
 @compiled
-def _plane_breaks(chart: Array, planes: Array, u: Vector, breaks: Array, count: int) -> int:
-    """Add the places where a ray of a sphere or shell crosses a horizon."""
+def _insert(breaks: Array, count: int, place: float, near: float, far: float) -> int:
+    """Insert a place into the sorted breaks if it lies inside the ray."""
+    if not near < place < far:
+        return count
+    i = count
+    while i > 0 and breaks[i - 1] > place:
+        breaks[i] = breaks[i - 1]
+        i -= 1
+    breaks[i] = place
+    return count + 1
+
+
+@compiled
+def _horizon_breaks(
+    chart: Array, planes: Array, u: Vector, breaks: Array, count: int, near: float, far: float
+) -> int:
+    """Insert the places where a ray of a sphere or shell crosses a horizon."""
     for i in range(planes.shape[0]):
         alpha = planes[i, 0] * chart[7] + planes[i, 1] * chart[8] + planes[i, 2] * chart[9]
         beta = planes[i, 0] * u[0] + planes[i, 1] * u[1] + planes[i, 2] * u[2]
@@ -135,12 +170,12 @@ def _plane_breaks(chart: Array, planes: Array, u: Vector, breaks: Array, count: 
         if size <= abs(planes[i, 3]):
             continue
         centre, spread = math.atan2(beta, alpha), math.acos(planes[i, 3] / size)
-        for sign in (-1.0, 1.0):
-            psi = centre + sign * spread
+        for j in range(2):
+            psi = centre + (2 * j - 1) * spread
             psi -= 2.0 * math.pi * math.floor(psi / (2.0 * math.pi))
-            if 0.0 < psi < math.pi:
-                breaks[count] = psi if chart[0] == SHELL else 2.0 * math.sin(0.5 * psi)
-                count += 1
+            if psi < math.pi:
+                place = psi if chart[0] == SHELL else 2.0 * math.sin(0.5 * psi)
+                count = _insert(breaks, count, place, near, far)
     return count
 
 
@@ -160,69 +195,54 @@ def _along_ray(
     far: float,
     tolerance: float,
     work: Array,
-    value: Array,
+    breaks: Array,
 ) -> float:
-    """Integrate along a ray into ``value`` and return the error."""
+    """Integrate along a ray into the first row of ``work`` and return the error."""
     rings, features, planes, lobes = marks
-    breaks = np.empty(2 + rings.size + 3 * features.shape[0] + 2 * planes.shape[0] + lobes.size)
-    breaks[0] = near
-    count = 1
+    count = 0
     for i in range(rings.size):
-        breaks[count] = rings[i]
-        count += 1
+        count = _insert(breaks, count, rings[i], near, far)
     for i in range(lobes.size):
-        breaks[count] = math.hypot(near, lobes[i])
-        count += 1
+        count = _insert(breaks, count, math.hypot(near, lobes[i]), near, far)
     for i in range(features.shape[0]):
         closest = features[i, 0] * direction[0] + features[i, 1] * direction[1]
-        breaks[count] = closest
-        count += 1
+        count = _insert(breaks, count, closest, near, far)
         if features[i, 2] > 0.0:
-            breaks[count], breaks[count + 1] = closest - features[i, 2], closest + features[i, 2]
-            count += 2
-    if chart[0] != FLAT:
-        count = _plane_breaks(chart, planes, u, breaks, count)
-    ends = np.sort(breaks[:count])
-    number = 0
+            count = _insert(breaks, count, closest - features[i, 2], near, far)
+            count = _insert(breaks, count, closest + features[i, 2], near, far)
+    if planes.shape[0] > 0:
+        count = _horizon_breaks(chart, planes, u, breaks, count, near, far)
+    if chart[32] > 0.0 and lobes.size > 0 and chart[0] == FLAT:
+        # a pure lobe is below 1e-27 of itself past the last mark
+        end = math.hypot(near, lobes[lobes.size - 1])
+        far = min(far, end)
+        while count > 0 and breaks[count - 1] >= far:
+            count -= 1
     scale = chart[11]
     last = math.atan(near / scale)
     for i in range(count + 1):
-        end = far if i == count else ends[i]
-        if end <= near or end > far or (i < count and end == far):
-            continue
-        angle = math.atan(end / scale)
-        work[number, 0], work[number, 1] = last, angle
-        number += 1
+        angle = math.atan((far if i == count else breaks[i]) / scale)
+        work[i + 1, 0], work[i + 1, 1] = last, angle
+        _ray_piece(chart, head, table, material, backdrop, signal, rule, u, work, i + 1)
         last = angle
-    value[:] = 0.0
-    total_error = 0.0
-    for i in range(number):
-        work[i, 2] = _ray_piece(
-            chart, head, table, material, backdrop, signal, rule, u, work[i, 0], work[i, 1],
-            work[i, 3:],
-        )  # fmt: skip
-        value += work[i, 3:]
-        total_error += work[i, 2]
-    while total_error > tolerance * value[0] and number < _INNER:
-        worst = 0
-        for i in range(1, number):
+    number = count + 1
+    while True:
+        for j in range(2, 3 + COMPONENTS):
+            work[0, j] = 0.0
+        worst = 1
+        for i in range(1, number + 1):
+            for j in range(2, 3 + COMPONENTS):
+                work[0, j] += work[i, j]
             if work[i, 2] > work[worst, 2]:
                 worst = i
+        if work[0, 2] <= tolerance * work[0, 3] or number >= _INNER:
+            return work[0, 2]
         middle = 0.5 * (work[worst, 0] + work[worst, 1])
+        number += 1
         work[number, 0], work[number, 1] = middle, work[worst, 1]
         work[worst, 1] = middle
-        for i in (worst, number):
-            work[i, 2] = _ray_piece(
-                chart, head, table, material, backdrop, signal, rule, u, work[i, 0], work[i, 1],
-                work[i, 3:],
-            )  # fmt: skip
-        number += 1
-        value[:] = 0.0
-        total_error = 0.0
-        for i in range(number):
-            value += work[i, 3:]
-            total_error += work[i, 2]
-    return total_error
+        _ray_piece(chart, head, table, material, backdrop, signal, rule, u, work, worst)
+        _ray_piece(chart, head, table, material, backdrop, signal, rule, u, work, number)
 
 
 @compiled
@@ -238,34 +258,36 @@ def _sector_piece(
     lines: Array,
     circle: Array,
     reference: Array,
-    panel: Array,
-    low: float,
-    high: float,
+    panels: Array,
     tolerance: float,
     work: Array,
-    value: Array,
-) -> float:
-    """Integrate one piece of a sector into ``value`` and return its error."""
+    breaks: Array,
+    pieces: Array,
+    row: int,
+) -> None:
+    """Integrate the piece of a sector that a row of ``pieces`` names, and complete the row."""
     outer, inner = rules
+    low, high, which = pieces[row, 0], pieces[row, 1], int(pieces[row, 2])
     half, middle = 0.5 * (high - low), 0.5 * (high + low)
-    other, part = np.zeros(COMPONENTS), np.zeros(COMPONENTS)
-    value[:] = 0.0
+    kind = panels[which, 0]
+    v0 = v1 = v2 = v3 = v4 = g0 = g1 = g2 = g3 = g4 = 0.0
     inner_error = 0.0
     for i in range(outer.shape[1]):
         s = middle + half * outer[0, i]
         reach = math.inf
-        if panel[0] == LINE:
-            row = int(panel[3])
-            h = lines[row, 2]
-            t = panel[4] * math.sinh(s)
+        if kind == LINE:
+            edge = int(panels[which, 3])
+            h = lines[edge, 2]
+            t = panels[which, 4] * math.sinh(s)
             reach = math.hypot(h, t)
-            x = (h * lines[row, 0] - t * lines[row, 1]) / reach
-            y = (h * lines[row, 1] + t * lines[row, 0]) / reach
-            turn = h * panel[4] * math.cosh(s) / (reach * reach)
+            x = (h * lines[edge, 0] - t * lines[edge, 1]) / reach
+            y = (h * lines[edge, 1] + t * lines[edge, 0]) / reach
+            turn = h * math.hypot(panels[which, 4], t) / (reach * reach)
         else:
             angle, turn = s, 1.0
-            if panel[0] == ARC:
-                angle, turn = panel[3] + panel[4] * math.sin(s), panel[4] * math.cos(s)
+            if kind == ARC:
+                angle = panels[which, 3] + panels[which, 4] * math.sin(s)
+                turn = panels[which, 4] * math.cos(s)
             c, sn = math.cos(angle), math.sin(angle)
             x = reference[0] * c - reference[1] * sn
             y = reference[1] * c + reference[0] * sn
@@ -280,14 +302,24 @@ def _sector_piece(
         )
         error = _along_ray(
             chart, head, table, material, backdrop, signal, inner, marks, u, (x, y), near, far,
-            tolerance, work, part,
+            tolerance, work, breaks,
         )  # fmt: skip
-        scale = turn * half
-        inner_error += error * scale * outer[1, i]
-        for j in range(COMPONENTS):
-            value[j] += part[j] * scale * outer[1, i]
-            other[j] += part[j] * scale * outer[2, i]
-    return _error(value, other) + inner_error
+        k, g = turn * half * outer[1, i], turn * half * outer[2, i]
+        inner_error += error * k
+        v0 += work[0, 3] * k
+        v1 += work[0, 4] * k
+        v2 += work[0, 5] * k
+        v3 += work[0, 6] * k
+        v4 += work[0, 7] * k
+        g0 += work[0, 3] * g
+        g1 += work[0, 4] * g
+        g2 += work[0, 5] * g
+        g3 += work[0, 6] * g
+        g4 += work[0, 7] * g
+    worst = max(abs(v0 - g0), abs(v1 - g1), abs(v2 - g2), abs(v3 - g3), abs(v4 - g4))
+    pieces[row, 3] = _error(worst, v0) + inner_error
+    pieces[row, 4], pieces[row, 5], pieces[row, 6] = v0, v1, v2
+    pieces[row, 7], pieces[row, 8] = v3, v4
 
 
 @compiled
@@ -340,6 +372,7 @@ def integrate(
     limit = max(_OUTER, 2 * size)
     pieces = np.empty((limit, 4 + COMPONENTS))
     work = np.empty((_INNER + 40, 3 + COMPONENTS))
+    breaks = np.empty(40)
     for i in range(size):
         if panels[i, 0] == LINE:
             panels[i, 4] = math.hypot(lines[int(panels[i, 3]), 2], chart[11])
@@ -348,9 +381,9 @@ def integrate(
         else:
             pieces[i, 0], pieces[i, 1] = panels[i, 1], panels[i, 2]
         pieces[i, 2] = i
-        pieces[i, 3] = _sector_piece(
+        _sector_piece(
             chart, head, table, material, backdrop, signal, rules, marks, lines, circle, reference,
-            panels[i], pieces[i, 0], pieces[i, 1], 0.1 * tolerance, work, pieces[i, 4:],
+            panels, 0.1 * tolerance, work, breaks, pieces, i,
         )  # fmt: skip
     number = size
     rays = size * rules[0].shape[1]
@@ -358,7 +391,8 @@ def integrate(
         total[:] = 0.0
         error, worst = 0.0, 0
         for i in range(number):
-            total += pieces[i, 4:]
+            for j in range(COMPONENTS):
+                total[j] += pieces[i, 4 + j]
             error += pieces[i, 3]
             if pieces[i, 3] > pieces[worst, 3]:
                 worst = i
@@ -369,10 +403,9 @@ def integrate(
         pieces[number, 2] = pieces[worst, 2]
         pieces[worst, 1] = middle
         for i in (worst, number):
-            pieces[i, 3] = _sector_piece(
+            _sector_piece(
                 chart, head, table, material, backdrop, signal, rules, marks, lines, circle,
-                reference, panels[int(pieces[i, 2])], pieces[i, 0], pieces[i, 1], 0.1 * tolerance,
-                work, pieces[i, 4:],
+                reference, panels, 0.1 * tolerance, work, breaks, pieces, i,
             )  # fmt: skip
         number += 1
         rays += 2 * rules[0].shape[1]
