@@ -1,26 +1,25 @@
 """From validated requests to checked arguments of the layers below."""
 
-from service.schemas import EstimateRequest, PosteriorRequest, SystemDescription
 from simulator.errors import InvalidInputError, Problem
-from simulator.frames import Frames, frames_from_columns
+from simulator.frames import FrameColumns, Frames, frames_from_columns
 from simulator.scene import Scene, check_scene
 from simulator.sensor import Sensor
 
 __all__ = ["system", "system_with_frames"]
 
 
-def system(request: SystemDescription) -> tuple[Sensor, Scene]:
+def system(sensor: Sensor, scene: Scene) -> tuple[Sensor, Scene]:
     """Check a scene against its sensor.
 
     Parameters
     ----------
-    request : SystemDescription
-        Holds both.
+    sensor, scene : Sensor, Scene
+        Of a request.
 
     Returns
     -------
     tuple
-        Sensor and scene.
+        Both.
 
     Raises
     ------
@@ -28,21 +27,21 @@ def system(request: SystemDescription) -> tuple[Sensor, Scene]:
         With pointers below ``/scene``.
     """
     try:
-        check_scene(request.sensor, request.scene)
+        check_scene(sensor, scene)
     except InvalidInputError as error:
         raise error.below("/scene") from None
-    return request.sensor, request.scene
+    return sensor, scene
 
 
 def system_with_frames(
-    request: EstimateRequest | PosteriorRequest,
+    sensor: Sensor, scene: Scene, columns: FrameColumns
 ) -> tuple[Sensor, Scene, Frames]:
     """Check a scene and frames against their sensor.
 
     Parameters
     ----------
-    request : EstimateRequest or PosteriorRequest
-        Holds all three.
+    sensor, scene, columns : Sensor, Scene, FrameColumns
+        Of a request.
 
     Returns
     -------
@@ -57,13 +56,13 @@ def system_with_frames(
     problems: list[Problem] = []
     frames = None
     try:
-        system(request)
+        system(sensor, scene)
     except InvalidInputError as error:
         problems += error.problems
     try:
-        frames = frames_from_columns(request.sensor, request.frames)
+        frames = frames_from_columns(sensor, columns)
     except InvalidInputError as error:
         problems += error.below("/frames").problems
     if problems or frames is None:
         raise InvalidInputError(*problems)
-    return request.sensor, request.scene, frames
+    return sensor, scene, frames

@@ -231,10 +231,12 @@ class Jobs:
         if job_id in self._tasks:
             self._tasks[job_id].cancel()
 
-    async def wait(self, job_id: str) -> None:
-        """Return when a job of this process has ended."""
-        if job_id in self._tasks:
-            await asyncio.wait([self._tasks[job_id]])
+    async def wait(self, job_id: str, timeout_s: float) -> bool:
+        """Wait for the end of a job of this process; whether it has ended."""
+        task = self._tasks.get(job_id)
+        if task is not None:
+            await asyncio.wait([task], timeout=timeout_s)
+        return task is None or task.done()
 
     def _schedule(self, record: JobRecord) -> None:
         task = asyncio.get_running_loop().create_task(self._run(record))

@@ -200,9 +200,42 @@ class SimulationResponse(pydantic.BaseModel):
 
 
 class TechniqueDescription(pydantic.BaseModel):
-    """What a technique needs and what it costs."""
+    """What a technique needs, what it is immune to, what it costs.
+
+    Attributes
+    ----------
+    name : str
+        Its name in requests.
+    kinds : list of str
+        Sensors that it serves.
+    observables : str
+        What it uses of a frame.
+    needs : list of str
+        Paths of the scene that must be known numbers.
+    immune_to : list of str
+        Terms that may be present without being known.
+    uses_background : bool
+        Whether the scene must have a background.
+    differential : bool
+        Whether it uses derivatives in time.
+    cost : float
+        Time a frame relative to ``conventional``.
+    equations : str
+        Where it comes from.
+    roots : str
+        How many roots it has, and when.
+    """
 
     name: str
+    kinds: list[str]
+    observables: str
+    needs: list[str]
+    immune_to: list[str]
+    uses_background: bool
+    differential: bool
+    cost: float
+    equations: str
+    roots: str
 
 
 class TechniquesResponse(pydantic.BaseModel):

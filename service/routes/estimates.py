@@ -38,7 +38,7 @@ def answer(request: EstimateRequest) -> bytes:
     InvalidInputError
         With pointers into the request.
     """
-    sensor, scene, frames = system_with_frames(request)
+    sensor, scene, frames = system_with_frames(request.sensor, request.scene, request.frames)
     return encode_estimates(estimate(sensor, scene, frames, request.techniques))
 
 

@@ -2,15 +2,16 @@
 
 import hashlib
 import re
-from typing import Annotated, Any
+from typing import Annotated
 
+import anyio.to_thread
 from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.responses import JSONResponse, Response
 
 from service.bodies import body_of, openapi_body
 from service.checks import system_with_frames
 from service.errors import MalformedError
-from service.job_store import JobRecord
+from service.posterior_json import brief, full
 from service.problems import problem_responses
 from service.schemas import PosteriorPage, PosteriorRequest, PosteriorResponse
 from service.state import state_of
@@ -21,30 +22,6 @@ router = APIRouter(prefix="/v1/posteriors", tags=["posteriors"])
 Body = Annotated[tuple[PosteriorRequest, bytes], Depends(body_of(PosteriorRequest))]
 
 _KEY = re.compile(r"[\x21-\x7e]{1,255}")
-_RESULTS = (
-    "verdict",
-    "parameters",
-    "range_m",
-    "identifiability",
-    "fit",
-    "left_out",
-    "runtime",
-)
-
-
-def _brief(record: JobRecord) -> dict[str, Any]:
-    return {
-        "id": record.id,
-        "status": record.status,
-        "method": record.method,
-        "seed": record.seed,
-        "progress": record.progress,
-    }
-
-
-def _full(record: JobRecord) -> dict[str, Any]:
-    body = _brief(record) | dict.fromkeys(_RESULTS) | (record.result or {})
-    return body if record.problem is None else body | {"problem": record.problem}
 
 
 def _key(header: str | None) -> str | None:
@@ -68,11 +45,13 @@ async def create(
     """Start a posterior; the same Idempotency-Key with the same body gives the same one."""
     key = _key(idempotency_key)
     asked, raw = body
-    sensor, scene, frames = system_with_frames(asked)
-    record = await state_of(request).jobs.submit(
-        sensor, scene, frames, asked.sampler, key=key, digest=hashlib.sha256(raw).hexdigest()
+    state = state_of(request)
+    checked = await anyio.to_thread.run_sync(
+        system_with_frames, asked.sensor, asked.scene, asked.frames, limiter=state.threads
     )
-    return JSONResponse(_full(record), 202, {"Location": f"/v1/posteriors/{record.id}"})
+    digest = hashlib.sha256(raw).hexdigest()
+    record = await state.jobs.submit(*checked, asked.sampler, key=key, digest=digest)
+    return JSONResponse(full(record), 202, {"Location": f"/v1/posteriors/{record.id}"})
 
 
 @router.get(
@@ -91,7 +70,7 @@ async def page(
     after = None if cursor is None else int(cursor)
     records = await state_of(request).jobs.page(after, limit + 1)
     more = str(records[limit - 1].sequence) if len(records) > limit else None
-    return JSONResponse({"items": [_brief(r) for r in records[:limit]], "next_cursor": more})
+    return JSONResponse({"items": [brief(r) for r in records[:limit]], "next_cursor": more})
 
 
 @router.get(
@@ -101,7 +80,7 @@ async def page(
 )
 async def get(request: Request, job_id: str) -> Response:
     """Return a posterior as it stands."""
-    return JSONResponse(_full(await state_of(request).jobs.get(job_id)))
+    return JSONResponse(full(await state_of(request).jobs.get(job_id)))
 
 
 @router.post(
@@ -112,7 +91,7 @@ async def get(request: Request, job_id: str) -> Response:
 )
 async def cancel(request: Request, job_id: str) -> Response:
     """End a posterior after the chunk that runs; it keeps what it has. One that ended stays."""
-    return JSONResponse(_full(await state_of(request).jobs.cancel(job_id)), 202)
+    return JSONResponse(full(await state_of(request).jobs.cancel(job_id)), 202)
 
 
 @router.delete("/{job_id}", status_code=204, response_model=None, responses=problem_responses(404))

@@ -1,0 +1,20 @@
+"""The commands, one file each: ``add_parser(subparsers)`` and ``run(args) -> exit code``.
+
+What a command needs is imported when it runs: worker processes import the command line too.
+"""
+
+import argparse
+from collections.abc import Callable
+
+from service.commands import estimate, infer, serve, simulate
+
+__all__ = ["COMMANDS", "AddParser"]
+
+AddParser = Callable[["argparse._SubParsersAction[argparse.ArgumentParser]"], None]
+
+COMMANDS: tuple[AddParser, ...] = (
+    serve.add_parser,
+    simulate.add_parser,
+    estimate.add_parser,
+    infer.add_parser,
+)

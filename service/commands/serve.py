@@ -1,0 +1,46 @@
+"""``hybridtof serve``: the service over HTTP."""
+
+import argparse
+import os
+
+__all__ = ["add_parser"]
+
+
+def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command to the command line."""
+    parser = subparsers.add_parser(
+        "serve",
+        help="serve over HTTP until SIGTERM",
+        description="Serve over HTTP. Environment variables HYBRIDTOF_WORKERS, HYBRIDTOF_THREADS, "
+        "HYBRIDTOF_MAX_BODY_BYTES, HYBRIDTOF_MAX_JOBS and HYBRIDTOF_SHUTDOWN_S are optional.",
+    )
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen on (%(default)s)")
+    parser.add_argument(
+        "--port", type=_port, default=8000, help="port, 0 for any free one (%(default)s)"
+    )
+    parser.set_defaults(run=_run)
+
+
+def _port(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and int(text) < 2**16):
+        raise argparse.ArgumentTypeError("must be a number from 0 to 65535")
+    return int(text)
+
+
+def _run(args: argparse.Namespace) -> int:
+    import uvicorn
+
+    from service.app import create_app
+    from service.settings import Settings
+
+    settings = Settings.from_environment(os.environ)
+    config = uvicorn.Config(
+        create_app(settings),
+        host=args.host,
+        port=args.port,
+        # an open connection must not hold up the end
+        timeout_graceful_shutdown=round(settings.shutdown_s),
+    )
+    server = uvicorn.Server(config)
+    server.run()
+    return 0 if server.started else 4

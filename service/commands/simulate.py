@@ -1,0 +1,70 @@
+"""``hybridtof simulate``: frames with their truth."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+__all__ = ["add_parser"]
+
+
+def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command to the command line."""
+    parser = subparsers.add_parser(
+        "simulate",
+        help="simulate frames of a scene",
+        description="Simulate frames of an object that moves along a line, and print them with "
+        "the truth as JSON. Unknowns of the scene are drawn from their priors, once.",
+    )
+    parser.add_argument(
+        "--scene", type=Path, required=True, help="JSON file with members sensor and scene"
+    )
+    parser.add_argument("--trajectory", type=Path, help="JSON file, instead of the options below")
+    parser.add_argument("--from-m", type=float, help="first range [m]")
+    parser.add_argument("--to-m", type=float, help="last range [m]")
+    parser.add_argument("--frames", type=int, help="number of frames")
+    parser.add_argument("--spacing", choices=("linear", "log"), help="of the ranges (linear)")
+    parser.add_argument("--duration-s", type=float, help="from the first to the last frame [s]")
+    parser.add_argument("--seed", type=int, help="left out: drawn and printed")
+    parser.add_argument(
+        "--output", type=Path, help="write the frames here too, as .csv, .ndjson or .json"
+    )
+    parser.set_defaults(run=_run)
+
+
+def _radial(args: argparse.Namespace) -> dict[str, Any]:
+    """Trajectory from the options that were given."""
+    names = ("from_m", "to_m", "frames", "spacing", "duration_s")
+    given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
+    return {"kind": "radial"} | given
+
+
+def _run(args: argparse.Namespace) -> int:
+    import pydantic_core
+
+    from service.commands.files import naming, read_data, read_document
+    from service.frame_files import write_frames
+    from service.schemas import SimulationRequest, SystemDescription
+    from service.simulation import simulation_of
+    from simulator.errors import InvalidInputError
+    from simulator.validated import parse
+
+    system = read_document(SystemDescription, args.scene)
+    radial = _radial(args)
+    data: dict[str, Any] = {} if args.seed is None else {"seed": args.seed}
+    if args.trajectory is None:
+        data["trajectory"] = radial
+        source = "options of the trajectory"
+    elif len(radial) > 1:
+        raise InvalidInputError.at("--trajectory", "comes with options that it replaces")
+    else:
+        data["trajectory"] = read_data(args.trajectory)
+        source = str(args.trajectory)
+    with naming({"/trajectory": source, "/seed": "--seed", "": str(args.scene)}):
+        request = parse(SimulationRequest, {"sensor": system.sensor, "scene": system.scene} | data)
+        result = simulation_of(request)
+    if args.output is not None:
+        write_frames(args.output, result["frames"])
+    text = pydantic_core.to_json(result).decode()
+    sys.stdout.write(text + "\n")
+    return 0
