@@ -52,6 +52,8 @@ def obstacle(
     if sensor.kind not in technique.kinds:
         return "a sine wave has no late window"
     if technique.differential:
+        if technique.uses_background and scene.motion == "tangential":
+            return "needs radial motion: a range that does not change leaves the background alone"
         if scene.motion == "static":
             return "needs motion: the scene's range does not change"
         if frames is not None and frames.derivatives is None:

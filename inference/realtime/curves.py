@@ -195,7 +195,7 @@ def _guess(kind: int, top: float, bottom: float, p: Array) -> float:
     if kind in (INTENSITY, CANCELLING_RATIO):
         return min(1.0 / math.sqrt(top), math.sqrt(math.sqrt(float(p[C0]) / top)))
     if kind == INTENSITY_W1:
-        return min(1.0 / top, (float(p[C0]) / top) ** (1.0 / 3.0))
+        return min(1.0 / top, math.pow(float(p[C0]) / top, 1.0 / 3.0))
     if kind in (DIFFERENTIAL_RATIO, BOTH_RATIO):
         return 1.6 * abs(top / bottom)
     if kind == DIFFERENTIAL_PHASE:

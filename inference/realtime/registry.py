@@ -4,7 +4,12 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from inference.realtime.background_cancelling import BACKGROUND_CANCELLING
+from inference.realtime.background_cancelling_differential import (
+    BACKGROUND_CANCELLING_DIFFERENTIAL,
+)
+from inference.realtime.background_intensity import BACKGROUND_INTENSITY
 from inference.realtime.conventional import CONVENTIONAL
+from inference.realtime.differential import DIFFERENTIAL
 from inference.realtime.intensity import INTENSITY, INTENSITY_W1
 from inference.realtime.technique import Technique
 
@@ -17,7 +22,10 @@ TECHNIQUES: Mapping[str, Technique] = MappingProxyType(
             CONVENTIONAL,
             INTENSITY,
             INTENSITY_W1,
+            DIFFERENTIAL,
             BACKGROUND_CANCELLING,
+            BACKGROUND_INTENSITY,
+            BACKGROUND_CANCELLING_DIFFERENTIAL,
         )
     }
 )

@@ -1,0 +1,98 @@
+"""Derivatives with a known background in them: immune to both terms, two roots as a rule."""
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.estimates import TechniqueResult
+from inference.realtime import curves
+from inference.realtime.assemble import NOISE_BAND, Outcome, assemble, reasons_of
+from inference.realtime.derivatives import DERIVATIVE_REASONS, derivatives_of
+from inference.realtime.differential import target_of
+from inference.realtime.from_curve import candidates_of
+from inference.realtime.motion import law_of_model
+from inference.realtime.technique import Task, Technique
+from simulator.sensor import PulsedSensor
+
+__all__ = ["BACKGROUND_CANCELLING_DIFFERENTIAL"]
+
+Array = NDArray[np.float64]
+
+_OWN = len(reasons_of())
+_REASONS = reasons_of(
+    *DERIVATIVE_REASONS,
+    "the readings do not change",
+    "the derivatives point below zero range within their noise: at or near contact",
+    "no range before the background has derivatives of this direction",
+)
+_STILL, _CONTACT, _NO_RANGE = (_OWN + len(DERIVATIVE_REASONS) + i for i in range(3))
+
+
+def _solve(task: Task) -> TechniqueResult:
+    sensor, known = task.sensor, task.known
+    rate = derivatives_of(sensor, known.crosstalk, task.frames, _OWN)
+    targets = target_of(task, rate)
+    high = known.get("background.distance_m")
+    if isinstance(sensor, PulsedSensor):
+        unit = known.unit
+        candidates, _ = candidates_of(
+            task,
+            curves.BOTH_RATIO,
+            min(high, sensor.r0),
+            targets.top / unit,
+            targets.sd / unit,
+            targets.bottom,
+        )
+    else:
+        high = min(high, sensor.max_range_m / 2)
+        candidates, _ = candidates_of(
+            task, curves.BOTH_PHASE, high, targets.top, targets.sd, period=math.pi
+        )
+        if task.physical:
+            candidates.roots[targets.contact] = np.nan
+    physical = None
+    if task.physical:
+        # the visible share of the background is not negative beyond -c1'
+        with np.errstate(invalid="ignore"):
+            slack = NOISE_BAND * np.where(np.isfinite(candidates.sd), candidates.sd, 0.0)
+            slack += 1e-12 * candidates.roots
+            physical = candidates.roots + known.get("background.shadow.c1") >= -slack
+    reason = np.where(targets.contact, _CONTACT, _NO_RANGE)
+    reason[targets.still] = _STILL
+    support = known.support if task.physical else (0.0, np.inf)
+    outcome = Outcome(physical, support, reason.astype(np.uint8), _REASONS)
+    result = assemble("background_cancelling_differential", rate.state, candidates, outcome)
+    return _with_law(task, result)
+
+
+def _with_law(task: Task, result: TechniqueResult) -> TechniqueResult:
+    """Add the power law and zeta that the known object has at the unique range."""
+    power, zeta = law_of_model(
+        result.range_m, task.known.get("object.c0"), task.known.get("object.c1")
+    )
+    return dataclasses.replace(result, power_law=power, zeta=zeta)
+
+
+BACKGROUND_CANCELLING_DIFFERENTIAL = Technique(
+    name="background_cancelling_differential",
+    kinds=("pulsed", "sine_wave"),
+    observables="derivatives in time of both readings",
+    needs=(
+        "object.c0",
+        "object.c1",
+        "object.c2",
+        "background.strength",
+        "background.distance_m",
+        "background.shadow.c0",
+        "background.shadow.c1",
+    ),
+    immune_to=("crosstalk", "background"),
+    uses_background=True,
+    differential=True,
+    cost=1.0,
+    equations="4.83; for a sine wave errata section 5",
+    roots="2 as a rule, 1 for a bright object, up to 3; sine wave: more at high frequencies",
+    solve=_solve,
+)

@@ -1,0 +1,204 @@
+"""Time derivatives of the readings: measured by the sensor, or differences over a window.
+
+A moving average of M + 1 first differences is the difference (x_i - x_(i-M-1)) / (M + 1) (App. A,
+25-27 as corrected): a longer window has less noise, and belongs to its centre. So a frame's own
+derivative needs a window around it. Three readings (i - m, i, i + m) with Lagrange's weights give
+it to second order at any spacing; with equal spacing it is the difference over 2 m, so M = 2 m - 1.
+At the ends the window is (i, i + m, i + 2 m), or its mirror.
+
+The half width m is Lepski's choice: the widest window whose direction of the derivative agrees with
+that of every narrower one within twice the narrower one's standard deviation. Noise widens it, and
+motion that bends the curves narrows it, without a model of either. What remains is a bias of the
+ratio of about -(N + 1)/3 (v h / r)^2 for a flux falling as r^-N and a half width of h seconds.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.realtime.net import (
+    UNREPRESENTABLE,
+    Net,
+    net_readings,
+    rule_out,
+)
+from simulator.compiled import compiled
+from simulator.errors import InvalidInputError
+from simulator.frames import Frames
+from simulator.sensor import Sensor
+
+__all__ = ["DERIVATIVE_REASONS", "LONELY", "UNEVEN_GAIN", "derivatives_of"]
+
+Array = NDArray[np.float64]
+
+LONELY, UNEVEN_GAIN = 0, 1
+DERIVATIVE_REASONS = (
+    "no other frame to form a difference with",
+    "the frame's gain changes, so that unknown crosstalk does not cancel in differences",
+)
+_HALF_WIDTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
+_AGREEMENT = 2.0
+
+
+@compiled
+def _weights(ta: float, tb: float, tc: float, at: int) -> tuple[float, float, float]:
+    """Lagrange's weights of the derivative at ta (at = 0), tb (1) or tc (2)."""
+    x = ta if at == 0 else (tb if at == 1 else tc)
+    wa = ((x - tb) + (x - tc)) / ((ta - tb) * (ta - tc))
+    wb = ((x - ta) + (x - tc)) / ((tb - ta) * (tb - tc))
+    wc = ((x - ta) + (x - tb)) / ((tc - ta) * (tc - tb))
+    return wa, wb, wc
+
+
+@compiled
+def _differences(
+    t: Array,
+    first: Array,
+    second: Array,
+    var1: Array,
+    var2: Array,
+    cov: Array,
+    gain: Array | None,
+    half_widths: tuple[int, ...],
+    out: Array,
+) -> None:
+    """Fill out (n, 5) with d1, d2, var1, var2, cov; nan where no window is allowed."""
+    n = t.size
+    kept = np.empty((len(half_widths), 2))
+    for i in range(n):
+        for j in range(5):
+            out[i, j] = math.nan
+        tried = 0
+        for m in half_widths:
+            if i >= m and i + m < n:
+                a, b, c, at = i - m, i, i + m, 1
+            elif i + 2 * m < n:
+                a, b, c, at = i, i + m, i + 2 * m, 0
+            elif i >= 2 * m:
+                a, b, c, at = i - 2 * m, i - m, i, 2
+            elif n == 2:
+                a, b, c, at = 0, 0, 1, -1
+            else:
+                break
+            if gain is not None and (gain[a] != gain[b] or gain[b] != gain[c]):
+                break
+            if at < 0:
+                wc = 1.0 / (t[1] - t[0])
+                wa, wb = -wc, 0.0
+            else:
+                wa, wb, wc = _weights(t[a], t[b], t[c], at)
+            # differences from the frame's own reading, so that a constant cancels exactly
+            o1, o2 = first[b], second[b]
+            d1 = wa * (first[a] - o1) + wc * (first[c] - o1)
+            d2 = wa * (second[a] - o2) + wc * (second[c] - o2)
+            v1 = wa * (wa * var1[a]) + wb * (wb * var1[b]) + wc * (wc * var1[c])
+            v2 = wa * (wa * var2[a]) + wb * (wb * var2[b]) + wc * (wc * var2[c])
+            v12 = wa * (wa * cov[a]) + wb * (wb * cov[b]) + wc * (wc * cov[c])
+            # the direction in units of the noise, modulo pi
+            s1, s2 = math.sqrt(v1), math.sqrt(v2)
+            x, y = d2 / s2, d1 / s1
+            size = x * x + y * y
+            angle = math.atan2(y, x)
+            spread = x * x + y * y - 2.0 * x * y * v12 / (s1 * s2)
+            sd = math.sqrt(max(spread, 0.0)) / size if size > 0.0 else math.inf
+            agrees = True
+            for earlier in range(tried):
+                off = abs(angle - kept[earlier, 0]) % math.pi
+                off = min(off, math.pi - off)
+                if off > _AGREEMENT * kept[earlier, 1]:
+                    agrees = False
+            if not agrees:
+                break
+            kept[tried, 0], kept[tried, 1] = angle, sd
+            tried += 1  # noqa: SIM113  # not every width is tried
+            out[i, 0], out[i, 1] = d1, d2
+            out[i, 2], out[i, 3], out[i, 4] = v1, v2, v12
+            if at < 0:
+                break
+
+
+def derivatives_of(
+    sensor: Sensor, crosstalk: tuple[float, float] | None, frames: Frames, first_reason: int
+) -> Net:
+    """Return the derivatives of the signals of object and background with their noise.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        Its noise; ``noise.derivative`` for derivative columns.
+    crosstalk : (float, float), optional
+        Known crosstalk; it matters only where the gain of frames differs.
+    frames : Frames
+        With derivative columns, or with times.
+    first_reason : int
+        Place of `DERIVATIVE_REASONS` among the reasons of the technique.
+
+    Returns
+    -------
+    Net
+        Derivatives [reading units / s] at the sensor's own gain; variances are nan for derivative
+        columns whose noise the sensor does not state.
+
+    Raises
+    ------
+    InvalidInputError
+        At ``/frames/time_s`` where times are missing, repeated or out of order.
+    """
+    if frames.derivatives is not None:
+        return _measured(sensor, frames)
+    if frames.time_s is None:
+        raise InvalidInputError.at("/frames/time_s", "is missing: differences in time need it")
+    backward = np.flatnonzero(~(frames.time_s[1:] > frames.time_s[:-1]))
+    if backward.size:
+        raise InvalidInputError.at(
+            "/frames/time_s", f"must increase: entry {backward[0] + 1} does not"
+        )
+    net = net_readings(sensor, crosstalk or (0.0, 0.0), frames)
+    usable = np.flatnonzero(net.state == 0)
+    var1, var2, cov = net.var1, net.var2, net.cov
+    with np.errstate(all="ignore"):
+        if net.relative > 0:
+            # independent from frame to frame, so it does not cancel in a difference
+            var1 = var1 + (net.relative * net.first) ** 2
+            var2 = var2 + (net.relative * net.second) ** 2
+            cov = cov + net.relative**2 * net.first * net.second
+    gain = frames.gain if crosstalk is None else None
+    out = np.full((len(frames), 5), np.nan)
+    state = net.state.copy()
+    if usable.size >= 2:
+        part = np.empty((usable.size, 5))
+        _differences(
+            frames.time_s[usable],
+            net.first[usable],
+            net.second[usable],
+            var1[usable],
+            var2[usable],
+            cov[usable],
+            None if gain is None else gain[usable],
+            _HALF_WIDTHS,
+            part,
+        )
+        out[usable] = part
+        missing = np.isnan(out[:, 0]) & np.isnan(out[:, 2]) & (state == 0)
+        state[missing] = first_reason + UNEVEN_GAIN
+    else:
+        state[usable] = first_reason + LONELY
+    bad = (state == 0) & ~(np.isfinite(out[:, 0]) & np.isfinite(out[:, 1]))
+    state[bad] = UNREPRESENTABLE
+    return Net(out[:, 0], out[:, 1], out[:, 2], out[:, 3], out[:, 4], 0.0, state)
+
+
+def _measured(sensor: Sensor, frames: Frames) -> Net:
+    """Use the sensor's own derivatives."""
+    assert frames.derivatives is not None  # noqa: S101  # decided by the caller
+    noise = sensor.noise.derivative or (math.nan, math.nan)
+    n = len(frames)
+    with np.errstate(all="ignore"):
+        gain = np.ones(n) if frames.gain is None else frames.gain
+        first, second = frames.derivatives[:, 0] / gain, frames.derivatives[:, 1] / gain
+        var1, var2 = (noise[0] / gain) ** 2, (noise[1] / gain) ** 2
+    state = rule_out(sensor, frames)
+    bad = ~(np.isfinite(first) & np.isfinite(second))
+    state[bad & (state == 0)] = UNREPRESENTABLE
+    return Net(first, second, var1, var2, np.zeros(n), 0.0, state)

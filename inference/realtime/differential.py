@@ -1,0 +1,243 @@
+"""Differential time of flight: crosstalk that does not change drops out of derivatives."""
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.estimates import Status, TechniqueResult
+from inference.realtime import curves
+from inference.realtime.assemble import (
+    NOISE_BAND,
+    Candidates,
+    Outcome,
+    assemble,
+    reasons_of,
+)
+from inference.realtime.derivatives import DERIVATIVE_REASONS, derivatives_of
+from inference.realtime.from_curve import candidates_of
+from inference.realtime.motion import law_of_model, law_of_motion
+from inference.realtime.net import Net, net_readings
+from inference.realtime.technique import Task, Technique
+from simulator.sensor import PulsedSensor
+
+__all__ = ["DIFFERENTIAL", "Targets", "target_of"]
+
+Array = NDArray[np.float64]
+
+OWN = len(reasons_of())
+_REASONS = reasons_of(
+    *DERIVATIVE_REASONS,
+    "the readings do not change",
+    "the derivatives point below zero range within their noise: at or near contact",
+    "no range has derivatives of this direction",
+    "c0 and c1 are not known: the range lies between the bounds, if c1 >= 0",
+)
+STILL, CONTACT, NO_RANGE = (OWN + len(DERIVATIVE_REASONS) + i for i in range(3))
+_BOUNDS = NO_RANGE + 1
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Targets:
+    """What derivatives say of the range.
+
+    Attributes
+    ----------
+    top, bottom : ndarray, shape (n,)
+        Of a pulse q = r0 w1' / w2' = top / bottom [m]; of a sine wave the phase modulo pi in
+        [0, pi) and 1. nan where there is none.
+    sd : ndarray, shape (n,)
+        Standard deviation of q or of the phase; nan where the noise is not known.
+    contact : ndarray of bool, shape (n,)
+        Whether the direction is below zero within its noise.
+    still : ndarray of bool, shape (n,)
+        Whether nothing changes at all.
+    """
+
+    top: Array
+    bottom: Array
+    sd: Array
+    contact: NDArray[np.bool_]
+    still: NDArray[np.bool_]
+
+
+def target_of(task: Task, rate: Net) -> Targets:
+    """Reduce derivatives to a ratio or an angle.
+
+    Parameters
+    ----------
+    task : Task
+        Gives the sensor.
+    rate : Net
+        Derivatives of the readings.
+
+    Returns
+    -------
+    Targets
+        The sign of the motion is not known, so an angle is known modulo pi only.
+    """
+    sensor = task.sensor
+    with np.errstate(all="ignore"):
+        # scaled, so that nothing overflows
+        size = np.maximum(np.abs(rate.first), np.abs(rate.second))
+        still = size == 0
+        safe = np.where(still, 1.0, size)
+        d1, d2 = rate.first / safe, rate.second / safe
+        usable = (rate.state == 0) & ~still
+        if isinstance(sensor, PulsedSensor):
+            ratio = d1 / d2
+            variance = rate.variance(1.0 / safe / d2, -ratio / safe / d2)
+            sd = sensor.r0 * np.sqrt(variance)
+            top = np.where(usable, sensor.r0 * d1, np.nan)
+            contact = (ratio <= 0) & (sensor.r0 * ratio > -NOISE_BAND * sd)
+            return Targets(top, d2, sd, contact | (ratio == 0), still)
+        length = np.hypot(d1, d2)
+        angle = np.arctan2(d2, d1) - sensor.phase_offset_rad
+        phase = np.mod(angle, np.pi)
+        sd = np.sqrt(rate.variance(-d2 / length / length / safe, d1 / length / length / safe))
+        band = np.minimum(NOISE_BAND * sd, 0.25 * np.pi)
+        contact = (phase > np.pi - band) | (phase == 0)
+        return Targets(np.where(usable, phase, np.nan), np.ones_like(phase), sd, contact, still)
+
+
+def _solve(task: Task) -> TechniqueResult:
+    sensor, known = task.sensor, task.known
+    rate = derivatives_of(sensor, known.crosstalk, task.frames, OWN)
+    targets = target_of(task, rate)
+    pulsed = isinstance(sensor, PulsedSensor)
+    # phases of derivatives are known modulo pi: half the unambiguous range of a sine wave
+    high = sensor.max_range_m if pulsed else sensor.max_range_m / 2
+    if task.high_m is not None:
+        high = task.high_m
+    bounds = None
+    if task.scene.motion == "tangential":
+        candidates = _fixed_distance(task, targets, high)
+    elif known.has("object.c0", "object.c1"):
+        unit = known.unit
+        if pulsed:
+            candidates, _ = candidates_of(
+                task,
+                curves.DIFFERENTIAL_RATIO,
+                high,
+                targets.top / unit,
+                targets.sd / unit,
+                targets.bottom,
+            )
+        else:
+            candidates, _ = candidates_of(
+                task, curves.DIFFERENTIAL_PHASE, high, targets.top, targets.sd, period=math.pi
+            )
+    else:
+        candidates = _no_candidates(targets.top.size)
+        bounds = _bounds(task, targets, high)
+    if task.physical and not pulsed:
+        candidates.roots[targets.contact] = np.nan
+    reason = np.where(targets.contact, CONTACT, NO_RANGE)
+    reason[targets.still] = STILL
+    support = known.support if task.physical else (0.0, np.inf)
+    outcome = Outcome(None, support, reason.astype(np.uint8), _REASONS)
+    result = assemble("differential", rate.state, candidates, outcome)
+    if bounds is not None:
+        result = _bounded(result, bounds, support)
+    return _with_motion(task, result, rate)
+
+
+def _fixed_distance(task: Task, targets: Targets, high: float) -> Candidates:
+    """At a fixed range zeta = 1: derivatives have the phase of the range itself (4.66, 4.67)."""
+    with np.errstate(all="ignore"):
+        if isinstance(task.sensor, PulsedSensor):
+            roots, sd = targets.top / targets.bottom, targets.sd
+            roots = roots[:, None]
+        else:
+            k = task.sensor.wave_number
+            turns = max(math.ceil(high * k / math.pi), 1)
+            roots = (targets.top[:, None] + math.pi * np.arange(turns)) / k
+            sd = targets.sd / k
+        roots = np.where((roots > 0) & (roots <= high), roots, np.nan)
+    never = np.zeros(roots.shape, dtype=np.bool_)
+    return Candidates(roots, np.broadcast_to(sd[:, None], roots.shape), never, never[:, 0])
+
+
+def _no_candidates(n: int) -> Candidates:
+    nothing, never = np.full((n, 1), np.nan), np.zeros((n, 1), dtype=np.bool_)
+    return Candidates(nothing, nothing, never, never[:, 0])
+
+
+def _bounds(task: Task, targets: Targets, high: float) -> Array:
+    """Bounds of the range for a power law between -2 and -4 (zeta in [1/2, 3/4])."""
+    with np.errstate(all="ignore"):
+        if isinstance(task.sensor, PulsedSensor):
+            q = targets.top / targets.bottom
+            bounds = np.column_stack([q / 0.75, q / 0.5])
+        else:
+            # exactly: psi = k r - atan(k r / N) with N between 2 and 4
+            turns = [_turn_of(targets.top, power) for power in (4.0, 2.0)]
+            bounds = np.column_stack(turns) / task.sensor.wave_number
+        bounds[:, 1] = np.minimum(bounds[:, 1], high)
+        good = (bounds[:, 0] > 0) & (bounds[:, 0] <= bounds[:, 1])
+        if task.physical:
+            good &= ~targets.contact
+    return np.where(good[:, None], bounds, np.nan)
+
+
+def _turn_of(psi: Array, power: float) -> Array:
+    """Solve x - atan(x / N) = psi for x in (psi, psi + pi/2) by bisection: the left increases."""
+    low, high = psi.copy(), psi + 0.5 * math.pi
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        below = middle - np.arctan(middle / power) < psi
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    # near zero the bisection is absolute; one Newton step makes it relative
+    x = 0.5 * (low + high)
+    small = psi < 1e-6
+    return np.where(small, psi * power / (power - 1.0), x)
+
+
+def _bounded(
+    result: TechniqueResult, bounds: Array, support: tuple[float, float]
+) -> TechniqueResult:
+    """Answer with bounds: ambiguous where there are any, of the ranges that the scene allows."""
+    with np.errstate(invalid="ignore"):
+        low = np.maximum(bounds[:, 0], support[0])
+        high = np.minimum(bounds[:, 1], support[1])
+        inside = (low <= high) & ((result.reason == 0) | (result.reason >= OWN))
+        inside &= result.status == Status.NONE
+    cut = np.where(inside[:, None], np.column_stack([low, high]), np.nan)
+    status = np.where(inside, Status.AMBIGUOUS, result.status).astype(np.uint8)
+    reason = np.where(inside, _BOUNDS, result.reason).astype(np.uint8)
+    return dataclasses.replace(result, status=status, reason=reason, range_bounds_m=cut)
+
+
+def _with_motion(task: Task, result: TechniqueResult, rate: Net) -> TechniqueResult:
+    """Add power law and zeta: measured where crosstalk is known, else those of the model."""
+    known = task.known
+    if known.crosstalk is not None and task.scene.background is None:
+        net = net_readings(task.sensor, known.crosstalk, task.frames)
+        power, zeta = law_of_motion(task.sensor, net, rate)
+    elif task.scene.motion == "radial" and known.has("object.c0", "object.c1"):
+        power, zeta = law_of_model(result.range_m, known.get("object.c0"), known.get("object.c1"))
+    else:
+        nothing = np.full(len(result), np.nan)
+        power, zeta = nothing, nothing
+        if task.scene.motion == "tangential":
+            zeta = np.where(result.status == Status.UNIQUE, 1.0, np.nan)
+    return dataclasses.replace(result, power_law=power, zeta=zeta)
+
+
+DIFFERENTIAL = Technique(
+    name="differential",
+    kinds=("pulsed", "sine_wave"),
+    observables="derivatives in time of both readings",
+    needs=(),
+    immune_to=("crosstalk",),
+    uses_background=False,
+    differential=True,
+    cost=1.0,
+    equations="4.64-4.68, exact form for a sine wave in errata section 5",
+    roots=(
+        "1 if c1 >= -1.633 sqrt(c0), else up to 3; without c0 and c1 bounds only; "
+        "1 at a fixed range"
+    ),
+    solve=_solve,
+)
