@@ -1,0 +1,157 @@
+"""A posterior that is a running sum: quick, pure, importable in a worker, the same every time."""
+
+import dataclasses
+import io
+import os
+import signal
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from inference.posterior.settings import SamplerSettings
+from simulator.errors import RefusedError
+from simulator.frames import Frames
+from simulator.scene import Scene
+from simulator.sensor import Sensor
+
+CHUNKS = 6
+STEPS = 10
+
+
+@dataclasses.dataclass(frozen=True)
+class Job:
+    settings: SamplerSettings
+    # directives of a test: {"sleep": seconds a piece, "die": path of a mark, "fail": message}
+    orders: dict[str, Any]
+
+    def to_bytes(self) -> bytes:
+        return repr((self.settings.model_dump(), self.orders)).encode()
+
+    @staticmethod
+    def from_bytes(raw: bytes) -> "Job":
+        import ast
+
+        settings, orders = ast.literal_eval(raw.decode())
+        return Job(SamplerSettings(**settings), orders)
+
+
+@dataclasses.dataclass(frozen=True)
+class Checkpoint:
+    chunk: int
+    sums: tuple[float, ...]
+
+    def to_bytes(self) -> bytes:
+        out = io.BytesIO()
+        np.savez(out, chunk=self.chunk, sums=np.asarray(self.sums))
+        return out.getvalue()
+
+    @staticmethod
+    def from_bytes(raw: bytes) -> "Checkpoint":
+        with np.load(io.BytesIO(raw)) as stored:
+            return Checkpoint(int(stored["chunk"]), tuple(stored["sums"].tolist()))
+
+
+@dataclasses.dataclass(frozen=True)
+class Task:
+    seed: int
+    chunk: int
+    ensemble: int
+    sum: float
+    orders: dict[str, Any]
+
+
+@dataclasses.dataclass(frozen=True)
+class Progress:
+    steps: int
+    target: int
+    ess: float | None
+    rhat: float | None
+    finished: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Posterior:
+    body: dict[str, Any]
+
+    def to_json(self) -> dict[str, Any]:
+        return self.body
+
+
+_ORDERS: dict[str, Any] = {}
+
+
+def order(**orders: Any) -> None:
+    """Say how the next jobs behave; an empty call takes it back."""
+    _ORDERS.clear()
+    _ORDERS.update(orders)
+
+
+def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSettings) -> Job:
+    if scene.discrepancy is not None:
+        raise RefusedError("a discrepancy is not known here; leave it out")
+    seed = 1 if settings.seed is None else settings.seed
+    return Job(settings.model_copy(update={"seed": seed}), dict(_ORDERS))
+
+
+def start(job: Job) -> Checkpoint:
+    return Checkpoint(0, (0.0,) * job.settings.ensembles)
+
+
+def tasks(job: Job, checkpoint: Checkpoint) -> tuple[Task, ...]:
+    if checkpoint.chunk == CHUNKS:
+        return ()
+    assert job.settings.seed is not None
+    return tuple(
+        Task(job.settings.seed, checkpoint.chunk, ensemble, total, job.orders)
+        for ensemble, total in enumerate(checkpoint.sums)
+    )
+
+
+def run(task: Task) -> float:
+    time.sleep(task.orders.get("sleep", 0.0))
+    if "fail" in task.orders:
+        raise ValueError(task.orders["fail"])
+    if "die" in task.orders and task.chunk == 2 and task.ensemble == 1:
+        mark = Path(task.orders["die"])
+        deaths = len(mark.read_text()) if mark.exists() else 0
+        if deaths < task.orders["deaths"]:
+            mark.write_text("x" * (deaths + 1))
+            os.kill(os.getpid(), signal.SIGKILL)
+    rng = np.random.default_rng([task.seed, task.chunk, task.ensemble])
+    return task.sum + float(rng.standard_normal())
+
+
+def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[float]) -> Checkpoint:
+    assert len(pieces) == job.settings.ensembles
+    return Checkpoint(checkpoint.chunk + 1, tuple(pieces))
+
+
+def progress(job: Job, checkpoint: Checkpoint) -> Progress:
+    done = checkpoint.chunk
+    rhat = 1.0 + 1.0 / done if done else None
+    return Progress(done * STEPS, CHUNKS * STEPS, 10.0 * done, rhat, done == CHUNKS)
+
+
+def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> Posterior:
+    finished = checkpoint.chunk == CHUNKS
+    summary = {"mean": checkpoint.sums[0], "sd": 1.0, "q05": 0.0, "q50": 0.0, "q95": 0.0}
+    summary |= {"ess_bulk": 1.0, "ess_tail": 1.0, "rhat": 1.0, "mcse_mean": 1.0}
+    return Posterior(
+        {
+            "method": job.settings.method,
+            "seed": job.settings.seed,
+            "verdict": {
+                "converged": finished,
+                "reasons": [] if finished else ["too few steps"],
+            },
+            "parameters": {"object.c0": summary},
+            "range_m": {"q05": [], "q50": [], "q95": [], "mean": [], "sd": [], "modes": []},
+            "identifiability": [],
+            "fit": {"p_value": 0.5, "misfit": False},
+            "left_out": [],
+            "runtime": {"wall_s": wall_s, "cpu_s": cpu_s, "likelihood_calls": 1, "k_hat": None},
+        }
+    )
