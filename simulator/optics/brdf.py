@@ -197,9 +197,9 @@ class Material(Validated):
     diffuse: Annotated[float, pydantic.Field(ge=0, le=1)] = 1.0
     specular: NonNegative = 0.0
     roughness: Annotated[float, pydantic.Field(ge=1e-4, le=10)] = 0.5
-    fresnel: Annotated[
-        ConstantFresnel | Dielectric, pydantic.Field(discriminator="kind")
-    ] = ConstantFresnel()
+    fresnel: Annotated[ConstantFresnel | Dielectric, pydantic.Field(discriminator="kind")] = (
+        ConstantFresnel()
+    )
     masking: Literal["v_cavity", "smith", "none"] = "v_cavity"
 
     @pydantic.model_validator(mode="after")

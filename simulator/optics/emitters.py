@@ -73,9 +73,8 @@ def intensity(pattern: Array, at: int, table: Array, cosine: float, sine: float)
     h = table[0, i + 1] - table[0, i]
     t = (angle - table[0, i]) / h
     u = 1.0 - t
-    return (
-        u * u * ((1.0 + 2.0 * t) * table[1, i] + t * h * table[2, i])
-        + t * t * ((1.0 + 2.0 * u) * table[1, i + 1] - u * h * table[2, i + 1])
+    return u * u * ((1.0 + 2.0 * t) * table[1, i] + t * h * table[2, i]) + t * t * (
+        (1.0 + 2.0 * u) * table[1, i + 1] - u * h * table[2, i + 1]
     )
 
 
@@ -202,9 +201,7 @@ class Emitter(Validated):
     power_w: Annotated[float, pydantic.Field(gt=0)] = 1.0
     size_m: (
         Annotated[
-            tuple[
-                Annotated[float, pydantic.Field(gt=0)], Annotated[float, pydantic.Field(gt=0)]
-            ],
+            tuple[Annotated[float, pydantic.Field(gt=0)], Annotated[float, pydantic.Field(gt=0)]],
             pydantic.Strict(False),
         ]
         | None

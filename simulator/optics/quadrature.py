@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulator.compiled import compiled
+from simulator.optics.brdf import reflect
 from simulator.optics.geometry import FLAT, SHELL, density
 from simulator.optics.regions import ARC, LINE, ray, sectors
 
@@ -99,10 +100,12 @@ def _ray_piece(
     # Kronrod sums v and Gauss sums g, as scalars: an array for each piece would cost as much
     # as the integrand
     v0 = v1 = v2 = v3 = v4 = g0 = g1 = g2 = g3 = g4 = 0.0
-    # diffuse and flat under a uniform or Lambertian emitter at the detector: a third of the cost
-    plain = backdrop is None and chart[0] == FLAT and material[1] == 0.0 and chart[31] > 0.0
+    # flat under a uniform or Lambertian emitter at the detector: both directions are one, which
+    # leaves a third of the cost
+    plain = backdrop is None and chart[0] == FLAT and chart[31] > 0.0
     height = chart[18]
-    share = material[0] * head[14] * (1.0 / math.pi) * height * height
+    diffuse = material[0] * (1.0 / math.pi)
+    lobe = material[1] > 0.0
     see0 = chart[15] * head[9] + chart[16] * head[10] + chart[17] * head[11]
     see1 = u[0] * head[9] + u[1] * head[10] + u[2] * head[11]
     shine0 = chart[12] * head[3] + chart[13] * head[4] + chart[14] * head[5]
@@ -114,10 +117,16 @@ def _ray_piece(
             see, shine = see0 + rho * see1, shine0 + rho * shine1
             if see <= 0.0 or shine <= 0.0:
                 continue
-            inverse2 = 1.0 / (height * height + rho * rho)
-            inverse = math.sqrt(inverse2)
-            path = 1.0 / inverse
-            f = share * rho * see * inverse2 * inverse2 * inverse2 * inverse
+            path = math.sqrt(height * height + rho * rho)
+            inverse = 1.0 / path
+            cosine = height * inverse
+            if lobe:
+                slope = rho / height
+                f = reflect(material, 0, cosine, cosine, cosine, slope * slope, 1.0)
+            else:
+                f = diffuse * cosine * cosine
+            inverse2 = inverse * inverse
+            f *= head[14] * rho * see * inverse2 * inverse2 * inverse
             if head[12] == 1.0:
                 f *= shine * inverse
         else:

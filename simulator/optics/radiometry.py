@@ -5,12 +5,9 @@ Everything is per Phi0 A_D [1/m^2], so that a sensor's gain turns it into readin
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import speed_of_light
 
 from simulator.compiled import compiled
 from simulator.errors import InvalidInputError
@@ -19,13 +16,12 @@ from simulator.optics.brdf import pack_material
 from simulator.optics.charts import build_chart
 from simulator.optics.detectors import Detector
 from simulator.optics.emitters import Emitter, Narrow, pack_pattern
+from simulator.optics.light import Light, Modulation, Status, dark
+from simulator.optics.narrow import observe_narrow
 from simulator.optics.quadrature import COMPONENTS, GAUSS_KRONROD, gauss_rule, integrate
 from simulator.optics.surfaces import Disk, Plane, Rectangle, Shell, Sphere, pack_surface
 
 __all__ = [
-    "Light",
-    "Modulation",
-    "Status",
     "observe",
     "observe_batch",
     "observe_shell",
@@ -33,7 +29,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-Status = Literal["lit", "edge_on", "opposite_faces", "out_of_view", "underflow"]
 AnySurface = Rectangle | Disk | Plane | Sphere
 
 _STATUS: dict[int, Status] = {
@@ -42,86 +37,6 @@ _STATUS: dict[int, Status] = {
     charts.OPPOSITE: "opposite_faces",
     charts.OUT_OF_VIEW: "out_of_view",
 }
-_REASON: dict[Status, str] = {
-    "lit": "",
-    "edge_on": "emitter or detector lies in the plane of the surface, which is seen edge-on",
-    "opposite_faces": "emitter and detector see opposite faces of the surface",
-    "out_of_view": "no part of the surface is in front of both emitter and detector",
-    "underflow": "what the surface returns is below the smallest number",
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Modulation:
-    """What a sensor does to light in time.
-
-    Attributes
-    ----------
-    frequency_hz : float, optional
-        f of a sine wave.
-    pulse_width_s : float, optional
-        T_p of a pulse.
-    """
-
-    frequency_hz: float | None = None
-    pulse_width_s: float | None = None
-
-    @property
-    def wave_number(self) -> float:
-        """k = 4 pi f / c [rad/m], 0 without a sine wave."""
-        return 4 * math.pi * (self.frequency_hz or 0.0) / speed_of_light
-
-    @property
-    def r0(self) -> float:
-        """c T_p / 2 [m], 0 without a pulse."""
-        return 0.5 * speed_of_light * (self.pulse_width_s or 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Light:
-    """What one surface returns, per Phi0 A_D.
-
-    Attributes
-    ----------
-    flux : float
-        Phi / (Phi0 A_D) [1/m^2].
-    distance_m : float
-        Effective distance of a long pulse, the flux-weighted mean of (r_i + r_o)/2 (3.2) [m]; nan
-        where there is no light.
-    late : float
-        int min(r/r0, 1) dPhi (2.33 with its erratum); nan without a pulse.
-    phasor : complex
-        int exp(j k r) dPhi (3.19 with its erratum); nan without a sine wave.
-    error : float
-        Estimated relative error of the flux.
-    status : str
-        "lit", or why the flux is zero.
-    """
-
-    flux: float
-    distance_m: float
-    late: float
-    phasor: complex
-    error: float
-    status: Status
-
-    @property
-    def reason(self) -> str:
-        """Why the flux is zero; empty where it is not."""
-        return _REASON[self.status]
-
-    def phase_distance_m(self, modulation: Modulation) -> float:
-        """Return the effective distance of a sine wave, arg(phasor)/k in [0, 2 pi/k) [m]."""
-        k = modulation.wave_number
-        if not k > 0 or self.flux == 0:
-            return math.nan
-        return (math.atan2(self.phasor.imag, self.phasor.real) % (2 * math.pi)) / k
-
-    def pulse_distance_m(self, modulation: Modulation) -> float:
-        """Return the effective distance of a pulse, r0 late/flux, at most r0 [m]."""
-        if not modulation.r0 > 0 or self.flux == 0:
-            return math.nan
-        return modulation.r0 * self.late / self.flux
 
 
 @compiled
@@ -141,9 +56,7 @@ def _observe_many(
     states = np.zeros((count, 2), dtype=np.int64)
     late = 1.0 / signal[1] if signal[1] > 0.0 else 0.0
     for i in range(count):
-        status, chart, region, marks = build_chart(
-            surfaces[i], head, materials[i], late, backdrop
-        )
+        status, chart, region, marks = build_chart(surfaces[i], head, materials[i], late, backdrop)
         states[i, 0] = status
         if status != 0:
             continue
@@ -196,19 +109,20 @@ def _lights(values: Array, errors: Array, states: Array, modulation: Modulation)
             raise InvalidInputError.at("/surface", "emitter or detector lies inside the sphere")
         flux = float(value[0])
         status = _STATUS[int(state)]
-        if status == "lit" and flux == 0.0:
-            status = "underflow"
+        if flux == 0.0:
+            lights.append(dark("underflow" if status == "lit" else status))
+            continue
         lights.append(
             Light(
                 flux=flux,
-                distance_m=float(value[1]) / flux if flux > 0 else math.nan,
+                distance_m=float(value[1]) / flux,
                 late=float(value[2]) if modulation.r0 > 0 else math.nan,
                 phasor=(
                     complex(value[3], value[4])
                     if modulation.wave_number > 0
                     else complex(math.nan, math.nan)
                 ),
-                error=float(error) / flux if flux > 0 else 0.0,
+                error=float(error) / flux,
                 status=status,
             )
         )
@@ -254,14 +168,9 @@ def observe_batch(
     if not surfaces:
         return []
     if isinstance(emitter.pattern, Narrow):
-        from simulator.optics.narrow import observe_narrow
-
         return [observe_narrow(s, emitter, detector, modulation) for s in surfaces]
     rows = np.vstack([pack_surface(s) for s in surfaces])
     materials = np.vstack([pack_material(s.material) for s in surfaces])
-    values = np.zeros((len(surfaces), COMPONENTS))
-    errors = np.zeros(len(surfaces))
-    states = np.full((len(surfaces), 2), -1, dtype=np.int64)
     signal = np.array(
         [modulation.wave_number, 1.0 / modulation.r0 if modulation.r0 > 0 else 0.0, 1.0]
     )

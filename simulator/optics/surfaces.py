@@ -118,9 +118,7 @@ class Shell(Validated):
     material: Material = Material()
 
 
-Surface = Annotated[
-    Rectangle | Disk | Plane | Sphere, pydantic.Field(discriminator="kind")
-]
+Surface = Annotated[Rectangle | Disk | Plane | Sphere, pydantic.Field(discriminator="kind")]
 
 
 def pack_surface(surface: Rectangle | Disk | Plane | Sphere) -> Array:
