@@ -14,7 +14,7 @@ from inference.realtime.assemble import (
     assemble,
     reasons_of,
 )
-from inference.realtime.net import SATURATED, UNREPRESENTABLE, net_readings, rule_out
+from inference.realtime.net import ABSENT, SATURATED, UNREPRESENTABLE, net_readings
 from inference.realtime.technique import Task, Technique
 from simulator.compiled import compiled
 from simulator.frames import Frames
@@ -53,19 +53,21 @@ def conventional_range(sensor: Sensor, frames: Frames, crosstalk: Pair = (0.0, 0
         Range [m]; nan where the readings give none: a pulse needs 0 < w1 <= w2, a sine wave any
         signal. Nothing is said of noise, saturation or empty scenes: that is `estimate`.
     """
-    first, second = frames.readings[:, 0], frames.readings[:, 1]
     if isinstance(sensor, PulsedSensor):
-        return _pulsed_range(first, second, sensor.r0, crosstalk[0], crosstalk[1])
+        flat = np.ascontiguousarray(frames.readings).reshape(-1)
+        return _pulsed_range(flat, sensor.r0, *crosstalk)
+    first, second = frames.readings[:, 0], frames.readings[:, 1]
     return _phase_range(first, second, sensor.wave_number, sensor.phase_offset_rad, *crosstalk)
 
 
 @compiled
-def _pulsed_range(w1: Array, w2: Array, r0: float, ct1: float, ct2: float) -> Array:
-    out = np.empty(w1.size)
-    for i in range(w1.size):
-        late, whole = w1[i] - ct1, w2[i] - ct2
-        r = r0 * (late / whole)
-        out[i] = r if 0.0 < late <= whole < math.inf else math.nan
+def _pulsed_range(flat: Array, r0: float, ct1: float, ct2: float) -> Array:
+    # one flat index: so the compiler sees how the pairs lie and divides several at once
+    out = np.empty(flat.size // 2)
+    for i in range(out.size):
+        late, whole = flat[2 * i] - ct1, flat[2 * i + 1] - ct2
+        good = (late > 0.0) & (late <= whole) & (whole < math.inf)
+        out[i] = r0 * (late / whole) if good else math.nan
     return out
 
 
@@ -85,102 +87,124 @@ def _phase_range(
 
 @compiled
 def _pulsed(
-    readings: Array,
+    flat: Array,
     r0: float,
     crosstalk: Pair,
     read: Pair,
     shot: float,
-    low: float,
-    high: float,
+    support: Pair,
     full: Pair,
-    codes: tuple[int, int, int, int, int, int],
-    status: NDArray[np.uint8],
-    reason: NDArray[np.uint8],
-    count: NDArray[np.intp],
     roots: Array,
     sds: Array,
-) -> bool:
-    """Fill the result of every frame in one pass; return whether any is saturated."""
-    dark, contact, beyond, outside, lost, saturated = codes
+    reason: NDArray[np.uint8],
+) -> int:
+    """Fill ranges, standard deviations and a mark of the frames that have none; count the marks.
+
+    Without branches, so that several frames are computed at once. A frame's gain and the relative
+    error of the object's signal cancel in the ratio.
+    """
+    low, high = support
     var1, var2 = read[0] * read[0], read[1] * read[1]
-    any_saturated = False
-    for i in range(readings.shape[0]):
-        raw1, raw2 = readings[i, 0], readings[i, 1]
+    bad = 0
+    for i in range(roots.size):
+        raw1, raw2 = flat[2 * i], flat[2 * i + 1]
         late, whole = raw1 - crosstalk[0], raw2 - crosstalk[1]
-        share = late / whole
+        inverse = 1.0 / whole
+        share = late * inverse
         r = r0 * share
-        # gradient of the ratio (1, -share) / whole; a frame's gain cancels in the ratio
-        own1, own2 = var1, var2
-        shared = 0.0
-        if shot > 0.0:
-            first, second = shot * abs(raw1), shot * abs(raw2)
-            shared = min(first, second)
-            own1 += first - shared
-            own2 += second - shared
-        lever = 1.0 - share
-        sd = r0 / abs(whole) * math.sqrt(own1 + share * share * own2 + lever * lever * shared)
-        # a sum of codes, exactly one of which applies: no branch, so that the loop is vectorised
-        code = 0
-        if not (low <= r <= high):
-            code = outside
-        if late > whole:
-            code = beyond
-        if late <= 0.0:
-            code = contact
-        if whole <= 0.0:
-            code = dark
-        if not (abs(late) < math.inf and abs(whole) < math.inf and r < math.inf):
-            code = lost if whole > 0.0 or not abs(whole) < math.inf else code
+        # gradient of the ratio: (1, -share) / whole; shared photons enter with 1 - share
+        first, second = shot * abs(raw1), shot * abs(raw2)
+        shared = first if first < second else second
+        variance = var1 + first - shared + share * share * (var2 + second - shared)
+        variance += (1.0 - share) * (1.0 - share) * shared
+        sd = r0 * inverse * math.sqrt(variance)
+        good = (low <= r) & (r <= high) & (late > 0.0) & (late <= whole) & (whole < math.inf)
+        good &= (sd < math.inf) & (abs(raw1) < full[0]) & (abs(raw2) < full[1])
+        roots[i] = r if good else math.nan
+        sds[i] = sd if good else math.nan
+        reason[i] = 0 if good else 1
+        bad += 0 if good else 1
+    return bad
+
+
+@compiled
+def _explain(
+    flat: Array,
+    r0: float,
+    crosstalk: Pair,
+    support: Pair,
+    full: Pair,
+    codes: tuple[int, int, int, int, int, int],
+    roots: Array,
+    reason: NDArray[np.uint8],
+) -> None:
+    """Say of the frames marked why they have no range, or give it where only its sd overflows."""
+    dark, contact, beyond, outside, lost, saturated = codes
+    for i in range(roots.size):
+        if reason[i] == 0:
+            continue
+        raw1, raw2 = flat[2 * i], flat[2 * i + 1]
+        late, whole = raw1 - crosstalk[0], raw2 - crosstalk[1]
+        r = r0 * (late / whole)
         if abs(raw1) >= full[0] or abs(raw2) >= full[1]:
-            code = saturated
-            any_saturated = True
-        good = code == 0
-        status[i] = 0 if good else 2
-        reason[i] = code
-        count[i] = 1 if good else 0
-        roots[i, 0] = r if good else math.nan
-        sds[i, 0] = sd if good and sd < math.inf else math.nan
-    return any_saturated
+            reason[i] = saturated
+        elif not (abs(late) < math.inf and abs(whole) < math.inf):
+            reason[i] = lost
+        elif whole <= 0.0:
+            reason[i] = dark
+        elif late <= 0.0:
+            reason[i] = contact
+        elif late > whole:
+            reason[i] = beyond
+        elif not r > 0.0:
+            reason[i] = lost
+        elif not support[0] <= r <= support[1]:
+            reason[i] = outside
+        else:
+            reason[i] = 0
+            roots[i] = r
 
 
 def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
     assert task.known.crosstalk is not None  # noqa: S101  # the plan leaves the technique out
-    n = len(task.frames)
-    status, reason = np.empty(n, dtype=np.uint8), np.empty(n, dtype=np.uint8)
-    count = np.empty(n, dtype=np.intp)
-    roots, sds = np.empty((n, 1)), np.empty((n, 1))
+    frames = task.frames
+    n = len(frames)
     slack = 8 * np.finfo(float).eps
     low, high = task.known.support if task.physical else (0.0, math.inf)
-    any_saturated = _pulsed(
-        task.frames.readings,
-        sensor.r0,
-        task.known.crosstalk,
-        sensor.noise.read,
-        sensor.noise.shot,
-        low * (1 - slack),
-        high * (1 + slack),
-        sensor.full_scale or (math.inf, math.inf),
-        (_DARK, _CONTACT, _BEYOND, OUTSIDE, UNREPRESENTABLE, SATURATED),
-        status,
-        reason,
-        count,
-        roots,
-        sds,
+    support = (low * (1 - slack), high * (1 + slack))
+    full = sensor.full_scale or (math.inf, math.inf)
+    crosstalk = task.known.crosstalk
+    # one block for all columns: freshly mapped pages would cost more than the arithmetic
+    block = np.empty(27 * n, dtype=np.uint8)
+    roots, sds = block[: 8 * n].view(np.float64), block[8 * n : 16 * n].view(np.float64)
+    count = block[16 * n : 24 * n].view(np.intp)
+    status, reason, near = (block[(24 + i) * n : (25 + i) * n] for i in range(3))
+    flat = np.ascontiguousarray(frames.readings).reshape(-1)
+    noise = sensor.noise
+    bad = _pulsed(
+        flat, sensor.r0, crosstalk, noise.read, noise.shot, support, full, roots, sds, reason
     )
-    if any_saturated:
+    count.fill(1)
+    status.fill(Status.UNIQUE)
+    near.fill(0)
+    if bad:
+        codes = (_DARK, _CONTACT, _BEYOND, OUTSIDE, UNREPRESENTABLE, SATURATED)
+        _explain(flat, sensor.r0, crosstalk, support, full, codes, roots, reason)
+    if frames.object_present is not None:
+        absent = ~frames.object_present & (reason != SATURATED)
+        reason[absent], roots[absent], sds[absent] = ABSENT, np.nan, np.nan
+        bad += int(np.count_nonzero(absent))
+    if bad:
+        status[reason > 0] = Status.NONE
         status[reason == SATURATED] = Status.SATURATED
-    if task.frames.object_present is not None:
-        state = rule_out(sensor, task.frames)
-        out = (state > 0) & (state != SATURATED)
-        status[out], reason[out], count[out] = Status.NONE, state[out], 0
-        roots[out], sds[out] = np.nan, np.nan
+        count[reason > 0] = 0
     return TechniqueResult(
         technique="conventional",
         status=status,
-        roots_m=roots,
-        roots_sd_m=sds,
+        roots_m=roots[:, None],
+        roots_sd_m=sds[:, None],
         root_count=count,
-        near_fold=np.zeros(n, dtype=np.bool_),
+        near_fold=near.view(np.bool_),
         reason=reason,
         reasons=_REASONS,
     )
