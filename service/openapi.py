@@ -36,7 +36,21 @@ def install(app: FastAPI) -> None:
                     ref_template=reference,
                 )
                 document["components"]["schemas"] |= found["$defs"]
+            _drop_supposed_refusals(document)
             app.openapi_schema = document
         return app.openapi_schema
 
     app.openapi = openapi  # type: ignore[method-assign]  # FastAPI's own way to extend it
+
+
+def _drop_supposed_refusals(document: dict[str, Any]) -> None:
+    """Remove the 422 that FastAPI supposes of every parameter; those that occur are declared."""
+    supposed = {
+        "application/json": {"schema": {"$ref": "#/components/schemas/HTTPValidationError"}}
+    }
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            if operation["responses"].get("422", {}).get("content") == supposed:
+                del operation["responses"]["422"]
+    for name in ("HTTPValidationError", "ValidationError"):
+        document["components"]["schemas"].pop(name, None)

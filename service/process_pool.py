@@ -178,8 +178,8 @@ class ProcessPool(Executor):
             worker = self._answer(index, worker, future, (function, arguments))
         if worker is not None:
             worker.end(kill=False)
-            with self._lock:
-                self._workers.pop(index, None)
+        with self._lock:
+            self._workers.pop(index, None)
 
     def _answer(
         self, index: int, worker: _Worker | None, future: Future[Any], task: object

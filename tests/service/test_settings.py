@@ -16,7 +16,13 @@ def test_reads_its_prefix_alone() -> None:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("WORKERS", "0"), ("WORKERS", "two"), ("SHUTDOWN_S", "nan"), ("SHUTDOWN_S", "60"), ("TYPO", "1")],
+    [
+        ("WORKERS", "0"),
+        ("WORKERS", "two"),
+        ("SHUTDOWN_S", "nan"),
+        ("SHUTDOWN_S", "60"),
+        ("TYPO", "1"),
+    ],
 )
 def test_names_the_variable(name: str, value: str) -> None:
     with pytest.raises(InvalidInputError) as caught:

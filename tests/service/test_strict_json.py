@@ -13,7 +13,10 @@ from simulator.frames import FrameColumns
 from simulator.validated import parse
 
 json_values = st.recursive(
-    st.none() | st.booleans() | st.integers(-(2**63), 2**63) | st.floats(allow_nan=False)
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**63), 2**63)
+    | st.floats(allow_nan=False)
     # decode refuses lone surrogates
     | st.text(st.characters(exclude_categories=["Cs"])),
     lambda inner: st.lists(inner) | st.dictionaries(st.text("ab/~é"), inner),
@@ -29,7 +32,18 @@ def test_reads_what_the_standard_library_reads(value: Any) -> None:
 
 @pytest.mark.parametrize(
     "raw",
-    [b"", b"  ", b"{", b"[1,]", b"{'a': 1}", b"1 2", b"\xff", b'{"a": 01}', b"[1.]", b"\xef\xbb\xbf1"],
+    [
+        b"",
+        b"  ",
+        b"{",
+        b"[1,]",
+        b"{'a': 1}",
+        b"1 2",
+        b"\xff",
+        b'{"a": 01}',
+        b"[1.]",
+        b"\xef\xbb\xbf1",
+    ],
 )
 def test_malformed(raw: bytes) -> None:
     with pytest.raises(MalformedError):
