@@ -7,7 +7,7 @@ from typing import Literal
 
 from scipy.constants import speed_of_light
 
-__all__ = ["Light", "Modulation", "Status", "add", "dark"]
+__all__ = ["Light", "Modulation", "Status", "add", "dark", "scaled"]
 
 Status = Literal["lit", "edge_on", "opposite_faces", "out_of_view", "underflow"]
 
@@ -37,12 +37,12 @@ class Modulation:
 
     @property
     def wave_number(self) -> float:
-        """K = 4 pi f / c [rad/m], 0 without a sine wave."""
+        """Wave number k = 4 pi f / c [rad/m], 0 without a sine wave."""
         return 4 * math.pi * (self.frequency_hz or 0.0) / speed_of_light
 
     @property
     def r0(self) -> float:
-        """C T_p / 2 [m], 0 without a pulse."""
+        """Range r0 = c T_p / 2 [m], 0 without a pulse."""
         return 0.5 * speed_of_light * (self.pulse_width_s or 0.0)
 
 
@@ -106,12 +106,24 @@ def add(lights: Sequence[Light]) -> Light:
     flux = math.fsum(light.flux for light in lights)
     if flux == 0.0:
         return dark(lights[0].status if lights else "out_of_view")
-    lit = [light for light in lights if light.flux > 0]
+    lit = [light for light in lights if light.flux != 0]
     return Light(
         flux=flux,
         distance_m=math.fsum(light.flux * light.distance_m for light in lit) / flux,
         late=math.fsum(light.late for light in lit),
         phasor=sum((light.phasor for light in lit), 0j),
-        error=math.fsum(light.flux * light.error for light in lit) / flux,
+        error=math.fsum(abs(light.flux) * light.error for light in lit) / abs(flux),
         status="lit",
+    )
+
+
+def scaled(light: Light, factor: float) -> Light:
+    """Return light times a factor (negative: taken away from a sum)."""
+    return Light(
+        flux=factor * light.flux,
+        distance_m=light.distance_m,
+        late=factor * light.late,
+        phasor=factor * light.phasor,
+        error=light.error,
+        status=light.status,
     )
