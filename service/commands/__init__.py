@@ -6,6 +6,7 @@ What a command needs is imported when it runs: worker processes import the comma
 import argparse
 from collections.abc import Callable
 
+from service import reproduce
 from service.commands import estimate, infer, serve, simulate
 
 __all__ = ["COMMANDS", "AddParser"]
@@ -17,4 +18,5 @@ COMMANDS: tuple[AddParser, ...] = (
     simulate.add_parser,
     estimate.add_parser,
     infer.add_parser,
+    reproduce.add_parser,
 )

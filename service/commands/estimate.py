@@ -1,7 +1,6 @@
 """``hybridtof estimate``: deterministic estimates of the frames in a file."""
 
 import argparse
-import sys
 from pathlib import Path
 
 __all__ = ["add_parser"]
@@ -31,6 +30,7 @@ def _run(args: argparse.Namespace) -> int:
     from inference.estimate import estimate
     from service.checks import system_with_frames
     from service.commands.files import naming, read_columns, read_document
+    from service.commands.output import write_result
     from service.estimate_json import encode_estimates
     from service.schemas import SystemDescription
 
@@ -40,5 +40,5 @@ def _run(args: argparse.Namespace) -> int:
     with naming(sources):
         sensor, scene, frames = system_with_frames(system.sensor, system.scene, columns)
         estimates = estimate(sensor, scene, frames, args.technique)
-    sys.stdout.write(encode_estimates(estimates).decode("ascii") + "\n")
+    write_result(encode_estimates(estimates))
     return 0

@@ -36,6 +36,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def _run(args: argparse.Namespace) -> int:
     from service.commands.files import naming, read_columns, read_document
+    from service.commands.output import write_result
     from service.posterior_json import full
     from service.schemas import PosteriorRequest, SystemDescription
     from simulator.validated import parse
@@ -56,7 +57,7 @@ def _run(args: argparse.Namespace) -> int:
             },
         )
         record = asyncio.run(_infer(request))
-    sys.stdout.write(json.dumps(full(record), allow_nan=False) + "\n")
+    write_result(json.dumps(full(record), allow_nan=False).encode())
     return 0 if record.problem is None else 3
 
 

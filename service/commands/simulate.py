@@ -1,7 +1,6 @@
 """``hybridtof simulate``: frames with their truth."""
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +42,7 @@ def _run(args: argparse.Namespace) -> int:
     import pydantic_core
 
     from service.commands.files import naming, read_data, read_document
+    from service.commands.output import write_result
     from service.frame_files import write_frames
     from service.schemas import SimulationRequest, SystemDescription
     from service.simulation import simulation_of
@@ -65,6 +65,5 @@ def _run(args: argparse.Namespace) -> int:
         result = simulation_of(request)
     if args.output is not None:
         write_frames(args.output, result["frames"])
-    text = pydantic_core.to_json(result).decode()
-    sys.stdout.write(text + "\n")
+    write_result(pydantic_core.to_json(result))
     return 0

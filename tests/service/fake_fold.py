@@ -89,7 +89,7 @@ def order(**orders: Any) -> None:
     _ORDERS.update(orders)
 
 
-def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSettings) -> Job:
+def prepare(_: Sensor, scene: Scene, __: Frames, settings: SamplerSettings) -> Job:
     if scene.discrepancy is not None:
         raise RefusedError("a discrepancy is not known here; leave it out")
     seed = 1 if settings.seed is None else settings.seed
@@ -129,7 +129,7 @@ def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[float]) -> Checkpoi
     return Checkpoint(checkpoint.chunk + 1, tuple(pieces))
 
 
-def progress(job: Job, checkpoint: Checkpoint) -> Progress:
+def progress(_: Job, checkpoint: Checkpoint) -> Progress:
     done = checkpoint.chunk
     rhat = 1.0 + 1.0 / done if done else None
     return Progress(done * STEPS, CHUNKS * STEPS, 10.0 * done, rhat, done == CHUNKS)

@@ -88,7 +88,7 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 @st.composite
 def spoiled(draw: st.DrawFn, replacements: st.SearchStrategy[Any]) -> dict[str, Any]:
     """A good body in which one to three places are something else, are gone, or are new."""
-    body = copy.deepcopy(draw(st.sampled_from(BODIES)))
+    body: dict[str, Any] = copy.deepcopy(draw(st.sampled_from(BODIES)))
     for _ in range(draw(st.integers(1, 3))):
         path = draw(st.sampled_from([p for p in places(body) if p]))
         target: Any = body

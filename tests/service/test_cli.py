@@ -1,0 +1,170 @@
+"""The command line in this process; what needs a process of its own is in test_server.py."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.cli import main
+from service.frame_files import read_frames
+from tests.service.conftest import FRAMES, SCENE, SENSOR
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps({"sensor": SENSOR, "scene": SCENE}))
+    return path
+
+
+@pytest.fixture
+def frames(tmp_path: Path) -> Path:
+    path = tmp_path / "frames.json"
+    path.write_text(json.dumps(FRAMES))
+    return path
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> tuple[int, str, str]:
+    code = main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def test_estimate(capsys: pytest.CaptureFixture[str], scene: Path, frames: Path) -> None:
+    code, out, err = run(
+        capsys, "estimate", frames, "--scene", scene,
+        "--technique", "conventional", "--technique", "intensity",
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    body = json.loads(out)
+    assert [result["technique"] for result in body["results"]] == ["conventional", "intensity"]
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".ndjson", ".json"])
+def test_simulate_then_estimate(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path, suffix: str
+) -> None:
+    path = tmp_path / f"made{suffix}"
+    options = ("--from-m", "0.2", "--to-m", "2", "--frames", "20", "--spacing", "log")
+    code, out, err = run(
+        capsys, "simulate", "--scene", scene, *options, "--seed", "1", "--output", path
+    )
+    assert (code, err) == (0, "")
+    body = json.loads(out)
+    assert read_frames(path).w1 == body["frames"]["w1"]
+    code, out, _ = run(capsys, "estimate", path, "--scene", scene, "--technique", "conventional")
+    assert code == 0
+    (result,) = json.loads(out)["results"]
+    for frame, truth in zip(result["frames"], body["truth"]["range_m"], strict=True):
+        # six standard deviations: a false alarm once in 5e7 runs, and the seed is fixed
+        assert abs(frame["range_m"] - truth) < 6 * frame["sd_m"]
+
+
+def test_simulate_from_a_trajectory_file(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path
+) -> None:
+    path = tmp_path / "trajectory.json"
+    path.write_text('{"range_m": [0.5, 0.6]}')
+    code, out, _ = run(capsys, "simulate", "--scene", scene, "--trajectory", path)
+    assert code == 0
+    assert json.loads(out)["truth"]["range_m"] == [0.5, 0.6]
+    code, _, err = run(capsys, "simulate", "--scene", scene, "--trajectory", path, "--from-m", "1")
+    assert code == 2
+    assert "--trajectory" in err
+
+
+def bad(tmp_path: Path, name: str, content: Any) -> Path:
+    path = tmp_path / name
+    path.write_text(content if isinstance(content, str) else json.dumps(content))
+    return path
+
+
+def test_errors_name_file_and_field(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path, frames: Path
+) -> None:
+    system = {"sensor": SENSOR, "scene": SCENE}
+    cases: list[tuple[tuple[str | Path, ...], str]] = [
+        (("estimate", tmp_path / "none.csv", "--scene", scene), "none.csv: No such file"),
+        (("estimate", frames, "--scene", tmp_path / "none.json"), "none.json: No such file"),
+        (("estimate", frames, "--scene", bad(tmp_path, "a.json", "{")), "a.json: not JSON"),
+        (
+            ("estimate", frames, "--scene", bad(tmp_path, "b.json", {"scene": {}})),
+            "b.json#/sensor: ",
+        ),
+        (
+            (
+                "estimate", frames, "--scene",
+                bad(tmp_path, "c.json", system | {"scene": {"object": {"c0": -1}}}),
+            ),
+            "c.json#/scene/object/c0: must be above 0",
+        ),
+        (
+            ("estimate", bad(tmp_path, "d.csv", "w1,w2\n1,x\n"), "--scene", scene),
+            "d.csv#/w2/0: line 2: must be a finite number, is 'x'",
+        ),
+        (
+            ("estimate", bad(tmp_path, "e.csv", "w1\n1\n"), "--scene", scene),
+            "e.csv#/w2: is missing",
+        ),
+        (
+            ("estimate", frames, "--scene", scene, "--technique", "magic"),
+            "--technique#/0: ",
+        ),
+        (("simulate", "--scene", scene, "--from-m", "1", "--to-m", "2"), "trajectory#/frames"),
+        (
+            ("simulate", "--scene", scene, "--from-m", "1", "--to-m", "nan", "--frames", "2"),
+            "trajectory#/to_m",
+        ),
+        (
+            ("simulate", "--scene", scene, "--from-m", "1", "--to-m", "2", "--frames", "2",
+             "--seed", "-1"),
+            "--seed: ",
+        ),
+        (("infer", frames, "--scene", scene, "--ensembles", "0"), "sampler#/ensembles: "),
+        (
+            ("infer", bad(tmp_path, "f.csv", "w1\n1\n"), "--scene", scene),
+            "f.csv#/w2: is missing",
+        ),
+    ]  # fmt: skip
+    for arguments, message in cases:
+        code, out, err = run(capsys, *arguments)
+        assert (code, out) == (2, ""), arguments
+        assert message in err, err
+        assert err.startswith("hybridtof: error: ")
+        assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["fly"],
+        ["serve", "--port", "70000"],
+        ["serve", "--port", "x"],
+        ["estimate", "--scene", "x"],
+    ],
+)
+def test_usage(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+    assert "usage: hybridtof" in capsys.readouterr().err
+
+
+def test_help_lists_commands_and_exit_codes(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["--help"])
+    assert caught.value.code == 0
+    out = capsys.readouterr().out
+    for word in ("serve", "simulate", "estimate", "infer", "exit codes"):
+        assert word in out
+
+
+def test_settings_of_serve(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HYBRIDTOF_WORKERS", "none")
+    code, _, err = run(capsys, "serve")
+    assert code == 2
+    assert "/HYBRIDTOF_WORKERS: " in err

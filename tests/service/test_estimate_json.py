@@ -1,0 +1,108 @@
+"""The columnwise encoder against one dictionary a frame."""
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from inference.estimates import Estimates, LeftOut, Status, TechniqueResult
+from service.estimate_json import encode_estimates
+
+REASONS = ("", 'a "quoted" {brace} reason', "beyond the background: é")
+
+
+def number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def slow(result: TechniqueResult) -> list[dict[str, Any]]:
+    frames = []
+    for n in range(len(result)):
+        count = int(result.root_count[n])
+        frame: dict[str, Any] = {
+            "status": Status(int(result.status[n])).name.lower(),
+            "range_m": number(result.range_m[n]),
+            "sd_m": number(result.sd_m[n]),
+            "roots_m": [number(x) for x in result.roots_m[n, :count]],
+            "roots_sd_m": [number(x) for x in result.roots_sd_m[n, :count]],
+            "near_fold": bool(result.near_fold[n]),
+        }
+        if result.reason[n]:
+            frame["reason"] = result.reasons[result.reason[n]]
+        if result.power_law is not None:
+            frame["power_law"] = number(result.power_law[n])
+        if result.zeta is not None:
+            frame["zeta"] = number(result.zeta[n])
+        if result.range_bounds_m is not None:
+            low, high = (number(x) for x in result.range_bounds_m[n])
+            frame["range_bounds_m"] = None if low is None else [low, high]
+        frames.append(frame)
+    return frames
+
+
+@st.composite
+def results(draw: st.DrawFn) -> TechniqueResult:
+    n = draw(st.integers(0, 30))
+    most = draw(st.integers(1, 3))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    count = rng.integers(0, most + 1, n)
+    unique = (count == 1) & (rng.random(n) < 0.8)
+    status = np.where(unique, 0, np.where(count > 1, 1, rng.integers(2, 4, n))).astype(np.uint8)
+    roots = np.sort(10.0 ** rng.uniform(-320, 300, (n, most)), axis=1)
+    roots[np.arange(most) >= count[:, None]] = np.nan
+    sds = np.where(rng.random((n, most)) < 0.3, np.nan, roots)
+    bounds = 10.0 ** rng.uniform(-3, 3, (n, 2))
+    bounds[rng.random(n) < 0.4] = np.nan
+    sees_motion = draw(st.booleans())
+    return TechniqueResult(
+        technique="conventional",
+        status=status,
+        roots_m=roots,
+        roots_sd_m=sds,
+        root_count=count.astype(np.intp),
+        near_fold=rng.random(n) < 0.2,
+        reason=rng.integers(0, 3, n).astype(np.uint8),
+        reasons=REASONS,
+        range_bounds_m=bounds if draw(st.booleans()) else None,
+        power_law=np.where(rng.random(n) < 0.5, np.nan, -2.0) if sees_motion else None,
+        zeta=rng.random(n) if sees_motion else None,
+        runtime_s=1e-5,
+    )
+
+
+@given(result=results())
+def test_same_as_one_dictionary_a_frame(result: TechniqueResult) -> None:
+    estimates = Estimates(None, (result, result), (LeftOut("intensity", 'needs "c0"'),))
+    body = json.loads(encode_estimates(estimates))
+    assert body["chosen"] is None
+    assert body["left_out"] == [{"technique": "intensity", "reason": 'needs "c0"'}]
+    assert len(body["results"]) == 2
+    for item in body["results"]:
+        assert item.keys() == {"technique", "frames", "parameters", "runtime_s"}
+        assert item["frames"] == slow(result)
+
+
+def test_no_result() -> None:
+    body = json.loads(encode_estimates(Estimates(None, (), ())))
+    assert body == {"chosen": None, "results": [], "left_out": []}
+
+
+def test_parameters_hold_no_nan() -> None:
+    empty = np.empty(0)
+    result = TechniqueResult(
+        "object_fit",
+        empty.astype(np.uint8),
+        empty.reshape(0, 1),
+        empty.reshape(0, 1),
+        empty.astype(np.intp),
+        empty.astype(bool),
+        empty.astype(np.uint8),
+        REASONS,
+        parameters={"object.c0": math.nan},
+    )
+    with pytest.raises(ValueError, match="JSON compliant"):
+        encode_estimates(Estimates(None, (result,), ()))

@@ -1,0 +1,134 @@
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from service.errors import MalformedError
+from service.frame_files import SUFFIXES, read_frames, write_frames
+from simulator.errors import InvalidInputError
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+frames = st.lists(st.tuples(finite, finite, st.booleans()), min_size=1, max_size=80)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("frames")
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+@given(rows=frames)
+def test_round_trip_to_the_last_bit(folder: Path, suffix: str, rows: list[Any]) -> None:
+    w1, w2, present = (list(column) for column in zip(*rows, strict=True))
+    path = folder / f"frames{suffix}"
+    write_frames(path, {"w1": w1, "w2": w2, "object_present": present})
+    read = read_frames(path)
+    assert read.model_fields_set == {"w1", "w2", "object_present"}
+    assert (read.w1, read.w2, read.object_present) == (w1, w2, present)
+    assert read.w1 is not None
+    assert all(math.copysign(1, a) == math.copysign(1, b) for a, b in zip(read.w1, w1, strict=True))
+
+
+def read(tmp_path: Path, suffix: str, content: str | bytes) -> Any:
+    path = tmp_path / f"frames{suffix}"
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return read_frames(path)
+
+
+def test_csv_as_spreadsheets_write_it(tmp_path: Path) -> None:
+    text = "\ufefftime_s, w1 ,w2,object_present\r\n0,1e-3, 2.5 ,TRUE\r\n1,-1,+.5,false\r\n\r\n"
+    columns = read(tmp_path, ".csv", text)
+    assert columns.time_s == [0.0, 1.0]
+    assert columns.w1 == [1e-3, -1.0]
+    assert columns.w2 == [2.5, 0.5]
+    assert columns.object_present == [True, False]
+
+
+def test_integers(tmp_path: Path) -> None:
+    assert read(tmp_path, ".ndjson", '{"w1": 1, "w2": 2}\n\n{"w2": 3, "w1": 4}').w2 == [2, 3]
+    assert read(tmp_path, ".json", '{"w1": [1], "w2": [2]}').w1 == [1]
+
+
+ODD = ["nan", "NaN", "inf", "-Infinity", "1e400", "1_000", "", "x", "true", "0x10", "١", "1,5"]
+
+
+@pytest.mark.parametrize("odd", ODD)
+def test_csv_odd_cell(tmp_path: Path, odd: str) -> None:
+    with pytest.raises(InvalidInputError, match="line 4: must be a finite number") as caught:
+        read(tmp_path, ".csv", f'w1,w2\n1,2\n\n3,"{odd}"\n')
+    assert [p.pointer for p in caught.value.problems] == ["/w2/1"]
+
+
+@pytest.mark.parametrize(
+    ("text", "pointer"),
+    [
+        ("w1,w9\n1,2\n", "/w9"),
+        ("w1,w1\n1,2\n", "/w1"),
+        ("w1,w2,object_present\n1,2,1\n", "/object_present/0"),
+        ("1,2\n3,4\n", "/1"),
+    ],
+)
+def test_csv_names_the_column(tmp_path: Path, text: str, pointer: str) -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        read(tmp_path, ".csv", text)
+    assert [p.pointer for p in caught.value.problems] == [pointer]
+
+
+@pytest.mark.parametrize(
+    ("suffix", "content", "match"),
+    [
+        (".csv", "", "empty"),
+        (".csv", "w1,w2\n1,2,3\n", "line 2 has 3 fields"),
+        (".csv", "w1,w2\n1\n", "line 2 has 1 field"),
+        (".csv", 'w1,w2\n1,"2\n', "line 2"),
+        (".csv", b"w1,w2\n1,\xff\n", "UTF-8"),
+        (".ndjson", "", "no frame"),
+        (".ndjson", '{"w1": 1}\nnope\n', "line 2: not JSON"),
+        (".ndjson", '{"w1": 1}\n[1]\n', "line 2 is not a JSON object"),
+        (".ndjson", '{"w1": 1, "w1": 2}\n', "line 1: /w1: the member is repeated"),
+        (".json", "{", "not JSON"),
+        (".txt", "1 2", ".csv"),
+        ("", "1 2", ".csv"),
+    ],
+)
+def test_unreadable(tmp_path: Path, suffix: str, content: str | bytes, match: str) -> None:
+    with pytest.raises(MalformedError, match=match):
+        read(tmp_path, suffix, content)
+
+
+@pytest.mark.parametrize(
+    ("text", "pointer"),
+    [
+        ('{"w1": 1, "w2": 2}\n{"w1": 1}', "/w2"),
+        ('{"w1": 1}\n{"w1": 1, "w2": 2}', "/w2"),
+        ('{"w1": [1]}', "/w1"),
+        ('{"w1": NaN}', "/w1/0"),
+        ('{"w1": 1e400}', "/w1/0"),
+        ('{"w1": "1"}', "/w1/0"),
+        ('{"w1": true}', "/w1/0"),
+        ('{"w9": 1}', "/w9"),
+    ],
+)
+def test_ndjson_names_the_field(tmp_path: Path, text: str, pointer: str) -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        read(tmp_path, ".ndjson", text)
+    assert [p.pointer for p in caught.value.problems] == [pointer]
+
+
+def test_json_must_hold_columns(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError):
+        read(tmp_path, ".json", "[1, 2]")
+    with pytest.raises(InvalidInputError) as caught:
+        read(tmp_path, ".json", json.dumps({"w1": [1.0] * 70 + [None]}))
+    assert [p.pointer for p in caught.value.problems] == ["/w1/70"]
+
+
+def test_no_file(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        read_frames(tmp_path / "none.csv")
+    with pytest.raises(MalformedError):
+        write_frames(tmp_path / "none.txt", {"w1": [1.0]})

@@ -1,0 +1,165 @@
+"""Processes of their own: the server over a real socket, signals, pipes."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.service.conftest import FRAMES, SCENE, SENSOR
+
+
+def fake_server(sleep: float, max_body_bytes: int = 10**6) -> tuple[str, ...]:
+    """Command of a server whose posteriors take six times ``sleep`` seconds."""
+    arguments = (str(sleep), str(max_body_bytes))
+    return (sys.executable, "-m", "tests.service.fake_server", *arguments)
+
+
+def environment(**extra: str) -> dict[str, str]:
+    """Environment without settings, coverage of the project's own folder."""
+    kept = {k: v for k, v in os.environ.items() if not k.startswith("HYBRIDTOF_")}
+    return kept | {"PYTHONPATH": str(Path(__file__).parents[2])} | extra
+
+
+@contextmanager
+def server(*command: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """A server on a port that the system picks, and its address."""
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment())
+    assert process.stderr is not None
+    try:
+        for line in process.stderr:
+            if match := re.search(r"running on (http://\S+)", line):
+                yield process, match[1]
+                break
+        else:
+            raise AssertionError("the server does not start")
+    finally:
+        process.kill()
+        process.wait()
+        process.stderr.close()
+
+
+def hybridtof(*arguments: str) -> tuple[str, ...]:
+    return (sys.executable, "-m", "service.cli", *arguments)
+
+
+def ended_within(process: subprocess.Popen[str], seconds: float) -> bool:
+    # the contract's own limit; a machine that is merely slow does not reach it
+    try:
+        process.wait(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        return False
+    return True
+
+
+def children(pid: int) -> list[int]:
+    found = subprocess.run(
+        ["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True, check=False
+    )
+    return [int(word) for word in found.stdout.split()]
+
+
+def alive(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != "Z"
+
+
+def gone(pids: list[int], seconds: float = 10.0) -> bool:
+    deadline = time.monotonic() + seconds
+    while any(alive(pid) for pid in pids):
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+def test_serves_without_configuration_and_ends_on_sigterm() -> None:
+    with server(*hybridtof("serve", "--port", "0")) as (process, address):
+        assert httpx.get(address + "/health/live").status_code == 200
+        assert httpx.get(address + "/health/ready").status_code == 200
+        body = {"sensor": SENSOR, "scene": SCENE, "frames": FRAMES}
+        assert httpx.post(address + "/v1/estimates", json=body, timeout=120).status_code == 200
+        process.send_signal(signal.SIGTERM)
+        assert ended_within(process, 15)
+
+
+@pytest.mark.parametrize("sleep", [0.2, 3600])
+def test_sigterm_with_jobs_running(sleep: float) -> None:
+    with server(*fake_server(sleep)) as (process, address):
+        body = {"sensor": SENSOR, "scene": {}, "frames": FRAMES}
+        for _ in range(4):
+            assert httpx.post(address + "/v1/posteriors", json=body).status_code == 202
+        while len(workers := children(process.pid)) < 2:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGTERM)
+        assert ended_within(process, 15)
+        assert gone(workers)
+
+
+def test_workers_end_with_a_killed_server() -> None:
+    with server(*fake_server(0.5)) as (process, address):
+        body = {"sensor": SENSOR, "scene": {}, "frames": FRAMES}
+        assert httpx.post(address + "/v1/posteriors", json=body).status_code == 202
+        while len(workers := children(process.pid)) < 2:
+            time.sleep(0.05)
+        process.kill()
+        process.wait()
+        assert gone(workers)
+
+
+def test_large_body_is_refused_over_a_socket() -> None:
+    with server(*fake_server(0, 1000)) as (_, address):
+        response = httpx.post(address + "/v1/estimates", content=b" " * 1001)
+        assert response.status_code == 413
+        assert response.headers["content-type"] == "application/problem+json"
+
+
+def test_health_answers_while_a_large_batch_is_worked_on() -> None:
+    columns: dict[str, Any] = {"w1": [0.02] * 200_000, "w2": [1.7] * 200_000}
+    content = json.dumps({"sensor": SENSOR, "scene": SCENE, "frames": columns}).encode()
+    with server(*hybridtof("serve", "--port", "0")) as (_, address):
+        with ThreadPoolExecutor(1) as threads:
+            batch = threads.submit(
+                httpx.post, address + "/v1/estimates", content=content, timeout=300
+            )
+            answered = 0
+            while not batch.done():
+                assert httpx.get(address + "/health/live", timeout=30).status_code == 200
+                answered += 1
+            assert batch.result().status_code == 200
+        assert answered > 1
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_reader_that_goes_away(tmp_path: Path, unbuffered: str) -> None:
+    scene = tmp_path / "scene.json"
+    scene.write_text(json.dumps({"sensor": SENSOR, "scene": SCENE}))
+    command = hybridtof("simulate", "--scene", str(scene), "--from-m", "0.1", "--to-m", "1",
+                        "--frames", "100000")  # fmt: skip
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(PYTHONUNBUFFERED=unbuffered),
+    )
+    assert process.stdout is not None
+    assert process.stderr is not None
+    assert process.stdout.read(10) == '{"frames":'
+    process.stdout.close()
+    assert process.wait(timeout=60) == 128 + signal.SIGPIPE
+    assert process.stderr.read() == ""
+    process.stderr.close()
