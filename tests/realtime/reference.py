@@ -252,7 +252,7 @@ def _scan(case: Case, m1: Any, m2: Any, high: float) -> list[Any]:
                 *(
                     math.sqrt(c) * np.geomspace(0.3, 3.0, 1500)
                     for c in (case.c0, case.c0s)
-                    if 0 < c
+                    if c > 0
                 ),
             ]
         )
@@ -266,22 +266,24 @@ def _scan(case: Case, m1: Any, m2: Any, high: float) -> list[Any]:
     def sign(r: Any) -> int:
         return int(mp.sign(exact(mp.mpf(r))))
 
-    brackets = []
     signs = np.sign(values)
     doubtful = np.flatnonzero(np.abs(values) < 1e-9 * np.abs(values).max())
     for j in doubtful:  # float64 may have the sign wrong
         signs[j] = sign(grid[j])
-    for j in np.flatnonzero(signs[1:] != signs[:-1]):
-        brackets.append((mp.mpf(grid[j]), mp.mpf(grid[j + 1])))
+    brackets = [
+        (mp.mpf(grid[j]), mp.mpf(grid[j + 1])) for j in np.flatnonzero(signs[1:] != signs[:-1])
+    ]
     size = np.abs(values)
     dips = (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])
     dips &= (signs[1:-1] == signs[:-2]) & (signs[1:-1] == signs[2:])
     for j in np.flatnonzero(dips) + 1:
         low, high_end = mp.mpf(grid[j - 1]), mp.mpf(grid[j + 1])
         side = int(signs[j])
-        bottom = _least(
-            lambda r, s=side: s * exact(r) / mp.mpf(_scale(case, float(r))), low, high_end
-        )
+
+        def depth(r: Any, side: int = side) -> Any:
+            return side * exact(r) / mp.mpf(_scale(case, float(r)))
+
+        bottom = _least(depth, low, high_end)
         if sign(bottom) != side:
             brackets += [(low, bottom), (bottom, high_end)]
     return sorted(_bisected(exact, *bracket) for bracket in brackets)
@@ -347,8 +349,9 @@ def reference_roots(case: Case, m1: Any, m2: Any, high: float | None = None) -> 
             top = max(abs(c) for c in scaled)
             every = mp.polyroots([c / top for c in scaled], maxsteps=2000, extraprec=800)
             real = [z.real * unit for z in every if abs(z.imag) <= mp.mpf(10) ** -35 * abs(z)]
-            within = (lambda r: 0 < r < high) if case.has_background else (lambda r: 0 < r <= high)
-            roots = sorted(r for r in real if within(r))
+            roots = sorted(
+                r for r in real if 0 < r < high or (r == high and not case.has_background)
+            )
         else:
             roots = [r for r in _scan(case, m1, m2, high) if 0 < r < high]
         if case.technique == "background_intensity":
