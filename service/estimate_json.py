@@ -4,8 +4,10 @@ Frames of one kind (same status, reason, number of roots, near a fold or not) ha
 but for their numbers, so each kind is one template that is filled from columns of number texts.
 """
 
+import dataclasses
 import json
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import pydantic_core
@@ -16,6 +18,11 @@ from inference.estimates import Estimates, Status, TechniqueResult
 __all__ = ["encode_estimates"]
 
 Array = NDArray[np.float64]
+
+
+# frames that are encoded in one go: their texts stay in the processor's cache, and between two goes
+# other threads get the interpreter
+_BLOCK = 8192
 
 
 def encode_estimates(estimates: Estimates) -> bytes:
@@ -31,20 +38,34 @@ def encode_estimates(estimates: Estimates) -> bytes:
     bytes
         JSON as in the contract; null where a number is not available.
     """
-    results = ", ".join(_technique(result) for result in estimates.results)
     left_out = [{"technique": item.name, "reason": item.reason} for item in estimates.left_out]
-    head = json.dumps(estimates.chosen)
-    text = f'{{"chosen": {head}, "results": [{results}], "left_out": {json.dumps(left_out)}}}'
-    return text.encode("ascii")
+    parts = [f'{{"chosen": {json.dumps(estimates.chosen)}, "results": [']
+    for number, result in enumerate(estimates.results):
+        parts.append(", " if number else "")
+        parts += _technique(result)
+    parts.append(f'], "left_out": {json.dumps(left_out)}}}')
+    # every part is ASCII: json.dumps escapes, numbers are
+    return b"".join(part.encode("ascii") for part in parts)
 
 
-def _technique(result: TechniqueResult) -> str:
+def _technique(result: TechniqueResult) -> Iterator[str]:
+    """Yield JSON text of one technique's results, block by block."""
+    yield f'{{"technique": {json.dumps(result.technique)}, "frames": ['
+    for start in range(0, len(result), _BLOCK):
+        yield (", " if start else "") + ", ".join(_frames(_rows(result, start, start + _BLOCK)))
     parameters = None if result.parameters is None else dict(result.parameters)
-    return (
-        f'{{"technique": {json.dumps(result.technique)}, "frames": [{", ".join(_frames(result))}], '
-        f'"parameters": {json.dumps(parameters, allow_nan=False)}, '
-        f'"runtime_s": {json.dumps(result.runtime_s, allow_nan=False)}}}'
-    )
+    rest = {"parameters": parameters, "runtime_s": result.runtime_s}
+    yield "], " + json.dumps(rest, allow_nan=False)[1:]
+
+
+def _rows(result: TechniqueResult, start: int, stop: int) -> TechniqueResult:
+    """Return the same result for some frames alone."""
+    arrays: dict[str, Any] = {
+        field.name: value[start:stop]
+        for field in dataclasses.fields(result)
+        if isinstance(value := getattr(result, field.name), np.ndarray)
+    }
+    return dataclasses.replace(result, **arrays)
 
 
 def _texts(column: Array) -> list[str]:

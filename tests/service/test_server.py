@@ -62,19 +62,23 @@ def ended_within(process: subprocess.Popen[str], seconds: float) -> bool:
     return True
 
 
+def status(pid: int) -> tuple[str, int] | None:
+    """State and parent of a process, from /proc; None where there is none."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    except (FileNotFoundError, ProcessLookupError):
+        return None
+    return fields[0], int(fields[1])
+
+
 def children(pid: int) -> list[int]:
-    found = subprocess.run(
-        ["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True, check=False
-    )
-    return [int(word) for word in found.stdout.split()]
+    pids = [int(path.name) for path in Path("/proc").iterdir() if path.name.isdigit()]
+    return [p for p in pids if (found := status(p)) is not None and found[1] == pid]
 
 
 def alive(pid: int) -> bool:
-    try:
-        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
-    except FileNotFoundError:
-        return False
-    return state != "Z"
+    found = status(pid)
+    return found is not None and found[0] != "Z"
 
 
 def gone(pids: list[int], seconds: float = 10.0) -> bool:
