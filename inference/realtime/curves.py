@@ -23,7 +23,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.realtime.bracketing import next_point
+from inference.realtime.bracketing import STEPS, best, narrowed, next_point, start
 from simulator.compiled import compiled
 from simulator.object_model import quadratic
 
@@ -67,7 +67,7 @@ PARAMETERS = 7
 def direction(kind: int, u: float, p: Array) -> tuple[float, float]:
     """Return (denominator, numerator) of a ratio, or the direction of the derivative phasor.
 
-    Divided by the positive factor Phi / u. A phasor is relative to the phase offset.
+    Divided by the positive factor Phi / u. A phasor is as seen from the object's own phase, k u.
     """
     c0, c1 = float(p[C0]), float(p[C1])
     q = quadratic(u, c0, c1)
@@ -81,11 +81,8 @@ def direction(kind: int, u: float, p: Array) -> tuple[float, float]:
     if kind == BOTH_RATIO:
         return b + rate, u * (1.0 + b) + float(p[DISTANCE]) * rate
     k = float(p[WAVE])
-    # seen from the object's phase, then turned
-    x = b + rate * math.cos(k * (float(p[DISTANCE]) - u))
-    y = k * u + rate * math.sin(k * (float(p[DISTANCE]) - u))
-    cosine, sine = math.cos(k * u), math.sin(k * u)
-    return x * cosine - y * sine, x * sine + y * cosine
+    far = k * (float(p[DISTANCE]) - u)
+    return b + rate * math.cos(far), k * u + rate * math.sin(far)
 
 
 @compiled
@@ -128,7 +125,7 @@ def value(kind: int, u: float, p: Array) -> float:
         return y / x
     if kind == BOTH_PHASE:
         x, y = direction(kind, u, p)
-        return math.atan2(y, x)
+        return float(p[WAVE]) * u + math.atan2(y, x)
     c0, c1 = float(p[C0]), float(p[C1])
     q = quadratic(u, c0, c1)
     if kind == DIFFERENTIAL_PHASE:
@@ -181,9 +178,10 @@ def _residual(kind: int, u: float, top: float, bottom: float, p: Array) -> float
         x, y = direction(kind, u, p)
         return y * bottom - x * top
     if kind == BOTH_PHASE:
+        # pieces turn by less than a right angle, so that a sine has the sign of the angle
         x, y = direction(kind, u, p)
-        cosine, sine = math.cos(top), math.sin(top)
-        return math.atan2(y * cosine - x * sine, x * cosine + y * sine)
+        turn = float(p[WAVE]) * u - top
+        return x * math.sin(turn) + y * math.cos(turn)
     if kind in (DIFFERENTIAL_PHASE, CANCELLING_QUADRATURE):
         return value(kind, u, p) - top
     return math.log(value(kind, u, p) / top)
@@ -198,7 +196,7 @@ def _guess(kind: int, top: float, bottom: float, p: Array) -> float:
         return min(1.0 / top, math.pow(float(p[C0]) / top, 1.0 / 3.0))
     if kind in (DIFFERENTIAL_RATIO, BOTH_RATIO):
         return 1.6 * abs(top / bottom)
-    if kind == DIFFERENTIAL_PHASE:
+    if kind in (DIFFERENTIAL_PHASE, BOTH_PHASE):
         return 1.6 * top / float(p[WAVE])
     return 0.0
 
@@ -218,37 +216,28 @@ def solve_between(kind: int, low: float, high: float, top: float, bottom: float,
     p : ndarray, shape (PARAMETERS,)
         Parameters.
     """
-    a, b = low, high
-    fa = _residual(kind, a, top, bottom, p)
-    fb = _residual(kind, b, top, bottom, p)
-    if fa == 0.0 or (fa > 0.0) == (fb > 0.0):  # rounding at an end: the nearer one is the root
-        return a if abs(fa) <= abs(fb) else b
+    f_low = _residual(kind, low, top, bottom, p)
+    f_high = _residual(kind, high, top, bottom, p)
+    if f_low == 0.0 or (f_low > 0.0) == (f_high > 0.0):
+        # rounding at an end: the nearer one is the root
+        return low if abs(f_low) <= abs(f_high) else high
+    bracket = start(low, high, f_low, f_high)
     x = _guess(kind, top, bottom, p)
     if low < x < high:
         # the guess and a point a factor of two beyond the root are a bracket in most cases
         fx = _residual(kind, x, top, bottom, p)
-        factor = 2.0 if (fx > 0.0) == (fa > 0.0) else 0.5
-        if factor > 1.0:
-            a, fa = x, fx
+        if (fx > 0.0) == (f_low > 0.0):
+            bracket = start(x, high, fx, f_high)
+            x *= 2.0
         else:
-            b, fb = x, fx
-        x *= factor
+            bracket = start(low, x, f_low, fx)
+            x *= 0.5
         if low < x < high:
-            fx = _residual(kind, x, top, bottom, p)
-            if (fx > 0.0) == (fa > 0.0):
-                a, fa = x, fx
-            else:
-                b, fb = x, fx
-    c, fc = b, fb
-    for _ in range(400):
-        x, tolerance = next_point(a, b, c, fa, fb, fc)
-        if abs(b - a) <= tolerance or fa == 0.0 or fb == 0.0:
+            bracket = narrowed(bracket, x, _residual(kind, x, top, bottom, p))
+            bracket = start(bracket[0], bracket[1], bracket[3], bracket[4])
+    for _ in range(STEPS):
+        x = next_point(bracket)
+        if x != x:
             break
-        fx = _residual(kind, x, top, bottom, p)
-        if (fx > 0.0) == (fa > 0.0):
-            c, fc = a, fa
-        else:
-            c, fc = b, fb
-            b, fb = a, fa
-        a, fa = x, fx
-    return a if abs(fa) < abs(fb) else b
+        bracket = narrowed(bracket, x, _residual(kind, x, top, bottom, p))
+    return best(bracket)

@@ -1,5 +1,7 @@
 """Solve a technique that inverts a curve: targets in, candidates out."""
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,8 +10,9 @@ from inference.realtime.invert import invert
 from inference.realtime.pieces import pieces_of
 from inference.realtime.technique import Task
 
-__all__ = ["candidates_of"]
+__all__ = ["candidates_of", "widened"]
 
+T = TypeVar("T", bound=np.generic)
 Array = NDArray[np.float64]
 
 _CHUNK = 4_000_000  # candidate roots held at a time
@@ -72,7 +75,7 @@ def candidates_of(
     ]
     width = max(part[0].shape[1] for part in parts)
     roots, slopes, gaps = (
-        np.concatenate([_widened(part[j], width) for part in parts]) for j in range(3)
+        np.concatenate([widened(part[j], width) for part in parts]) for j in range(3)
     )
     nearest = np.concatenate([part[3] for part in parts])
     with np.errstate(all="ignore"):
@@ -93,9 +96,10 @@ def _trimmed(part: tuple[Array, Array, Array, Array]) -> tuple[Array, Array, Arr
     return roots[:, :used], slopes[:, :used], gaps[:, :used], nearest
 
 
-def _widened(array: Array, width: int) -> Array:
+def widened(array: NDArray[T], width: int) -> NDArray[T]:
+    """Pad columns with nan, or False."""
     if array.shape[1] == width:
         return array
-    wide = np.full((array.shape[0], width), np.nan)
+    wide = np.full((array.shape[0], width), np.nan if array.dtype.kind == "f" else 0, array.dtype)
     wide[:, : array.shape[1]] = array
     return wide

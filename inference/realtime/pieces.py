@@ -236,7 +236,7 @@ def _unwrapped(p: Array, points: Array, turns: list[float]) -> Pieces:
             middle = 0.5 * (a + b) if b < 4.0 * a else math.sqrt(a) * math.sqrt(b)
             first, second, third = (value(BOTH_PHASE, u, p) for u in (a, middle, b))
             steps = (_wrapped(second - first), _wrapped(third - second))
-            wide = max(abs(steps[0]), abs(steps[1])) > 0.5 * math.pi or steps[0] * steps[1] < 0.0
+            wide = max(abs(steps[0]), abs(steps[1])) > 0.24 * math.pi or steps[0] * steps[1] < 0.0
             if (wide or depth < 1) and depth < 60 and a < middle < b:
                 stack += [(middle, b, depth + 1), (a, middle, depth + 1)]
             else:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.realtime.bracketing import next_point
+from inference.realtime.bracketing import STEPS, best, narrowed, next_point, start
 from simulator.compiled import compiled
 
 __all__ = ["horner", "real_roots"]
@@ -24,21 +24,14 @@ def horner(coefficients: Array, count: int, x: float) -> float:
 
 @compiled
 def _bracketed(coefficients: Array, count: int, low: float, high: float) -> float:
-    a, b = low, high
-    fa, fb = horner(coefficients, count, a), horner(coefficients, count, b)
-    c, fc = b, fb
-    for _ in range(300):
-        x, tolerance = next_point(a, b, c, fa, fb, fc)
-        if abs(b - a) <= tolerance or fa == 0.0 or fb == 0.0:
+    f_low, f_high = horner(coefficients, count, low), horner(coefficients, count, high)
+    bracket = start(low, high, f_low, f_high)
+    for _ in range(STEPS):
+        x = next_point(bracket)
+        if x != x:
             break
-        fx = horner(coefficients, count, x)
-        if (fx > 0.0) == (fa > 0.0):
-            c, fc = a, fa
-        else:
-            c, fc = b, fb
-            b, fb = a, fa
-        a, fa = x, fx
-    return a if abs(fa) < abs(fb) else b
+        bracket = narrowed(bracket, x, horner(coefficients, count, x))
+    return best(bracket)
 
 
 @compiled
