@@ -23,7 +23,9 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
-Chart = tuple[int, Array, tuple[Array, Array], tuple[Array, Array, Array, Array]]
+Chart = tuple[
+    int, Array, tuple[Array, Array], tuple[Array, Array, Array, Array, Array]
+]
 
 # kinds of surface rows: kind 0, centre 1:4, width axis 4:7, height axis 7:10, normal 10:13,
 # half sizes (or radius) 13:15
@@ -49,6 +51,16 @@ def _spread(head: Array) -> float:
     if head[12] == 2.0:
         return 0.0
     return min(head[15], 1.4)
+
+
+@compiled
+def _cones(head: Array, table: Array) -> Array:
+    """Return the cosines of the angles at which the emitter's pattern has a kink."""
+    if head[12] == 3.0:
+        return np.array([math.cos(head[13])])
+    if head[12] == 4.0:
+        return np.cos(table[0])
+    return np.empty(0)
 
 
 @compiled
@@ -79,7 +91,7 @@ def _half_plane(chart: Array, direction: Array, height: float, reach: float) -> 
 
 
 @compiled
-def _flat(surface: Array, head: Array, material: Array, late: float) -> Chart:
+def _flat(surface: Array, head: Array, table: Array, material: Array, late: float) -> Chart:
     chart = np.zeros(33)
     chart[0] = FLAT
     chart[1:10] = surface[4:13]
@@ -90,7 +102,7 @@ def _flat(surface: Array, head: Array, material: Array, late: float) -> Chart:
         height_i, height_o = -height_i, -height_o
     none = np.empty(0)
     empty = (np.empty((0, 3)), np.zeros(3))
-    marks = (none, np.empty((0, 3)), np.empty((0, 4)), none)
+    marks = (none, np.empty((0, 3)), np.empty((0, 4)), none, none)
     if height_o < 0.0:
         return OPPOSITE, chart, empty, marks
     if height_i == 0.0 or height_o == 0.0:
@@ -157,8 +169,9 @@ def _flat(surface: Array, head: Array, material: Array, late: float) -> Chart:
         features = np.empty((1, 3))
         features[0, 0] = _dot(chart[1:4], head[3:6]) * run - _dot(chart[1:4], chart[12:15])
         features[0, 1] = _dot(chart[4:7], head[3:6]) * run - _dot(chart[4:7], chart[12:15])
-        features[0, 2] = run * math.tan(spread)
-    marks = (rings[:count].copy(), features, np.empty((0, 4)), lobes)
+        # a cone cuts the plane in an ellipse that is longer the more it grazes
+        features[0, 2] = 1.05 * run * math.tan(spread) / sink
+    marks = (rings[:count].copy(), features, np.empty((0, 4)), lobes, _cones(head, table))
     return LIT, chart, (lines[:edges].copy(), circle), marks
 
 
@@ -183,7 +196,7 @@ def _round(surface: Array, head: Array, material: Array, late: float) -> Chart:
     size_e, size_d = math.sqrt(_dot(to_e, to_e)), math.sqrt(_dot(to_d, to_d))
     none = np.empty(0)
     empty = (np.empty((0, 3)), np.zeros(3))
-    marks = (none, np.empty((0, 3)), np.empty((0, 4)), none)
+    marks = (none, np.empty((0, 3)), np.empty((0, 4)), none, none)
     if size_e <= radius or size_d <= radius:
         return INSIDE, chart, empty, marks
     axis = to_e / size_e + to_d / size_d
@@ -243,8 +256,9 @@ def _round(surface: Array, head: Array, material: Array, late: float) -> Chart:
         features = np.empty((1, 3))
         features[0, 0] = _dot(hit, chart[1:4]) * stretch
         features[0, 1] = _dot(hit, chart[4:7]) * stretch
-        features[0, 2] = run * math.tan(spread) / radius
-    marks = (rings[:count].copy(), features, planes[: 2 if together else 4].copy(), lobes)
+        slant = -_dot(head[3:6], hit)
+        features[0, 2] = 1.05 * run * math.tan(spread) / (radius * max(slant, 0.1))
+    marks = (rings[:count].copy(), features, planes[: 2 if together else 4].copy(), lobes, none)
     return LIT, chart, (np.empty((0, 3)), circle), marks
 
 
@@ -272,12 +286,12 @@ def _shell(backdrop: Array, head: Array) -> Chart:
             features[0, 0], features[0, 1] = angle * x / sine, angle * y / sine
         features[0, 2] = spread
     none = np.empty(0)
-    return LIT, chart, (np.empty((0, 3)), circle), (none, features, planes, none)
+    return LIT, chart, (np.empty((0, 3)), circle), (none, features, planes, none, none)
 
 
 @compiled
 def build_chart(
-    surface: Array, head: Array, material: Array, late: float, backdrop: Array | None
+    surface: Array, head: Array, table: Array, material: Array, late: float, backdrop: Array | None
 ) -> Chart:
     """Return the chart of a surface, its region and its marks.
 
@@ -285,8 +299,8 @@ def build_chart(
     ----------
     surface : ndarray, shape (15,)
         Row of a surface; of length 0 for the backdrop itself.
-    head, material : ndarray
-        Packed emitter and detector, reflectance.
+    head, table, material : ndarray
+        Packed emitter and detector, table of the emitter, reflectance.
     late : float
         r0 of a pulse [m], 0 for none.
     backdrop : ndarray or None
@@ -305,4 +319,4 @@ def build_chart(
         return _shell(backdrop, head)
     if surface[0] == ROUND:
         return _round(surface, head, material, late)
-    return _flat(surface, head, material, late)
+    return _flat(surface, head, table, material, late)

@@ -189,6 +189,37 @@ def _horizon_breaks(
 
 
 @compiled
+def _cone_breaks(
+    chart: Array,
+    head: Array,
+    cones: Array,
+    u: Vector,
+    breaks: Array,
+    count: int,
+    near: float,
+    far: float,
+) -> int:
+    """Insert the places where a ray of a flat chart crosses a cone about the emitter's aim."""
+    p0 = chart[12] * head[3] + chart[13] * head[4] + chart[14] * head[5]
+    p1 = u[0] * head[3] + u[1] * head[4] + u[2] * head[5]
+    q0 = chart[12] * chart[12] + chart[13] * chart[13] + chart[14] * chart[14]
+    q1 = chart[12] * u[0] + chart[13] * u[1] + chart[14] * u[2]
+    for i in range(cones.size):
+        c2 = cones[i] * cones[i]
+        a, b, c = p1 * p1 - c2, p0 * p1 - c2 * q1, p0 * p0 - c2 * q0
+        square = b * b - a * c
+        if square <= 0.0:
+            continue
+        # both roots without cancellation; the shadow cone behind the emitter does no harm
+        t = -b - math.copysign(math.sqrt(square), b)
+        if a != 0.0:
+            count = _insert(breaks, count, t / a, near, far)
+        if t != 0.0:
+            count = _insert(breaks, count, c / t, near, far)
+    return count
+
+
+@compiled
 def _along_ray(
     chart: Array,
     head: Array,
@@ -197,7 +228,7 @@ def _along_ray(
     backdrop: Array | None,
     signal: Array,
     rule: Array,
-    marks: tuple[Array, Array, Array, Array],
+    marks: tuple[Array, Array, Array, Array, Array],
     u: Vector,
     direction: tuple[float, float],
     near: float,
@@ -207,7 +238,7 @@ def _along_ray(
     breaks: Array,
 ) -> float:
     """Integrate along a ray into the first row of ``work`` and return the error."""
-    rings, features, planes, lobes = marks
+    rings, features, planes, lobes, cones = marks
     count = 0
     for i in range(rings.size):
         count = _insert(breaks, count, rings[i], near, far)
@@ -217,8 +248,10 @@ def _along_ray(
         closest = features[i, 0] * direction[0] + features[i, 1] * direction[1]
         count = _insert(breaks, count, closest, near, far)
         if features[i, 2] > 0.0:
-            count = _insert(breaks, count, closest - features[i, 2], near, far)
-            count = _insert(breaks, count, closest + features[i, 2], near, far)
+            for j in (-3.0, -1.0, 1.0, 3.0):
+                count = _insert(breaks, count, closest + j * features[i, 2], near, far)
+    if cones.size > 0 and chart[0] == FLAT:
+        count = _cone_breaks(chart, head, cones, u, breaks, count, near, far)
     if planes.shape[0] > 0:
         count = _horizon_breaks(chart, planes, u, breaks, count, near, far)
     if chart[32] > 0.0 and lobes.size > 0 and chart[0] == FLAT:
@@ -235,6 +268,7 @@ def _along_ray(
         _ray_piece(chart, head, table, material, backdrop, signal, rule, u, work, i + 1)
         last = angle
     number = count + 1
+    most = _INNER + count
     while True:
         for j in range(2, 3 + COMPONENTS):
             work[0, j] = 0.0
@@ -244,7 +278,7 @@ def _along_ray(
                 work[0, j] += work[i, j]
             if work[i, 2] > work[worst, 2]:
                 worst = i
-        if work[0, 2] <= tolerance * work[0, 3] or number >= _INNER:
+        if work[0, 2] <= tolerance * work[0, 3] or number >= most:
             return work[0, 2]
         middle = 0.5 * (work[worst, 0] + work[worst, 1])
         number += 1
@@ -263,7 +297,7 @@ def _sector_piece(
     backdrop: Array | None,
     signal: Array,
     rules: tuple[Array, Array],
-    marks: tuple[Array, Array, Array, Array],
+    marks: tuple[Array, Array, Array, Array, Array],
     lines: Array,
     circle: Array,
     reference: Array,
@@ -341,7 +375,7 @@ def integrate(
     signal: Array,
     rules: tuple[Array, Array],
     region: tuple[Array, Array],
-    marks: tuple[Array, Array, Array, Array],
+    marks: tuple[Array, Array, Array, Array, Array],
     tolerance: float,
 ) -> tuple[Array, float, int]:
     """Integrate the light of one surface.
@@ -357,7 +391,7 @@ def integrate(
     region : (ndarray, ndarray)
         Half-planes and circle of the chart's plane.
     marks : tuple of ndarray
-        Rings, features, horizon planes, and radii of a lobe.
+        Rings, features, horizon planes, radii of a lobe, and cosines of an emitter's cones.
     tolerance : float
         Relative.
 
@@ -380,8 +414,9 @@ def integrate(
     size = panels.shape[0]
     limit = max(_OUTER, 2 * size)
     pieces = np.empty((limit, 4 + COMPONENTS))
-    work = np.empty((_INNER + 40, 3 + COMPONENTS))
-    breaks = np.empty(40)
+    spare = 40 + 2 * marks[4].size
+    work = np.empty((_INNER + spare, 3 + COMPONENTS))
+    breaks = np.empty(spare)
     for i in range(size):
         if panels[i, 0] == LINE:
             panels[i, 4] = math.hypot(lines[int(panels[i, 3]), 2], chart[11])

@@ -168,7 +168,7 @@ def sectors(
         if circle[2] > 0.0:
             nearest = min(nearest, max(math.hypot(circle[0], circle[1]) - circle[2], 0.0))
     k = lines.shape[0]
-    events = np.empty((corners.shape[0] + k * (1 + 2 * rings.size) + 2 + 3 * len(features) + 3, 2))
+    events = np.empty((corners.shape[0] + k * (1 + 2 * rings.size) + 2 + 5 * len(features) + 3, 2))
     count = 0
     for i in range(corners.shape[0]):
         events[count] = corners[i]
@@ -200,7 +200,8 @@ def sectors(
         fx, fy, width = features[i, 0], features[i, 1], features[i, 2]
         distance = math.hypot(fx, fy)
         if distance > 0.0:
-            for turn in (-width / distance, 0.0, width / distance):
+            for j in (-3.0, -1.0, 0.0, 1.0, 3.0):
+                turn = j * width / distance
                 events[count, 0] = fx - turn * fy
                 events[count, 1] = turn * fx + fy
                 count += 1
