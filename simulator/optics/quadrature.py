@@ -24,6 +24,8 @@ Vector = tuple[float, float, float]
 # flux, flux r, flux min(r / r0, 1), flux cos(k r), flux sin(k r)
 COMPONENTS = 5
 _INNER, _OUTER = 60, 400
+# error of a piece that has not been integrated
+_UNKNOWN = -1.0
 
 
 def _gauss_kronrod() -> Array:
@@ -264,8 +266,7 @@ def _along_ray(
     last = math.atan(near / scale)
     for i in range(count + 1):
         angle = math.atan((far if i == count else breaks[i]) / scale)
-        work[i + 1, 0], work[i + 1, 1] = last, angle
-        _ray_piece(chart, head, table, material, backdrop, signal, rule, u, work, i + 1)
+        work[i + 1, 0], work[i + 1, 1], work[i + 1, 2] = last, angle, _UNKNOWN
         last = angle
     number = count + 1
     most = _INNER + count
@@ -274,6 +275,9 @@ def _along_ray(
             work[0, j] = 0.0
         worst = 1
         for i in range(1, number + 1):
+            # one place that calls the kernel: compilers copy it to each
+            if work[i, 2] == _UNKNOWN:
+                _ray_piece(chart, head, table, material, backdrop, signal, rule, u, work, i)
             for j in range(2, 3 + COMPONENTS):
                 work[0, j] += work[i, j]
             if work[i, 2] > work[worst, 2]:
@@ -284,8 +288,7 @@ def _along_ray(
         number += 1
         work[number, 0], work[number, 1] = middle, work[worst, 1]
         work[worst, 1] = middle
-        _ray_piece(chart, head, table, material, backdrop, signal, rule, u, work, worst)
-        _ray_piece(chart, head, table, material, backdrop, signal, rule, u, work, number)
+        work[worst, 2] = work[number, 2] = _UNKNOWN
 
 
 @compiled
@@ -424,17 +427,19 @@ def integrate(
             pieces[i, 1] = math.asinh(panels[i, 2] / panels[i, 4])
         else:
             pieces[i, 0], pieces[i, 1] = panels[i, 1], panels[i, 2]
-        pieces[i, 2] = i
-        _sector_piece(
-            chart, head, table, material, backdrop, signal, rules, marks, lines, circle, reference,
-            panels, 0.1 * tolerance, work, breaks, pieces, i,
-        )  # fmt: skip
+        pieces[i, 2], pieces[i, 3] = i, _UNKNOWN
     number = size
-    rays = size * rules[0].shape[1]
+    rays = 0
     while True:
         total[:] = 0.0
         error, worst = 0.0, 0
         for i in range(number):
+            if pieces[i, 3] == _UNKNOWN:
+                rays += rules[0].shape[1]
+                _sector_piece(
+                    chart, head, table, material, backdrop, signal, rules, marks, lines, circle,
+                    reference, panels, 0.1 * tolerance, work, breaks, pieces, i,
+                )  # fmt: skip
             for j in range(COMPONENTS):
                 total[j] += pieces[i, 4 + j]
             error += pieces[i, 3]
@@ -446,10 +451,5 @@ def integrate(
         pieces[number, 0], pieces[number, 1] = middle, pieces[worst, 1]
         pieces[number, 2] = pieces[worst, 2]
         pieces[worst, 1] = middle
-        for i in (worst, number):
-            _sector_piece(
-                chart, head, table, material, backdrop, signal, rules, marks, lines, circle,
-                reference, panels, 0.1 * tolerance, work, breaks, pieces, i,
-            )  # fmt: skip
+        pieces[worst, 3] = pieces[number, 3] = _UNKNOWN
         number += 1
-        rays += 2 * rules[0].shape[1]
