@@ -67,7 +67,7 @@ def _log_likelihoods(
     out: Array,
 ) -> None:
     """Fill out[i, j] with the log likelihood of frame j under parameter vector i."""
-    modes = np.empty((MAX_MODES, 5))
+    modes = np.empty((MAX_MODES, 6))
     for i in range(shapes.shape[0]):
         shape = (shapes[i, 0], shapes[i, 1], shapes[i, 2])
         crosstalk = crosstalk_of(crosstalks, i)
@@ -138,6 +138,11 @@ class CollapsedDensity:
             self.shot,
             self.relative,
         )
+
+    def with_readings(self, readings: Array) -> "CollapsedDensity":
+        """Return the same density for other readings of shape (frames, 2)."""
+        frames = np.ascontiguousarray(np.column_stack([readings, self.frames[:, 2]]))
+        return dataclasses.replace(self, frames=frames)
 
     def frame_log_likelihoods(self, z: Array) -> Array:
         """Return log p(y_j | z_i), shape (len(z), frames); -inf where physics forbids z."""

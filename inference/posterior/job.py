@@ -1,0 +1,157 @@
+"""What is to be inferred, and where the work stands."""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.posterior.collapsed import CollapsedDensity, collapsed_density
+from inference.posterior.ensemble import Ensemble
+from inference.posterior.importance import WeightedDraws
+from inference.posterior.proposal import Mixture
+from inference.posterior.settings import SamplerSettings
+from inference.posterior.verdict import Chains, Verdict, chains_of
+from simulator.errors import InvalidInputError, RefusedError
+from simulator.frames import Frames
+from simulator.parameters import parameters_of
+from simulator.scene import Scene
+from simulator.sensor import Sensor
+
+__all__ = ["Checkpoint", "Job", "chains", "prepare"]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Job:
+    """What is to be inferred, checked.
+
+    Attributes
+    ----------
+    sensor, scene : Sensor, Scene
+        As given.
+    frames : Frames
+        As given, saturated ones included.
+    settings : SamplerSettings
+        With a seed.
+    """
+
+    sensor: Sensor
+    scene: Scene
+    frames: Frames
+    settings: SamplerSettings
+
+    @property
+    def seed(self) -> int:
+        """The seed of every random stream of the job."""
+        seed = self.settings.seed
+        if seed is None:
+            raise ValueError("a job is made by `prepare`, which draws the seed")
+        return seed
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """Frames that are not saturated, shape (n,)."""
+        if self.sensor.full_scale is None:
+            return np.ones(len(self.frames), dtype=bool)
+        limit = np.asarray(self.sensor.full_scale)
+        return np.asarray((np.abs(self.frames.readings) < limit).all(axis=1))
+
+    def density(self) -> CollapsedDensity:
+        """Return the collapsed density of the usable frames."""
+        return collapsed_density(self.sensor, self.scene, self.frames.select(self.usable))
+
+    def stream(self, purpose: int) -> np.random.Generator:
+        """Return the random stream of one purpose; streams of different purposes are distinct."""
+        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(purpose,)))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """Where a job stands.
+
+    Attributes
+    ----------
+    method : "emcee" or "importance"
+        What is being done.
+    mixture : Mixture or None
+        Laplace approximations at the optima; None where nothing is unknown.
+    ensembles : tuple of Ensemble
+        Empty with importance sampling.
+    weighted : WeightedDraws or None
+        With importance sampling.
+    calls : int
+        Density evaluations so far.
+    verdict : Verdict
+        On the draws so far.
+    ess, r_hat : float or None
+        Least effective sample size and largest R-hat so far.
+    finished : bool
+        Whether more steps would serve nothing.
+    """
+
+    method: str
+    mixture: Mixture | None
+    ensembles: tuple[Ensemble, ...]
+    weighted: WeightedDraws | None
+    calls: int
+    verdict: Verdict
+    ess: float | None
+    r_hat: float | None
+    finished: bool
+
+
+def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSettings) -> Job:
+    """Check a request before any time is spent on it.
+
+    Parameters
+    ----------
+    sensor, scene, frames : Sensor, Scene, Frames
+        The request.
+    settings : SamplerSettings
+        Without a seed, one is drawn from the operating system.
+
+    Returns
+    -------
+    Job
+
+    Raises
+    ------
+    InvalidInputError
+        Pointers below /scene, /frames.
+    RefusedError
+        Where no honest answer exists; with the remedy.
+    """
+    try:
+        parameters_of(sensor, scene)
+    except InvalidInputError as error:
+        raise error.below("/scene") from None
+    if scene.motion == "tangential":
+        raise RefusedError(
+            "the object's amplitude changes from frame to frame in tangential motion, and the "
+            "posterior has one amplitude for all frames; use the technique `differential`"
+        )
+    if scene.discrepancy is not None:
+        raise RefusedError(
+            "the posterior has no term for a model discrepancy; leave `discrepancy` out, and state "
+            "an independent relative error as the noise's `relative`"
+        )
+    if scene.optional_terms:
+        term = scene.optional_terms[0]
+        raise RefusedError(
+            f"the posterior cannot decide whether {term} stays; leave `optional` out to keep the "
+            "term, or leave the term out"
+        )
+    if settings.seed is None:
+        seed = int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 1)
+        settings = settings.model_copy(update={"seed": seed})
+    job = Job(sensor, scene, frames, settings)
+    if not job.usable.any():
+        raise RefusedError("every frame is saturated: lower the gain or the exposure")
+    return job
+
+
+def chains(job: Job, checkpoint: Checkpoint) -> Chains:
+    """Return the kept draws of an emcee checkpoint."""
+    if checkpoint.mixture is None:
+        raise ValueError("nothing was sampled")
+    names = parameters_of(job.sensor, job.scene).names
+    return chains_of(checkpoint.ensembles, checkpoint.mixture.nearest, names)

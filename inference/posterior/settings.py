@@ -1,0 +1,34 @@
+"""What a caller may choose about the sampling of a posterior."""
+
+from typing import Annotated, Literal
+
+import pydantic
+
+from simulator.validated import Validated
+
+__all__ = ["SamplerSettings"]
+
+
+class SamplerSettings(Validated):
+    """Settings of a posterior.
+
+    Attributes
+    ----------
+    method : "emcee", "importance" or "auto"
+        Ensembles of walkers; Laplace with Student-t importance sampling, refused above a Pareto
+        k-hat of 0.5; or importance sampling where it is good enough, ensembles otherwise.
+    ensembles : int
+        Independent ensembles; fewer than four cannot show much disagreement.
+    target_ess : int
+        Effective sample size wanted for every parameter.
+    max_seconds : float
+        Wall time [s] after which an unfinished run is summarised as it is.
+    seed : int, optional
+        Left out: drawn, and returned with the answer.
+    """
+
+    method: Literal["emcee", "importance", "auto"] = "emcee"
+    ensembles: Annotated[int, pydantic.Field(ge=2, le=32)] = 4
+    target_ess: Annotated[int, pydantic.Field(ge=10, le=1_000_000)] = 400
+    max_seconds: Annotated[float, pydantic.Field(gt=0, le=86_400)] = 120.0
+    seed: Annotated[int, pydantic.Field(ge=0, lt=2**63)] | None = None
