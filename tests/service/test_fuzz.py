@@ -4,6 +4,7 @@ import asyncio
 import copy
 import json
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import httpx
@@ -11,8 +12,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from inference.posterior import fold as real_fold
+from inference.posterior.settings import SamplerSettings
 from service.app import create_app
 from service.settings import Settings
+from simulator.frames import Frames
+from simulator.scene import Scene
+from simulator.sensor import Sensor
 from tests.service import fake_fold
 from tests.service.conftest import FRAMES, SCENE, SENSOR
 
@@ -104,6 +110,12 @@ def spoiled(draw: st.DrawFn, replacements: st.SearchStrategy[Any]) -> dict[str, 
     return body
 
 
+def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSettings) -> Any:
+    """What the real posterior refuses is refused; what it would sample is not sampled here."""
+    real_fold.prepare(sensor, scene, frames, settings)
+    return fake_fold.prepare(sensor, Scene(), frames, settings)
+
+
 @pytest.fixture(scope="module")
 def loop() -> Iterator[asyncio.Runner]:
     with asyncio.Runner() as runner:
@@ -113,7 +125,8 @@ def loop() -> Iterator[asyncio.Runner]:
 @pytest.fixture(scope="module")
 def http(loop: asyncio.Runner) -> Iterator[httpx.AsyncClient]:
     fake_fold.order()
-    app = create_app(Settings(workers=1, max_jobs=100_000), fake_fold)
+    fold: Any = SimpleNamespace(**vars(fake_fold) | {"prepare": prepare})
+    app = create_app(Settings(workers=1, max_jobs=100_000), fold)
     lifespan = app.router.lifespan_context(app)
     loop.run(lifespan.__aenter__())
     # an exception that is not answered fails the test with its own traceback

@@ -8,6 +8,12 @@ import httpx
 import pytest
 
 from service.app import create_app
+from service.schemas import (
+    EstimatesResponse,
+    PosteriorPage,
+    PosteriorResponse,
+    SimulationResponse,
+)
 from service.settings import Settings
 from tests.service import fake_fold
 
@@ -47,6 +53,7 @@ async def test_estimates(client: httpx.AsyncClient, request_body: dict[str, Any]
         assert frame["status"] in {"unique", "ambiguous", "none", "saturated"}
     assert {item["technique"] for item in body["left_out"]} >= {"posterior", "object_fit"}
     assert all(item["reason"] for item in body["left_out"])
+    EstimatesResponse.model_validate(body)
 
 
 async def test_conventional_range(client: httpx.AsyncClient, request_body: dict[str, Any]) -> None:
@@ -273,6 +280,7 @@ async def test_posterior(client: httpx.AsyncClient, request_body: dict[str, Any]
     assert body["status"] == "done"
     assert body.keys() == first.keys()
     assert body["verdict"] == {"converged": True, "reasons": []}
+    assert PosteriorResponse.model_validate(body).model_dump(exclude={"problem"}) == body
     assert (await client.delete(location)).status_code == 204
     assert_problem(await client.get(location), 404)
     assert_problem(await client.delete(location), 404)
@@ -327,6 +335,7 @@ async def test_pages(client: httpx.AsyncClient, request_body: dict[str, Any]) ->
     parameters: dict[str, Any] = {"limit": 2}
     while True:
         page = (await client.get("/v1/posteriors", params=parameters)).json()
+        assert PosteriorPage.model_validate(page).model_dump() == page
         found += [item["id"] for item in page["items"]]
         if page["next_cursor"] is None:
             break
@@ -353,6 +362,7 @@ async def test_simulation_and_back(
     assert response.status_code == 200, response.text
     body = response.json()
     assert body.keys() == {"frames", "truth", "seed"}
+    SimulationResponse.model_validate(body)
     assert body["truth"]["parameters"].keys() == {"object.c2"}
     assert len(body["truth"]["range_m"]) == 2
     assert (await client.post("/v1/simulations", json=content)).json() == body

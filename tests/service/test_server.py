@@ -147,6 +147,26 @@ def test_health_answers_while_a_large_batch_is_worked_on() -> None:
         assert answered > 1
 
 
+def test_ctrl_c_ends_an_inference(tmp_path: Path) -> None:
+    (tmp_path / "scene.json").write_text(json.dumps({"sensor": SENSOR, "scene": {}}))
+    (tmp_path / "frames.json").write_text(json.dumps(FRAMES))
+    command = hybridtof("infer", str(tmp_path / "frames.json"), "--scene",
+                        str(tmp_path / "scene.json"), "--target-ess", "1000000")  # fmt: skip
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment()
+    )
+    while not (workers := children(process.pid)):
+        assert process.poll() is None
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 128 + signal.SIGINT
+    assert out == ""
+    assert err.endswith("hybridtof: interrupted\n")
+    assert "Traceback" not in err
+    assert gone(workers)
+
+
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_reader_that_goes_away(tmp_path: Path, unbuffered: str) -> None:
     scene = tmp_path / "scene.json"

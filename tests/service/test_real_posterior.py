@@ -1,0 +1,106 @@
+"""The real posterior through the service: its shape, and what survives a kill."""
+
+import asyncio
+import os
+import signal
+from typing import Any
+
+import httpx
+import pytest
+
+from inference.posterior import fold
+from inference.posterior.settings import SamplerSettings
+from service.app import create_app
+from service.job_store import MemoryJobStore
+from service.jobs import Jobs
+from service.process_pool import ProcessPool
+from service.schemas import PosteriorRequest, PosteriorResponse, SimulationRequest
+from service.settings import Settings
+from service.simulation import simulation_of
+from simulator.frames import frames_from_columns
+from simulator.validated import parse
+from tests.service.conftest import SENSOR
+
+# machine code may have to be made first, in every worker
+pytestmark = [pytest.mark.anyio, pytest.mark.slow]
+
+
+def request_body() -> dict[str, Any]:
+    """Forty frames of an object of unknown parameters before known crosstalk."""
+    system = {
+        "sensor": SENSOR | {"noise": {"read": [1e-4, 1e-4]}},
+        "scene": {"crosstalk": [0.01, 0.02]},
+    }
+    known = {"object": {"c0": 0.0769, "c1": -0.123, "c2": 0.1}, "crosstalk": [0.01, 0.02]}
+    trajectory = {"kind": "radial", "from_m": 0.2, "to_m": 2.0, "frames": 40, "spacing": "log"}
+    simulated = simulation_of(
+        parse(SimulationRequest, system | {"scene": known, "trajectory": trajectory, "seed": 1})
+    )
+    sampler = {"seed": 2, "max_seconds": 600.0, "target_ess": 100}
+    return system | {"frames": simulated["frames"], "sampler": sampler}
+
+
+async def test_over_http() -> None:
+    app = create_app(Settings(workers=2))
+    transport = httpx.ASGITransport(app)
+    async with (
+        app.router.lifespan_context(app),
+        httpx.AsyncClient(transport=transport, base_url="http://test") as client,
+    ):
+        response = await client.post("/v1/posteriors", json=request_body())
+        assert response.status_code == 202, response.text
+        location = response.headers["location"]
+        while (body := (await client.get(location)).json())["status"] in {"queued", "running"}:
+            await asyncio.sleep(0.2)
+    assert body["status"] == "done", body
+    assert body["seed"] == 2
+    answer = PosteriorResponse.model_validate(body)
+    # what OpenAPI says is what is sent, no more and no less
+    assert answer.model_dump(exclude={"problem"}) == body
+    assert body["verdict"]["converged"], body["verdict"]
+    assert body["parameters"].keys() == {"object.c0", "object.c1", "object.c2"}
+    for name in ("q05", "q50", "q95", "mean", "sd", "modes"):
+        assert len(body["range_m"][name]) == 40
+
+
+async def test_refusal_over_http() -> None:
+    app = create_app(Settings(workers=1))
+    transport = httpx.ASGITransport(app)
+    async with (
+        app.router.lifespan_context(app),
+        httpx.AsyncClient(transport=transport, base_url="http://test") as client,
+    ):
+        body = request_body()
+        body["sensor"]["full_scale"] = [1e-9, 1e-9]
+        response = await client.post("/v1/posteriors", json=body)
+    assert response.status_code == 422
+    assert response.json()["type"] == "urn:hybridtof:problem:refused"
+
+
+async def posterior(kill_workers: bool) -> dict[str, Any]:
+    request = parse(PosteriorRequest, request_body())
+    frames = frames_from_columns(request.sensor, request.frames)
+    settings = SamplerSettings(seed=2, target_ess=10_000, max_seconds=600)
+    pool = ProcessPool(2)
+    jobs = Jobs(fold, MemoryJobStore(1), pool, running=1)
+    await jobs.start()
+    try:
+        record = await jobs.submit(request.sensor, request.scene, frames, settings)
+        killed = 0
+        while not await jobs.wait(record.id, timeout_s=0.05):
+            progress = (await jobs.get(record.id)).progress
+            if kill_workers and killed < 2 and progress is not None and progress["steps"] > 0:
+                os.kill(pool.pids[killed], signal.SIGKILL)
+                killed += 1
+                await asyncio.sleep(0.5)
+        assert killed == (2 if kill_workers else 0)
+        result = (await jobs.get(record.id)).result
+    finally:
+        await jobs.close()
+    assert result is not None
+    del result["runtime"]
+    return result
+
+
+async def test_killed_workers_change_nothing() -> None:
+    assert await posterior(kill_workers=True) == await posterior(kill_workers=False)
