@@ -23,9 +23,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
-Chart = tuple[
-    int, Array, tuple[Array, Array], tuple[Array, Array, Array, Array, Array]
-]
+Chart = tuple[int, Array, tuple[Array, Array], tuple[Array, Array, Array, Array, Array]]
 
 # kinds of surface rows: kind 0, centre 1:4, width axis 4:7, height axis 7:10, normal 10:13,
 # half sizes (or radius) 13:15

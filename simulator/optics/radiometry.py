@@ -56,7 +56,9 @@ def _observe_many(
     states = np.zeros((count, 2), dtype=np.int64)
     late = 1.0 / signal[1] if signal[1] > 0.0 else 0.0
     for i in range(count):
-        status, chart, region, marks = build_chart(surfaces[i], head, table, materials[i], late, backdrop)
+        status, chart, region, marks = build_chart(
+            surfaces[i], head, table, materials[i], late, backdrop
+        )
         states[i, 0] = status
         if status != 0:
             continue
