@@ -25,6 +25,19 @@ def _balance(r: float, w1: float, w2: float, b: float, p: Array) -> float:
 
 @compiled
 def _between(low: float, high: float, w1: float, w2: float, b: float, p: Array) -> float:
+    # Newton from the conventional range, which is the root where there is no background
+    r = w1 / w2
+    for _ in range(10):
+        if not low < r < high:
+            break
+        q = r * (r + p[2]) + p[1]
+        seen, left = b * (r * (r + p[2]) / q), p[0] - r
+        steep = w2 - seen + b * (p[1] / q) * ((2.0 * r + p[2]) / q) * left
+        step = ((w1 - r * w2) - seen * left) / steep
+        r += step
+        if abs(step) < 1e-8 * r:  # what remains is its square; once more in the exact form
+            r -= _balance(r, w1, w2, b, p) / steep
+            return float(min(max(r, low), high))
     bracket = start(low, high, _balance(low, w1, w2, b, p), _balance(high, w1, w2, b, p))
     for _ in range(STEPS):
         x = next_point(bracket)

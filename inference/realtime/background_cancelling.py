@@ -8,10 +8,13 @@ from numpy.typing import NDArray
 from inference.estimates import TechniqueResult
 from inference.realtime import curves
 from inference.realtime.assemble import NOISE_BAND, Outcome, assemble, reasons_of
+from inference.realtime.bracketing import EPSILON
 from inference.realtime.exact import cycles_phase, weighted_differences
 from inference.realtime.from_curve import candidates_of
 from inference.realtime.net import UNREPRESENTABLE, net_readings
 from inference.realtime.technique import Task, Technique
+from simulator.compiled import compiled
+from simulator.object_model import quadratic
 from simulator.sensor import PulsedSensor
 
 __all__ = ["BACKGROUND_CANCELLING"]
@@ -63,8 +66,21 @@ def _solve(task: Task) -> TechniqueResult:
         physical = None
         if task.physical and known.has("background.strength"):
             magnitude = np.abs(net.first) * abs(towards_free[0]) + np.abs(net.second)
+            c0, c1 = known.get("object.c0"), known.get("object.c1")
+            gain = sensor.gain * known.get("object.c2")
             physical = _physical(
-                task, candidates.roots, slopes / scale, free, whole, v11, v12, v22, magnitude
+                candidates.roots,
+                slopes / scale,
+                free,
+                whole,
+                v11,
+                v12,
+                v22,
+                magnitude,
+                (gain, c0, c1, known.get("background.strength")),
+                None if isinstance(sensor, PulsedSensor) else (sensor.wave_number, distance),
+                sensor.noise.relative,
+                NOISE_BAND,
             )
     reason = np.where(free > 0, _NO_RANGE, _BEYOND).astype(np.uint8)
     if kind == curves.CANCELLING_QUADRATURE:
@@ -81,8 +97,8 @@ def _product(
     return a[0] * b[0] * var1 + a[1] * b[1] * var2 + (a[0] * b[1] + a[1] * b[0]) * cov
 
 
+@compiled
 def _physical(
-    task: Task,
     roots: Array,
     slopes: Array,
     free: Array,
@@ -91,33 +107,42 @@ def _physical(
     v12: Array,
     v22: Array,
     magnitude: Array,
+    scene: tuple[float, float, float, float],
+    wave: tuple[float, float] | None,
+    relative: float,
+    band: float,
 ) -> NDArray[np.bool_]:
     """Say at which roots the background is between nothing and its strength, within noise.
 
     The background is whole - C Phi(r), with C = 1 or cos k (R - r), and its first-order error
-    d whole - (C Phi)' d free / free'(r).
+    d whole - (C Phi)' d free / free'(r). ``scene`` is (gain c2, c0, c1, strength), ``wave`` (k, R).
     """
-    sensor, known = task.sensor, task.known
-    c0, c1 = known.get("object.c0"), known.get("object.c1")
-    q = roots * (roots + c1) + c0
-    flux = sensor.gain * known.get("object.c2") * (c0 / q) / roots / roots
-    change = -flux * (2.0 + roots * (2.0 * roots + c1) / q) / roots
-    if isinstance(sensor, PulsedSensor):
-        part = flux
-    else:
-        k = sensor.wave_number
-        angle = k * (known.get("background.distance_m") - roots)
-        part = flux * np.cos(angle)
-        change = change * np.cos(angle) + k * flux * np.sin(angle)
-    background = whole[:, None] - part
-    lever = change / slopes
-    variance = v22[:, None] - 2.0 * lever * v12[:, None] + lever**2 * v11[:, None]
-    variance += (sensor.noise.relative * (part - lever * free[:, None])) ** 2
-    rounding = 64 * np.finfo(float).eps * (magnitude[:, None] * (1 + np.abs(lever)) + flux)
-    tolerance = NOISE_BAND * np.sqrt(np.maximum(variance, 0.0)) + rounding
-    strength = known.get("background.strength")
-    inside = (background >= -tolerance) & (background <= strength + tolerance)
-    return np.asarray(inside | ~np.isfinite(tolerance))
+    gain, c0, c1, strength = scene
+    n, m = roots.shape
+    accepted = np.zeros((n, m), dtype=np.bool_)
+    for i in range(n):
+        for j in range(m):
+            r = roots[i, j]
+            if not r > 0.0:
+                continue
+            q = quadratic(r, c0, c1)
+            flux = gain * (c0 / q) / r / r
+            change = -flux * (2.0 + r * (2.0 * r + c1) / q) / r
+            part = flux
+            if wave is not None:
+                angle = wave[0] * (wave[1] - r)
+                cosine, sine = math.cos(angle), math.sin(angle)
+                part = flux * cosine
+                change = change * cosine + wave[0] * flux * sine
+            background = whole[i] - part
+            lever = change / slopes[i, j]
+            variance = v22[i] - 2.0 * (lever * v12[i]) + lever * (lever * v11[i])
+            common = relative * (part - lever * free[i])
+            variance = max(variance, 0.0) + common * common
+            rounding = 64.0 * EPSILON * (magnitude[i] * (1.0 + abs(lever)) + flux)
+            slack = band * math.sqrt(variance) + rounding
+            accepted[i, j] = not (background < -slack or background > strength + slack)
+    return accepted
 
 
 BACKGROUND_CANCELLING = Technique(
@@ -128,7 +153,7 @@ BACKGROUND_CANCELLING = Technique(
     immune_to=("background",),
     uses_background=True,
     differential=False,
-    cost=1.0,
+    cost=200.0,
     equations="4.73; for a sine wave errata section 5",
     roots="1 in (0, R) if c1^2 <= 32 c0 / 9; sine wave: 1 if kR <= pi, else up to 2 a half period",
     solve=_solve,

@@ -28,7 +28,7 @@ _REASONS = reasons_of(
     "no range before the background gives these readings",
 )
 _DARK, _CONTACT, _BEYOND, _SILENT, _NO_RANGE = range(len(_REASONS) - 5, len(_REASONS))
-_CHUNK = 2_000_000
+_CHUNK = 200_000  # candidate roots held at a time, so that they stay in the cache
 
 
 def _solve(task: Task) -> TechniqueResult:
@@ -106,7 +106,7 @@ BACKGROUND_INTENSITY = Technique(
     immune_to=("background",),
     uses_background=True,
     differential=False,
-    cost=1.0,
+    cost=160.0,
     equations="4.76; for a sine wave errata section 5",
     roots="1 in (0, R) for c1' >= 0; sine wave: 1 if kR <= pi and c1' >= 0, else several",
     solve=_solve,

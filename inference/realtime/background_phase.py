@@ -1,4 +1,4 @@
-"""Background intensity of a sine wave: the phase of what the background leaves is that of the range.
+"""Background intensity of a sine wave: what the background leaves has the phase of the range.
 
 x - B S(r) e^jkR is the object alone, so theta(r) = k r - arg(x - B S e^jkR) is a multiple of 2 pi.
 B S moves along a straight line, so that arg is monotone in S, and theta turns where a quartic has
@@ -33,6 +33,21 @@ def _theta(r: float, line: Line, p: Array) -> float:
 
 @compiled
 def _between(low: float, high: float, goal: float, line: Line, p: Array) -> float:
+    psi, mu, nu, cosine, sine = line
+    # Newton from the range of an object alone
+    r = (goal + psi) / p[3]
+    for _ in range(10):
+        if not low < r < high:
+            break
+        q = r * (r + p[2]) + p[1]
+        hidden = nu * (r * (r + p[2]) / q)
+        x, y = mu - hidden * cosine, -hidden * sine
+        steep = p[3] + mu * nu * sine * ((p[1] / q) * ((2.0 * r + p[2]) / q)) / (x * x + y * y)
+        step = (goal - (p[3] * r - psi - math.atan2(y, x))) / steep
+        r += step
+        if abs(step) < 1e-8 * r:  # what remains is its square
+            r += (goal - _theta(r, line, p)) / steep
+            return float(min(max(r, low), high))
     f_low, f_high = _theta(low, line, p) - goal, _theta(high, line, p) - goal
     if (f_low > 0.0) == (f_high > 0.0):  # rounding at an end
         return low if abs(f_low) < abs(f_high) else high

@@ -56,8 +56,7 @@ def conventional_range(sensor: Sensor, frames: Frames, crosstalk: Pair = (0.0, 0
     if isinstance(sensor, PulsedSensor):
         flat = np.ascontiguousarray(frames.readings).reshape(-1)
         return _pulsed_range(flat, sensor.r0, *crosstalk)
-    first, second = frames.readings[:, 0], frames.readings[:, 1]
-    return _phase_range(first, second, sensor.wave_number, sensor.phase_offset_rad, *crosstalk)
+    return _phase_range(frames.readings, sensor.wave_number, sensor.phase_offset_rad, crosstalk)
 
 
 @compiled
@@ -71,18 +70,16 @@ def _pulsed_range(flat: Array, r0: float, ct1: float, ct2: float) -> Array:
     return out
 
 
-@compiled
-def _phase_range(
-    i_reading: Array, q_reading: Array, k: float, offset: float, ct1: float, ct2: float
-) -> Array:
-    out = np.empty(i_reading.size)
-    turn = 2.0 * math.pi
-    for i in range(i_reading.size):
-        x, y = i_reading[i] - ct1, q_reading[i] - ct2
-        phase = (math.atan2(y, x) - offset) % turn
-        good = (x != 0.0 or y != 0.0) and abs(x) < math.inf and abs(y) < math.inf
-        out[i] = phase / k if good else math.nan
-    return out
+def _phase_range(readings: Array, k: float, offset: float, crosstalk: Pair) -> Array:
+    with np.errstate(all="ignore"):
+        x, y = readings[:, 0] - crosstalk[0], readings[:, 1] - crosstalk[1]
+        phase = np.arctan2(y, x)
+        phase -= math.remainder(offset, 2 * math.pi)
+        phase[phase < 0] += 2 * math.pi
+        phase[phase >= 2 * math.pi] -= 2 * math.pi
+        phase[((x == 0) & (y == 0)) | ~np.isfinite(x + y)] = np.nan
+        phase /= k
+    return phase
 
 
 @compiled

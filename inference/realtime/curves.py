@@ -190,7 +190,8 @@ def _residual(kind: int, u: float, top: float, bottom: float, p: Array) -> float
 @compiled
 def _guess(kind: int, top: float, bottom: float, p: Array) -> float:
     """Return a first guess from the limits of near and far ranges."""
-    if kind in (INTENSITY, CANCELLING_RATIO):
+    if kind in (INTENSITY, CANCELLING_RATIO, CANCELLING_QUADRATURE):
+        top = abs(top)
         return min(1.0 / math.sqrt(top), math.sqrt(math.sqrt(float(p[C0]) / top)))
     if kind == INTENSITY_W1:
         return min(1.0 / top, math.pow(float(p[C0]) / top, 1.0 / 3.0))
@@ -199,6 +200,58 @@ def _guess(kind: int, top: float, bottom: float, p: Array) -> float:
     if kind in (DIFFERENTIAL_PHASE, BOTH_PHASE):
         return 1.6 * top / float(p[WAVE])
     return 0.0
+
+
+@compiled
+def _newton(kind: int, low: float, high: float, top: float, bottom: float, p: Array) -> float:
+    """Solve by Newton in logarithms; nan where that leaves the interval or the sign.
+
+    A power law, which every such curve is near both ends, is solved in one step.
+    """
+    target = top / bottom
+    c0, c1 = float(p[C0]), float(p[C1])
+    u = _guess(kind, top, bottom, p)
+    for _ in range(12):
+        if not low < u < high:
+            return math.nan
+        if kind in (INTENSITY, INTENSITY_W1, CANCELLING_RATIO):
+            q = quadratic(u, c0, c1)
+            height = c0 / q / u
+            power = -1.0 - u * (2.0 * u + c1) / q
+            if kind != INTENSITY_W1:
+                height /= u
+                power -= 1.0
+            if kind == CANCELLING_RATIO:
+                left = float(p[DISTANCE]) - u
+                height *= left / float(p[DISTANCE])
+                power -= u / left
+        elif kind == DIFFERENTIAL_RATIO:
+            over, under = u * (3.0 * u + 2.0 * c1) + c0, u * (4.0 * u + 3.0 * c1) + 2.0 * c0
+            height = u * over / under
+            power = 1.0 + u * ((6.0 * u + 2.0 * c1) / over - (8.0 * u + 3.0 * c1) / under)
+        elif kind == DIFFERENTIAL_PHASE:
+            q, under = quadratic(u, c0, c1), u * (4.0 * u + 3.0 * c1) + 2.0 * c0
+            x = float(p[WAVE]) * u
+            height = x - math.atan2(x * q, under)
+            bend = x * x * q + u * (12.0 * u + 6.0 * c1) + 2.0 * c0
+            power = x * (bend * q) / (under * under + x * q * x * q) / height
+        else:
+            q = quadratic(u, c0, c1)
+            turn = float(p[WAVE]) * (float(p[DISTANCE]) - u)
+            sine = math.sin(turn)
+            height = sine * (c0 / q / u / u)
+            b = -2.0 - u * (2.0 * u + c1) / q
+            power = b - float(p[WAVE]) * u * math.cos(turn) / sine
+        ratio = height / target
+        if not ratio > 0.0:
+            return math.nan
+        step = -math.log(ratio) / power
+        if not abs(step) < 2.0:
+            return math.nan
+        if abs(step) < 3e-8:  # what remains is its square
+            return min(max(u * (1.0 + step), low), high)
+        u *= 1.0 + step + 0.5 * step * step if abs(step) < 0.02 else math.exp(step)
+    return math.nan
 
 
 @compiled
@@ -216,6 +269,10 @@ def solve_between(kind: int, low: float, high: float, top: float, bottom: float,
     p : ndarray, shape (PARAMETERS,)
         Parameters.
     """
+    if kind not in (BOTH_RATIO, BOTH_PHASE):  # far from power laws
+        root = _newton(kind, low, high, top, bottom, p)
+        if root == root:
+            return root
     f_low = _residual(kind, low, top, bottom, p)
     f_high = _residual(kind, high, top, bottom, p)
     if f_low == 0.0 or (f_low > 0.0) == (f_high > 0.0):

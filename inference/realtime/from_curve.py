@@ -1,5 +1,6 @@
 """Solve a technique that inverts a curve: targets in, candidates out."""
 
+from collections.abc import Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -15,7 +16,7 @@ __all__ = ["candidates_of", "widened"]
 T = TypeVar("T", bound=np.generic)
 Array = NDArray[np.float64]
 
-_CHUNK = 4_000_000  # candidate roots held at a time
+_CHUNK = 200_000  # candidate roots held at a time, so that they stay in the cache
 
 
 def candidates_of(
@@ -73,11 +74,7 @@ def candidates_of(
         )
         for i in range(0, top.size, step)
     ]
-    width = max(part[0].shape[1] for part in parts)
-    roots, slopes, gaps = (
-        np.concatenate([widened(part[j], width) for part in parts]) for j in range(3)
-    )
-    nearest = np.concatenate([part[3] for part in parts])
+    roots, slopes, gaps, nearest = parts[0] if len(parts) == 1 else _joined(parts)
     with np.errstate(all="ignore"):
         slopes = slopes / unit
         candidates = Candidates(
@@ -87,6 +84,14 @@ def candidates_of(
             near_frame=nearest < NOISE_BAND * sd,
         )
     return candidates, slopes
+
+
+def _joined(parts: Sequence[tuple[Array, ...]]) -> tuple[Array, Array, Array, Array]:
+    width = max(part[0].shape[1] for part in parts)
+    roots, slopes, gaps = (
+        np.concatenate([widened(part[j], width) for part in parts]) for j in range(3)
+    )
+    return roots, slopes, gaps, np.concatenate([part[3] for part in parts])
 
 
 def _trimmed(part: tuple[Array, Array, Array, Array]) -> tuple[Array, Array, Array, Array]:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.realtime.bracketing import STEPS, best, narrowed, next_point, start
+from inference.realtime.exact import difference_of_products
 from simulator.compiled import compiled
 
 __all__ = ["horner", "real_roots"]
@@ -35,6 +36,29 @@ def _bracketed(coefficients: Array, count: int, low: float, high: float) -> floa
 
 
 @compiled
+def _quadratic(a: float, b: float, c: float, low: float, high: float, out: Array) -> int:
+    """Roots in (low, high) where the sign changes, without cancellation."""
+    found = 0
+    if a == 0.0:
+        first, second = (-c / b if b != 0.0 else math.nan), math.nan
+    else:
+        discriminant = difference_of_products(b, b, 4.0 * a, c)
+        if not discriminant > 0.0:
+            return 0
+        sum_of_larger = -0.5 * (b + math.copysign(math.sqrt(discriminant), b))
+        first, second = sum_of_larger / a, c / sum_of_larger
+    if first > second:
+        first, second = second, first
+    if low < first < high:
+        out[found] = first
+        found += 1
+    if low < second < high:
+        out[found] = second
+        found += 1
+    return found
+
+
+@compiled
 def real_roots(coefficients: Array, low: float, high: float, out: Array) -> int:
     """Find every sign change of a polynomial in (low, high).
 
@@ -56,10 +80,18 @@ def real_roots(coefficients: Array, low: float, high: float, out: Array) -> int:
         Number of roots.
     """
     degree = coefficients.size - 1
+    positive = negative = False
+    for i in range(degree + 1):
+        positive |= coefficients[i] > 0.0
+        negative |= coefficients[i] < 0.0
+    if not (positive and negative):  # Descartes
+        return 0
+    if degree == 2:
+        return _quadratic(coefficients[0], coefficients[1], coefficients[2], low, high, out)
     derivative = np.empty(degree + 1)
     previous = np.empty(degree + 2)
     found = 0
-    for order in range(degree - 1, -1, -1):
+    for order in range(max(degree - 2, 0), -1, -1):
         # coefficients of the derivative of this order
         count = degree - order + 1
         for i in range(count):
@@ -67,6 +99,9 @@ def real_roots(coefficients: Array, low: float, high: float, out: Array) -> int:
             for j in range(order):
                 factor *= degree - i - j
             derivative[i] = coefficients[i] * factor
+        if count == 3:
+            found = _quadratic(derivative[0], derivative[1], derivative[2], low, high, out)
+            continue
         previous[0] = low
         for i in range(found):
             previous[i + 1] = out[i]

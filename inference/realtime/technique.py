@@ -65,7 +65,7 @@ class Technique:
     differential : bool
         Whether it uses derivatives in time.
     cost : float
-        Time a frame relative to ``conventional``, measured by benchmarks/realtime.py.
+        Time a frame relative to ``conventional`` of a pulse, measured by benchmarks/realtime.py.
     equations : str
         Where it comes from.
     roots : str
