@@ -53,6 +53,7 @@ def empty_frame_log_likelihood(
 
 @compiled
 def _log_likelihoods(
+    out: Array,
     shapes: Array,
     crosstalks: Array | None,
     backgrounds: Array | None,
@@ -64,7 +65,6 @@ def _log_likelihoods(
     read: Pair,
     shot: float | None,
     relative: float | None,
-    out: Array,
 ) -> None:
     """Fill out[i, j] with the log likelihood of frame j under parameter vector i."""
     modes = np.empty((MAX_MODES, 6))
@@ -139,10 +139,18 @@ class CollapsedDensity:
             self.relative,
         )
 
-    def with_readings(self, readings: Array) -> "CollapsedDensity":
-        """Return the same density for other readings of shape (frames, 2)."""
-        frames = np.ascontiguousarray(np.column_stack([readings, self.frames[:, 2]]))
-        return dataclasses.replace(self, frames=frames)
+    def paired_log_likelihood(self, z: Array, readings: Array) -> Array:
+        """Return log p(readings_i | z_i) for readings of shape (n, frames, 2), shape (n,)."""
+        arguments = self.arguments(self.parameters.terms(z))
+        scene, sensor = arguments[:4], arguments[5:]
+        out = np.empty((len(z), self.frames.shape[0]))
+        frames = self.frames.copy()
+        for i in range(len(z)):
+            frames[:, :2] = readings[i]
+            row = [None if part is None else part[i : i + 1] for part in scene]
+            everything: list[Any] = [*row, frames, *sensor]
+            _log_likelihoods(out[i : i + 1], *everything)
+        return np.asarray(out.sum(axis=1))
 
     def frame_log_likelihoods(self, z: Array) -> Array:
         """Return log p(y_j | z_i), shape (len(z), frames); -inf where physics forbids z."""
@@ -155,7 +163,7 @@ class CollapsedDensity:
             if part is not None:
                 good &= np.isfinite(part).all(axis=1)
         if good.all():
-            _log_likelihoods(*self.arguments(terms), out)
+            _log_likelihoods(out, *self.arguments(terms))
         elif good.any():
             out[good] = self.frame_log_likelihoods(z[good])
         return out

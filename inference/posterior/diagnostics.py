@@ -77,7 +77,7 @@ def effective_sample_size(draws: Array) -> float:
     within = float(means.var(axis=1, ddof=1).mean()) * tau / (ensembles * steps)
     if not variance > 0 or not within > 0:
         return math.nan
-    return min(variance / within, float(draws.size))
+    return float(min(variance / within, draws.size))
 
 
 def rank_normalise(draws: Array) -> Array:
@@ -89,7 +89,7 @@ def rank_normalise(draws: Array) -> Array:
 def tail_effective_sample_size(draws: Array) -> float:
     """Return the smaller effective sample size of the 5 % and 95 % quantiles' indicators."""
     quantiles = np.quantile(draws, [0.05, 0.95])
-    return min(effective_sample_size((draws <= q).astype(float)) for q in quantiles)
+    return float(min(effective_sample_size((draws <= q).astype(float)) for q in quantiles))
 
 
 def split_r_hat(draws: Array) -> float:

@@ -26,7 +26,15 @@ from inference.posterior.integrand import (
 from simulator.compiled import compiled
 from simulator.readings import background_readings, object_readings
 
-__all__ = ["MAX_MODES", "frame_log_likelihood", "integration_bounds", "knot_count", "tabulate"]
+__all__ = [
+    "MAX_MODES",
+    "falls_off",
+    "find_modes",
+    "frame_log_likelihood",
+    "integration_bounds",
+    "knot_count",
+    "tabulate",
+]
 
 Array = NDArray[np.float64]
 
@@ -215,7 +223,7 @@ def find_modes(
 
 
 @compiled
-def _falls_off(
+def falls_off(
     mode: Array,
     frame: Triple,
     scene: SceneArguments,
@@ -250,7 +258,7 @@ def _narrow(
     Gauss-Hermite nodes leave an error below 1e-7; their outer nodes find the exceptions.
     """
     u, top, sd = mode[0], mode[1], mode[2]
-    if not sd < 1.0 or not _falls_off(mode, frame, scene):
+    if not sd < 1.0 or not falls_off(mode, frame, scene):
         return -1.0
     if sd < _NEARLY_GAUSSIAN:
         total, largest = 0.0, 0.0
@@ -260,7 +268,7 @@ def _narrow(
             largest = max(largest, abs(excess))
             total += _HERMITE_WEIGHTS[j] * math.exp(min(excess, 1.0))
         if largest < 0.5:
-            return sd * total
+            return float(sd * total)
     even, odd = 1.0, 0.0
     for j in range(1, _HALF + 1):
         for sign in (-1.0, 1.0):
@@ -274,7 +282,7 @@ def _narrow(
     allowed = 2e-3 if scene[7] is None else 1e-5
     if not abs(even - odd) <= allowed * (even + odd):
         return -1.0
-    return _STEP * sd * (even + odd)
+    return float(_STEP * sd * (even + odd))
 
 
 @compiled

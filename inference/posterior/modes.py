@@ -9,44 +9,38 @@ __all__ = ["range_modes"]
 
 Array = NDArray[np.float64]
 
-_LEAST_WEIGHT = 0.005
-_SEPARATION = 4.0  # standard deviations between two modes' tops
+_NEIGHBOURS = 10  # draws on either side that a gap is held against
+_GAP = 2.0  # times their span
 
 
-def range_modes(log_r: Array, tops: Array, widths: Array) -> tuple[Mode, ...]:
-    """Group the draws of one range by the mode that each was drawn from.
+def range_modes(ranges: Array) -> tuple[Mode, ...]:
+    """Group the draws of one range into modes separated by empty stretches of log r.
+
+    A gap between two neighbouring draws separates modes where it is wider than twice the span of
+    the ten draws on either side; among draws of one smooth density that happens by chance with
+    probability 3^-10 a gap. Modes of fewer than ten draws are not told apart from tails.
 
     Parameters
     ----------
-    log_r : ndarray, shape (n,)
-        Draws of log r.
-    tops, widths : ndarray, shape (n,)
-        log r at the top of the mode that each was drawn from, and its standard deviation.
+    ranges : ndarray, shape (n,)
+        Draws of a range [m].
 
     Returns
     -------
     tuple of Mode
-        By ascending range; those below half a percent left out. Over the draws of the parameters
-        one mode's tops form a chain without gaps; a gap of several widths separates two modes.
+        By ascending range: the median of each mode and its share of the draws.
     """
-    order = np.argsort(tops)
-    log_r, tops, widths = log_r[order], tops[order], widths[order]
-    gaps = np.diff(tops)
-    # the spread of the tops within a chain counts as well as the widths of single modes
-    typical = np.maximum(widths[:-1], widths[1:]) + _local_spread(gaps)
-    groups = np.split(np.arange(tops.size), np.flatnonzero(gaps > _SEPARATION * typical) + 1)
-    kept = [group for group in groups if group.size >= _LEAST_WEIGHT * tops.size]
-    total = sum(group.size for group in kept)
-    return tuple(Mode(float(np.exp(np.median(log_r[g]))), g.size / total) for g in kept)
-
-
-def _local_spread(gaps: Array) -> Array:
-    """Return the larger of the median gaps of the fifty neighbours on either side."""
-    spread = np.empty(gaps.size)
-    for k in range(gaps.size):
-        left = gaps[max(k - 50, 0) : k]
-        right = gaps[k + 1 : k + 51]
-        spread[k] = max(
-            (float(np.median(part)) for part in (left, right) if part.size), default=0.0
-        )
-    return spread
+    ordered = np.sort(ranges)
+    logs = np.log(ordered)
+    n, m = logs.size, _NEIGHBOURS
+    if n < 2 * m:
+        return (Mode(float(np.median(ordered)), 1.0),)
+    # gap k lies between draws k and k + 1; the m draws on either side of it end and begin there
+    index = np.arange(m - 1, n - m)
+    gap = logs[index + 1] - logs[index]
+    span = np.maximum(
+        logs[index] - logs[index - m + 1],
+        logs[np.minimum(index + m, n - 1)] - logs[index + 1],
+    )
+    cuts = index[(gap > _GAP * span) & (gap > 0)] + 1
+    return tuple(Mode(float(np.median(group)), group.size / n) for group in np.split(ordered, cuts))

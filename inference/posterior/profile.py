@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ _DIFFERENCE = 1e-5
 
 @compiled
 def _best_ranges(
+    out: Array,
     shapes: Array,
     crosstalks: Array | None,
     backgrounds: Array | None,
@@ -46,7 +48,6 @@ def _best_ranges(
     read: Pair,
     shot: float | None,
     relative: float | None,
-    out: Array,
 ) -> None:
     """Fill out[i, j] with u, log density and standard deviation of frame j's best mode."""
     modes = np.empty((MAX_MODES, 6))
@@ -83,6 +84,9 @@ def _best_ranges(
 
 @compiled
 def _moments(
+    means: Array,
+    slopes: Array,
+    parts: Array,
     shapes: Array,
     crosstalks: Array | None,
     backgrounds: Array | None,
@@ -93,9 +97,6 @@ def _moments(
     read: Pair,
     shot: float | None,
     relative: float | None,
-    means: Array,
-    slopes: Array,
-    parts: Array,
 ) -> None:
     """Fill means (n, frames, 2), and for the first vector slopes (frames, 2) and noise parts."""
     for i in range(shapes.shape[0]):
@@ -111,13 +112,13 @@ def _moments(
                 o1, o2 = object_readings(r, r0, wave, strength, shapes[i, 1], shapes[i, 2])
                 t1, t2 = object_slopes(r, r0, wave, strength, shapes[i, 1], shapes[i, 2])
             m1, m2 = o1, o2
-            if backgrounds is not None:
+            if backgrounds is not None and background is not None:
                 b1, b2 = background_readings(r, r0, wave, background)
                 m1, m2 = m1 + gain * b1, m2 + gain * b2
                 if math.isfinite(r):
                     a1, a2 = background_slopes(r, r0, wave, background)
                     t1, t2 = t1 + gain * a1, t2 + gain * a2
-            if crosstalks is not None:
+            if crosstalks is not None and crosstalk is not None:
                 m1, m2 = m1 + crosstalk[0], m2 + crosstalk[1]
             means[i, j, 0], means[i, j, 1] = m1, m2
             if i == 0:
@@ -145,7 +146,7 @@ def best_ranges(density: CollapsedDensity, z: Array) -> Array:
     """
     terms = density.parameters.terms(z)
     out = np.empty((z.shape[0], density.frames.shape[0], 3))
-    _best_ranges(*density.arguments(terms), out)
+    _best_ranges(out, *density.arguments(terms))
     return out
 
 
@@ -203,7 +204,8 @@ def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearis
     n = density.frames.shape[0]
     means = np.empty((2 * d + 1, n, 2))
     slopes, parts = np.empty((n, 2)), np.empty((n, 5))
-    _moments(*arguments[:3], positions, density.frames, *arguments[6:], means, slopes, parts)
+    everything: list[Any] = [*arguments[:3], positions, density.frames, *arguments[6:]]
+    _moments(means, slopes, parts, *everything)
     whitener = _whitener(parts)
     residual = np.einsum("nij,nj->ni", whitener, density.frames[:, :2] - means[0])
     change = (means[1 : d + 1] - means[d + 1 :]) / (2 * _DIFFERENCE)

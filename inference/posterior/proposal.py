@@ -1,12 +1,13 @@
 """A mixture of Student-t laws on the optima: importance sampling, and an emcee move."""
 
 import dataclasses
+import functools
 import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, special
+from scipy import special
 
 from inference.posterior.start import Optimum
 
@@ -40,14 +41,20 @@ class Mixture:
         d = self.centres.shape[1]
         constant = special.gammaln((_DEGREES + d) / 2) - special.gammaln(_DEGREES / 2)
         constant -= 0.5 * d * math.log(_DEGREES * math.pi)
-        parts = []
-        for centre, factor, weight in zip(self.centres, self.factors, self.weights, strict=True):
-            standard = linalg.solve_triangular(factor, (z - centre).T, lower=True)
-            square = np.einsum("ij,ij->j", standard, standard)
-            logdet = np.log(np.diagonal(factor)).sum()
-            tail = -0.5 * (_DEGREES + d) * np.log1p(square / _DEGREES)
-            parts.append(math.log(weight) + constant - logdet + tail)
-        return np.asarray(special.logsumexp(parts, axis=0))
+        logdet = np.log(np.diagonal(self.factors, axis1=1, axis2=2)).sum(axis=1)
+        tail = -0.5 * (_DEGREES + d) * np.log1p(self._squares(z) / _DEGREES)
+        parts = constant + tail + (np.log(self.weights) - logdet)[:, None]
+        return np.asarray(np.logaddexp.reduce(parts, axis=0))
+
+    @functools.cached_property
+    def _inverses(self) -> Array:
+        return np.asarray(np.linalg.inv(self.factors), dtype=np.float64)
+
+    def _squares(self, z: Array) -> Array:
+        """Return squared Mahalanobis distances, shape (m, n)."""
+        # einsum, not BLAS: its threads cost more than these few numbers
+        standard = np.einsum("mij,mnj->mni", self._inverses, z - self.centres[:, None])
+        return np.asarray(np.einsum("mni,mni->mn", standard, standard))
 
     def draw(self, random: np.random.Generator | np.random.RandomState, n: int) -> Array:
         """Draw n points, shape (n, d); emcee brings a RandomState."""
@@ -65,11 +72,8 @@ class Mixture:
 
     def nearest(self, z: Array) -> NDArray[np.intp]:
         """Return the component that each z of shape (n, d) belongs to most."""
-        distance = []
-        for centre, factor in zip(self.centres, self.factors, strict=True):
-            standard = linalg.solve_triangular(factor, (z - centre).T, lower=True)
-            distance.append(np.einsum("ij,ij->j", standard, standard))
-        return np.argmin(distance, axis=0)
+        nearest: NDArray[np.intp] = np.argmin(self._squares(z), axis=0)
+        return nearest
 
 
 def mixture_of(optima: Sequence[Optimum]) -> Mixture:

@@ -1,6 +1,7 @@
 """Draws of every range from p(r_i | theta, y_i), and readings replicated at them."""
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.frame_integral import (
     MAX_MODES,
+    falls_off,
     find_modes,
     frame_log_likelihood,
     integration_bounds,
@@ -23,7 +25,8 @@ __all__ = ["draw_ranges", "replicate"]
 
 Array = NDArray[np.float64]
 
-_SIDE = 64  # grid points on either side of a mode
+_SIDE = 40  # grid points on either side of a mode
+_FAR = 8.5  # standard deviations at which the grid ends where nothing is left
 
 
 @compiled
@@ -31,9 +34,10 @@ def _invert(
     mode: Array, probability: float, frame: Triple, scene: SceneArguments, grid: Array
 ) -> float:
     """Invert the cumulative density of a mode's interval on a grid graded away from its top."""
+    reach = _FAR * mode[2] if mode[2] < 1.0 and falls_off(mode, frame, scene) else math.inf
     for side in range(2):
         sign = -1.0 if side == 0 else 1.0
-        length = mode[0] - mode[3] if side == 0 else mode[4] - mode[0]
+        length = min(mode[0] - mode[3] if side == 0 else mode[4] - mode[0], reach)
         scale = min(mode[2], length)
         growth = math.asinh(length / scale) if scale > 0.0 else 0.0
         for j in range(_SIDE + 1):
@@ -64,6 +68,8 @@ def _invert(
 
 @compiled
 def _draw_ranges(
+    out: Array,
+    uniforms: Array,
     shapes: Array,
     crosstalks: Array | None,
     backgrounds: Array | None,
@@ -75,10 +81,8 @@ def _draw_ranges(
     read: Pair,
     shot: float | None,
     relative: float | None,
-    uniforms: Array,
-    out: Array,
 ) -> None:
-    """Fill out[i, j] with log r, and the position and width of the mode that it was drawn from."""
+    """Fill out[i, j] with log r."""
     modes = np.empty((MAX_MODES, 6))
     grid = np.empty((2 * _SIDE + 1, 2))
     for i in range(shapes.shape[0]):
@@ -92,7 +96,7 @@ def _draw_ranges(
         scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative)
         tabulate(table, bounds, shape, background, law, r0, wave)
         for j in range(frames.shape[0]):
-            out[i, j, :] = math.nan
+            out[i, j] = math.nan
             if present is not None and not present[j]:
                 continue
             frame = (frames[j, 0], frames[j, 1], frames[j, 2])
@@ -107,14 +111,15 @@ def _draw_ranges(
             for k in range(count):
                 mass = math.exp(modes[k, 5] - best)
                 if left <= mass or k == count - 1:
-                    out[i, j, 0] = _invert(modes[k], uniforms[i, j, 1], frame, scene, grid)
-                    out[i, j, 1], out[i, j, 2] = modes[k, 0], modes[k, 2]
+                    out[i, j] = _invert(modes[k], uniforms[i, j, 1], frame, scene, grid)
                     break
                 left -= mass
 
 
 @compiled
 def _replicate(
+    out: Array,
+    normals: Array,
     shapes: Array,
     crosstalks: Array | None,
     backgrounds: Array | None,
@@ -125,8 +130,6 @@ def _replicate(
     read: Pair,
     shot: float | None,
     relative: float | None,
-    normals: Array,
-    out: Array,
 ) -> None:
     """Fill out[i, j] with readings drawn at the log ranges positions[i, j]."""
     for i in range(positions.shape[0]):
@@ -139,10 +142,10 @@ def _replicate(
                 strength = gain * shapes[i, 0]
                 o1, o2 = object_readings(r, r0, wave, strength, shapes[i, 1], shapes[i, 2])
             m1, m2 = o1, o2
-            if backgrounds is not None:
+            if backgrounds is not None and background is not None:
                 b1, b2 = background_readings(r, r0, wave, background)
                 m1, m2 = m1 + gain * b1, m2 + gain * b2
-            if crosstalks is not None:
+            if crosstalks is not None and crosstalk is not None:
                 m1, m2 = m1 + crosstalk[0], m2 + crosstalk[1]
             own1, own2, shared, s1, s2 = noise_parts(
                 read, shot, relative, wave is None, (m1, m2), (o1, o2)
@@ -166,14 +169,13 @@ def draw_ranges(density: CollapsedDensity, z: Array, rng: np.random.Generator) -
 
     Returns
     -------
-    ndarray, shape (n, frames, 3)
-        log r; log r at the top of the mode that it was drawn from, and the mode's standard
-        deviation in log r. nan for a frame without object.
+    ndarray, shape (n, frames)
+        log r; nan for a frame without object.
     """
     n, frames = z.shape[0], density.frames.shape[0]
-    out = np.empty((n, frames, 3))
+    out = np.empty((n, frames))
     arguments = density.arguments(density.parameters.terms(z))
-    _draw_ranges(*arguments, rng.random((n, frames, 2)), out)
+    _draw_ranges(out, rng.random((n, frames, 2)), *arguments)
     return out
 
 
@@ -202,5 +204,6 @@ def replicate(
     arguments = density.arguments(density.parameters.terms(z))
     normals = rng.standard_normal((*positions.shape, 4))
     gains = np.ascontiguousarray(density.frames[:, 2])
-    _replicate(*arguments[:3], positions, gains, *arguments[6:], normals, out)
+    everything: list[Any] = [*arguments[:3], positions, gains, *arguments[6:]]
+    _replicate(out, normals, *everything)
     return out

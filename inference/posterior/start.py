@@ -5,6 +5,7 @@ biased (incidental parameters); each optimum is then refined on the collapsed de
 """
 
 import dataclasses
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,7 @@ class Optimum:
         """Log of its Laplace mass."""
         d = self.z.size
         logdet = float(np.log(np.diagonal(self.factor)).sum())
-        return self.log_density + logdet + 0.5 * d * np.log(2 * np.pi)
+        return self.log_density + logdet + 0.5 * d * math.log(2 * math.pi)
 
 
 def _profile(density: CollapsedDensity, z: Array) -> tuple[Array, Array]:

@@ -85,9 +85,9 @@ def _summaries_of_weights(
 
 
 def _range_summary(job: Job, drawn: Array) -> RangeSummary:
-    """Summarise draws of log r, shape (m, usable frames, 3), for all frames of the job."""
+    """Summarise draws of log r, shape (m, usable frames), for all frames of the job."""
     usable = np.flatnonzero(job.usable)
-    ranges = np.exp(drawn[:, :, 0])
+    ranges = np.exp(drawn)
     n = len(job.frames)
     columns = {name: np.full(n, np.nan) for name in ("q05", "q50", "q95", "mean", "sd")}
     modes: list[tuple[Mode, ...]] = [()] * n
@@ -99,7 +99,7 @@ def _range_summary(job: Job, drawn: Array) -> RangeSummary:
             r, [0.05, 0.5, 0.95]
         )
         columns["mean"][frame], columns["sd"][frame] = r.mean(), r.std(ddof=1)
-        modes[frame] = range_modes(*drawn[:, j].T)
+        modes[frame] = range_modes(r)
     return RangeSummary(**columns, modes=tuple(modes))
 
 
@@ -111,13 +111,9 @@ def _predictive_check(
     The replicates share the ranges' draws, so the p-value leans towards one half and the false
     alarms are rarer than stated. One replicate a draw.
     """
-    anew = replicate(density, z, log_r, rng)
-    seen = density.frame_log_likelihoods(z).sum(axis=1)
-    count = 0
-    for i in range(len(z)):
-        other = density.with_readings(anew[i])
-        count += float(other.log_likelihood(z[i : i + 1])[0]) <= float(seen[i])
-    p = (count + 0.5) / (len(z) + 1)
+    anew = density.paired_log_likelihood(z, replicate(density, z, log_r, rng))
+    seen = density.log_likelihood(z)
+    p = float((np.sum(anew <= seen) + 0.5) / (len(z) + 1))
     return Fit(p, p < _MISFIT)
 
 
@@ -242,16 +238,16 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
         summaries = _summaries_of_weights(names, draws[0, 0], weights)
     chosen = z[np.linspace(0, len(z) - 1, min(_RANGE_DRAWS, len(z))).astype(int)]
     drawn = draw_ranges(density, chosen, rng)
-    fit = _predictive_check(density, chosen, drawn[:, :, 0], rng)
+    fit = _predictive_check(density, chosen, drawn, rng)
     ranges = np.full((len(chosen), len(job.frames)), np.nan)
-    ranges[:, job.usable] = np.exp(drawn[:, :, 0])
+    ranges[:, job.usable] = np.exp(drawn)
     return Posterior(
         checkpoint.method,
         job.seed,
         verdict,
         summaries,
         _range_summary(job, drawn),
-        _identifiability(names, z, drawn[:, :, 0], parameters.range_prior),
+        _identifiability(names, z, drawn, parameters.range_prior),
         fit,
         _left_out(job.scene),
         Runtime(wall_s, cpu_s, checkpoint.calls, k_hat),

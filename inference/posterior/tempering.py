@@ -26,7 +26,7 @@ def _next_power(log_likelihood: Array, power: float) -> float:
 
     def surplus(step: float) -> float:
         weights = np.exp(step * span)
-        return float(weights.sum() ** 2 / (weights**2).sum()) - 0.5 * span.size
+        return float(weights.sum() ** 2 / (weights**2).sum() - 0.5 * span.size)
 
     rest = 1.0 - power
     if surplus(rest) >= 0:
