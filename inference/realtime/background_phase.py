@@ -62,12 +62,11 @@ def _between(low: float, high: float, goal: float, line: Line, p: Array) -> floa
 
 @compiled
 def _distance_to(
-    r: float, x: float, y: float, b: float, offset: float, far_phase: float, p: Array
+    r: float, x: float, y: float, b: float, far_cos: float, far_sin: float, p: Array
 ) -> float:
     """Return abs(x - B S(r) e^jkR), which turns an angle into a reading."""
     hidden = b * shadow(r, p[1], p[2])
-    angle = far_phase + offset
-    return math.hypot(x - hidden * math.cos(angle), y - hidden * math.sin(angle))
+    return math.hypot(x - hidden * far_cos, y - hidden * far_sin)
 
 
 @compiled
@@ -109,6 +108,7 @@ def solve_phase(
         Results, see `Candidates`; filled from the left.
     """
     distance, c0, c1, k = p[0], p[1], p[2], p[3]
+    far_cos, far_sin = math.cos(far_phase + offset), math.sin(far_phase + offset)
     quartic, turns, ends = np.empty(5), np.empty(5), np.empty(6)
     for i in range(first.size):
         largest = max(abs(first[i]), abs(second[i]))
@@ -119,22 +119,27 @@ def solve_phase(
         v1, v2, v12 = var1[i] / size / size, var2[i] / size / size, cov[i] / size / size
         rho = largest / size * math.hypot(first[i] / largest, second[i] / largest)
         psi = (math.atan2(y, x) - offset) % (2.0 * math.pi)
-        chi = far_phase - psi
-        cosine, sine, half = math.cos(chi), math.sin(chi), math.sin(0.5 * chi)
+        # e^j chi, chi = k R - psi, and sin^2(chi / 2) without cancellation
+        cosine, sine = (far_cos * x + far_sin * y) / rho, (far_sin * x - far_cos * y) / rho
+        half = 0.5 * sine * sine / (1.0 + cosine) if cosine > 0.0 else 0.5 * (1.0 - cosine)
         # x - B S e^jkR is mu - nu S e^j chi as seen from x
         mu, nu = rho, b
         top = max(mu, nu)
         mu, nu = mu / top, nu / top
         line = (psi, mu, nu, cosine, sine)
-        whole = (mu - nu) * (mu - nu) + 4.0 * mu * nu * half * half
-        real = mu * ((mu - nu) + 2.0 * nu * half * half)
+        whole = (mu - nu) * (mu - nu) + 4.0 * mu * nu * half
+        real = mu * ((mu - nu) + 2.0 * nu * half)
         twist = mu * nu * sine
         quartic[0] = k * whole
         quartic[1] = 2.0 * k * whole * c1
         quartic[2] = k * (whole * c1 * c1 + 2.0 * real * c0)
         quartic[3] = 2.0 * c0 * (k * real * c1 + twist)
         quartic[4] = c0 * (k * mu * mu * c0 + twist * c1)
-        count = real_roots(quartic, 0.0, distance, turns)
+        # with twist >= 0 theta can only turn where 2 r + c1' < 0, if the twist is strong enough
+        least = mu * c0 - 0.25 * c1 * c1 * math.sqrt(whole)
+        count = 0
+        if twist < 0.0 or not (least > 0.0 and k * least * least > -twist * c0 * min(c1, 0.0)):
+            count = real_roots(quartic, 0.0, distance, turns)
         ends[0] = LEAST
         for j in range(count):
             ends[j + 1] = turns[j]
@@ -158,13 +163,20 @@ def solve_phase(
                     continue
                 hidden = b * shadow(r, c0, c1)
                 slope = b * shadow_slope(r, c0, c1)
-                far = k * (distance - r)
-                cs, sn = math.cos(k * r + offset), math.sin(k * r + offset)
-                flux = x * cs + y * sn - hidden * math.cos(far)
-                steep = -k * flux - slope * math.sin(far)
+                # the object's own direction, and the background's as seen from it
+                cs, sn = x - hidden * far_cos, y - hidden * far_sin
+                length = math.hypot(cs, sn)
+                if length > 0.0:
+                    sign = 1.0 if turn % 2.0 == 0.0 else -1.0
+                    cs, sn = sign * cs / length, sign * sn / length
+                else:
+                    cs, sn = math.cos(k * r + offset), math.sin(k * r + offset)
+                cos_far, sin_far = far_cos * cs + far_sin * sn, far_sin * cs - far_cos * sn
+                flux = x * cs + y * sn - hidden * cos_far
+                steep = -k * flux - slope * sin_far
                 spread = math.sqrt(max(sn * sn * v1 + cs * cs * v2 - 2.0 * sn * cs * v12, 0.0))
                 sd = spread / abs(steep)
-                lever = slope * math.cos(far) / steep
+                lever = slope * cos_far / steep
                 g1, g2 = cs - lever * sn, sn + lever * cs
                 flux_sd = math.sqrt(max(g1 * g1 * v1 + g2 * g2 * v2 + 2.0 * g1 * g2 * v12, 0.0))
                 slack = band * flux_sd + 64.0 * EPSILON * (rho + b) * (1.0 + abs(lever))
@@ -176,7 +188,7 @@ def solve_phase(
                     if inner:
                         at = low if side == 0 else high
                         gap = abs((left if side == 0 else right) - goal)
-                        reach = gap * _distance_to(at, x, y, b, offset, far_phase, p)
+                        reach = gap * _distance_to(at, x, y, b, far_cos, far_sin, p)
                         if reach < band * spread:
                             close = True
                 roots[i, found] = r
@@ -191,6 +203,6 @@ def solve_phase(
                 gap = 2.0 * math.pi * abs(off - math.floor(off + 0.5))
                 cs, sn = math.cos(k * high + offset), math.sin(k * high + offset)
                 spread = math.sqrt(max(sn * sn * v1 + cs * cs * v2 - 2.0 * sn * cs * v12, 0.0))
-                reach = gap * _distance_to(high, x, y, b, offset, far_phase, p)
+                reach = gap * _distance_to(high, x, y, b, far_cos, far_sin, p)
                 if reach < band * spread:
                     near_frame[i] = True
