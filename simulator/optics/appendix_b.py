@@ -90,10 +90,10 @@ def sweep(
         modulation = Modulation(frequency_hz=FREQUENCY_HZ if sine else None)
         plates = [scene.plate(float(d)) for d in distances_m]
         lights = observe_batch(plates, modulation=modulation, points=_POINTS)
-        ranges = [
+        exact = [
             light.phase_distance_m(modulation) if sine else light.distance_m for light in lights
         ]
-        return np.array(ranges), np.array([light.flux for light in lights])
+        return np.array(exact), np.array([light.flux for light in lights])
     theta, step = facet_polar_grid(_GRID)
     sums = facet_plate(
         distances_m,
@@ -107,8 +107,8 @@ def sweep(
         step,
     )
     flux = sums[:, 0]
-    ranges = np.arctan2(sums[:, 3], sums[:, 2]) / wave_number if sine else sums[:, 1] / flux
-    return np.asarray(ranges), flux
+    phases = np.arctan2(sums[:, 3], sums[:, 2])
+    return np.asarray(phases / wave_number if sine else sums[:, 1] / flux), flux
 
 
 def simulate(

@@ -146,7 +146,7 @@ def reflect(
             if material[at + 3] > 0.0:
                 f = fresnel_dielectric(cos_wh, f)
             value += 0.25 * material[at + 1] * d * g * f
-    return value
+    return float(value)
 
 
 class ConstantFresnel(Validated):

@@ -36,7 +36,7 @@ _INFINITE = 1e5
 
 @compiled
 def _dot(a: Array, b: Array) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 @compiled
@@ -48,7 +48,7 @@ def _spread(head: Array) -> float:
         return 3.0 / math.sqrt(head[13])
     if head[12] == 2.0:
         return 0.0
-    return min(head[15], 1.4)
+    return float(min(head[15], 1.4))
 
 
 @compiled
@@ -57,7 +57,10 @@ def _cones(head: Array, table: Array) -> Array:
     if head[12] == 3.0:
         return np.array([math.cos(head[13])])
     if head[12] == 4.0:
-        return np.cos(table[0])
+        cosines = np.empty(table.shape[1])
+        for i in range(cosines.size):
+            cosines[i] = math.cos(table[0, i])
+        return cosines
     return np.empty(0)
 
 

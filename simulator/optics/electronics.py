@@ -1,4 +1,4 @@
-"""What electronics do to readings: drift with temperature, dead time, noise, range and resolution."""
+"""What electronics do to readings: drift, dead time, noise, full scale and resolution."""
 
 import math
 from typing import Annotated

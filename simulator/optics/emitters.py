@@ -4,6 +4,7 @@
 emitter is part of the kernel, it lives in I_e (errata, section 0).
 """
 
+import itertools
 import math
 from typing import Annotated, Literal
 
@@ -55,27 +56,27 @@ def intensity(pattern: Array, at: int, table: Array, cosine: float, sine: float)
         return 0.0
     kind = pattern[at]
     if kind == 0.0:
-        return pattern[at + 2]
+        return float(pattern[at + 2])
     if kind == 1.0:
         power = pattern[at + 1]
-        return pattern[at + 2] * (cosine if power == 1.0 else cosine**power)
+        return float(pattern[at + 2] * (cosine if power == 1.0 else cosine**power))
     angle = math.atan2(sine, cosine)
     if kind == 2.0:
-        return pattern[at + 2] * math.atan2(cosine, sine)
+        return float(pattern[at + 2] * math.atan2(cosine, sine))
     if kind == 3.0:
         if angle >= pattern[at + 1]:
             return 0.0
         half = math.cos(0.5 * math.pi * angle / pattern[at + 1])
-        return pattern[at + 2] * half * half
+        return float(pattern[at + 2] * half * half)
     if angle < table[0, 0] or angle > table[0, -1]:
         return 0.0
     i = min(max(np.searchsorted(table[0], angle) - 1, 0), table.shape[1] - 2)
     h = table[0, i + 1] - table[0, i]
     t = (angle - table[0, i]) / h
     u = 1.0 - t
-    return u * u * ((1.0 + 2.0 * t) * table[1, i] + t * h * table[2, i]) + t * t * (
-        (1.0 + 2.0 * u) * table[1, i + 1] - u * h * table[2, i + 1]
-    )
+    left = (1.0 + 2.0 * t) * table[1, i] + t * h * table[2, i]
+    right = (1.0 + 2.0 * u) * table[1, i + 1] - u * h * table[2, i + 1]
+    return float(u * u * left + t * t * right)
 
 
 class Uniform(Validated):
@@ -144,7 +145,7 @@ class Table(Validated):
     @pydantic.field_validator("angle_rad")
     @classmethod
     def _rises(cls, angles: tuple[float, ...]) -> tuple[float, ...]:
-        if not all(low < high for low, high in zip(angles, angles[1:], strict=False)):
+        if not all(low < high for low, high in itertools.pairwise(angles)):
             raise ValueError("angles must be sorted and distinct")
         if angles[0] < 0 or angles[-1] > math.pi / 2:
             raise ValueError("angles must lie between 0 and pi/2")
@@ -247,7 +248,7 @@ def pack_pattern(pattern: Pattern) -> tuple[Array, Array]:
         x, w = np.polynomial.legendre.leggauss(12)
         raw = np.array([TABLE, 0.0, 1.0, angle[-1]])
         total = 0.0
-        for low, high in zip(angle[:-1], angle[1:], strict=True):
+        for low, high in itertools.pairwise(angle):
             nodes = 0.5 * (high - low) * x + 0.5 * (high + low)
             values = [intensity(raw, 0, table, math.cos(a), math.sin(a)) for a in nodes]
             total += math.pi * (high - low) * float(np.sum(w * np.sin(nodes) * values))

@@ -1,7 +1,7 @@
 """The layout of packed arrays that the optical kernels share, and the light path at a point.
 
-A kernel knows a surface as a chart: a base point and three axes such that a point lies at ``radial``
-from the base along a ray ``u`` of the chart's plane.
+A kernel knows a surface as a chart: a base point and three axes such that a point lies at
+``radial`` from the base along a ray ``u`` of the chart's plane.
 
 ========  ==========================  =================================  ==================
 chart     base                        point P                            area element
@@ -83,10 +83,9 @@ def light_path(
         sy = ez * head[3] - ex * head[5]
         sz = ex * head[4] - ey * head[3]
         sine = math.sqrt(sx * sx + sy * sy + sz * sz) * inverse_i
-    if head[12] == 0.0:  # the plainest pattern is not worth a call
-        emitted = head[14]
-    else:
-        emitted = intensity(head, 12, table, ahead * inverse_i, sine)
+    # the plainest pattern is not worth a call
+    plain = head[12] == 0.0
+    emitted = head[14] if plain else intensity(head, 12, table, ahead * inverse_i, sine)
     if emitted == 0.0:
         return 0.0, ri, ro
     cos_i, cos_o = min(height_i * inverse_i, 1.0), min(height_o * inverse_o, 1.0)

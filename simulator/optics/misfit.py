@@ -1,8 +1,8 @@
 """How wrong the Object Parameter Model is, by class of scene.
 
 The thesis reads a mean square as a percentage: its "average error below 0.1 %" is a root mean
-square of 2.6 % with facet noise, 1 to 3 % without. The misfit is smooth along log r, so that it does
-not average out over frames; inference takes its size and correlation length from here.
+square of 2.6 % with facet noise, 1 to 3 % without. The misfit is smooth along log r, so that it
+does not average out over frames; inference takes its size and correlation length from here.
 
 The table in ``misfit_table.py`` is made by ``python -m simulator.optics.misfit``.
 """

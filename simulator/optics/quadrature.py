@@ -79,7 +79,7 @@ def _error(worst: float, size: float) -> float:
     """Return QUADPACK's estimate of the error from the disagreement of the two rules of a pair."""
     if worst == 0.0 or size == 0.0:
         return worst
-    return size * min(1.0, (200.0 * worst / size) ** 1.5)
+    return float(size * min(1.0, (200.0 * worst / size) ** 1.5))
 
 
 @compiled
@@ -283,7 +283,7 @@ def _along_ray(
             if work[i, 2] > work[worst, 2]:
                 worst = i
         if work[0, 2] <= tolerance * work[0, 3] or number >= most:
-            return work[0, 2]
+            return float(work[0, 2])
         middle = 0.5 * (work[worst, 0] + work[worst, 1])
         number += 1
         work[number, 0], work[number, 1] = middle, work[worst, 1]

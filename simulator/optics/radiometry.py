@@ -29,6 +29,7 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
 AnySurface = Rectangle | Disk | Plane | Sphere
 
 _STATUS: dict[int, Status] = {
@@ -49,7 +50,7 @@ def _observe_many(
     signal: Array,
     rules: tuple[Array, Array],
     tolerance: float,
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Counts]:
     count = surfaces.shape[0]
     values = np.zeros((count, COMPONENTS))
     errors = np.zeros(count)
@@ -104,7 +105,7 @@ def _rules(points: int | None) -> tuple[Array, Array]:
     return rule, rule
 
 
-def _lights(values: Array, errors: Array, states: Array, modulation: Modulation) -> list[Light]:
+def _lights(values: Array, errors: Array, states: Counts, modulation: Modulation) -> list[Light]:
     lights = []
     for value, error, (state, _) in zip(values, errors, states, strict=True):
         if state == charts.INSIDE:

@@ -72,7 +72,8 @@ def _inside(lines: Array, circle: Array, x: float, y: float, slack: float) -> bo
     for i in range(lines.shape[0]):
         if lines[i, 0] * x + lines[i, 1] * y > lines[i, 2] + slack:
             return False
-    return circle[2] <= 0.0 or math.hypot(x - circle[0], y - circle[1]) <= circle[2] + slack
+    distance = math.hypot(x - circle[0], y - circle[1])
+    return bool(circle[2] <= 0.0 or distance <= circle[2] + slack)
 
 
 @compiled
@@ -200,10 +201,10 @@ def sectors(
         fx, fy, width = features[i, 0], features[i, 1], features[i, 2]
         distance = math.hypot(fx, fy)
         if distance > 0.0:
-            for j in (-3.0, -1.0, 0.0, 1.0, 3.0):
-                turn = j * width / distance
-                events[count, 0] = fx - turn * fy
-                events[count, 1] = turn * fx + fy
+            for multiple in (-3.0, -1.0, 0.0, 1.0, 3.0):
+                shift = multiple * width / distance
+                events[count, 0] = fx - shift * fy
+                events[count, 1] = shift * fx + fy
                 count += 1
     angles = np.empty(count + 2)
     used = 0

@@ -1,5 +1,6 @@
 """The slow, obvious way: the printed kernel on a parametrised surface, by adaptive cubature."""
 
+import itertools
 import math
 from collections.abc import Callable
 
@@ -163,8 +164,8 @@ def cubature(
     """Flux and mean distance."""
     total = np.zeros(2)
     xs, ys = (np.linspace(low[i], high[i], pieces[i] + 1) for i in (0, 1))
-    for x0, x1 in zip(xs[:-1], xs[1:], strict=True):
-        for y0, y1 in zip(ys[:-1], ys[1:], strict=True):
+    for x0, x1 in itertools.pairwise(xs):
+        for y0, y1 in itertools.pairwise(ys):
             result = integrate.cubature(
                 f, [x0, y0], [x1, y1], rule="gk21", rtol=rtol, atol=0, max_subdivisions=3000
             )

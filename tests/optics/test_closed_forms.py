@@ -24,16 +24,18 @@ TOLERANCE = 1e-12
 
 def _moment(pattern: cf.ClosedPattern, n: int, angle: mp.mpf) -> mp.mpf:
     """Return int I_e cos^n sin dt in 40 digits."""
-    if isinstance(pattern, Linear):
-        shape = lambda t: (mp.pi / 2 - t) / (mp.pi * (mp.pi - 2))  # noqa: E731
-    else:
-        power = pattern.exponent if isinstance(pattern, CosinePower) else 0
-        shape = lambda t: (power + 1) / (2 * mp.pi) * mp.cos(t) ** power  # noqa: E731
+    power = pattern.exponent if isinstance(pattern, CosinePower) else 0
+
+    def shape(t: mp.mpf) -> mp.mpf:
+        if isinstance(pattern, Linear):
+            return (mp.pi / 2 - t) / (mp.pi * (mp.pi - 2))
+        return (power + 1) / (2 * mp.pi) * mp.cos(t) ** power
+
     return mp.quad(lambda t: shape(t) * mp.cos(t) ** n * mp.sin(t), [0, angle / 2, angle])
 
 
 def _is_close(value: float, expected: mp.mpf) -> bool:
-    return abs(mp.mpf(value) / expected - 1) < TOLERANCE
+    return bool(abs(mp.mpf(value) / expected - 1) < TOLERANCE)
 
 
 @pytest.mark.parametrize("pattern", PATTERNS, ids=str)
