@@ -1,11 +1,14 @@
 """From validated requests to checked arguments of the layers below."""
 
-from simulator.errors import InvalidInputError, Problem
+from simulator.errors import InvalidInputError, Problem, RefusedError
 from simulator.frames import FrameColumns, Frames, frames_from_columns
 from simulator.scene import Scene, check_scene
-from simulator.sensor import Sensor
+from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = ["system", "system_with_frames"]
+
+# roots that an answer may hold: about a gigabyte
+_MOST_ROOTS = 50_000_000
 
 
 def system(sensor: Sensor, scene: Scene) -> tuple[Sensor, Scene]:
@@ -52,6 +55,8 @@ def system_with_frames(
     ------
     InvalidInputError
         With pointers below ``/scene`` and ``/frames``, of both at once.
+    RefusedError
+        Where the answer would have more roots than memory has room for.
     """
     problems: list[Problem] = []
     frames = None
@@ -65,4 +70,20 @@ def system_with_frames(
         problems += error.below("/frames").problems
     if problems or frames is None:
         raise InvalidInputError(*problems)
+    _check_aliases(sensor, scene, len(frames))
     return sensor, scene, frames
+
+
+def _check_aliases(sensor: Sensor, scene: Scene, n: int) -> None:
+    """Refuse a background so many wavelengths away that every frame has a multitude of roots."""
+    if isinstance(sensor, PulsedSensor) or scene.background is None:
+        return
+    distance = scene.background.distance_m
+    if not isinstance(distance, float | int):
+        return
+    aliases = 1.0 + distance / sensor.max_range_m
+    if n * aliases > _MOST_ROOTS:
+        raise RefusedError(
+            f"the background lies {aliases:.3g} unambiguous ranges away, and each of {n} frames "
+            "may have as many roots; lower the frequency or send fewer frames"
+        )

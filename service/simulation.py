@@ -37,8 +37,12 @@ def simulation_of(request: SimulationRequest) -> dict[str, Any]:
     """
     sensor, scene = system(request.sensor, request.scene)
     seed = secrets.randbelow(2**53) if request.seed is None else request.seed
-    simulation = simulate(sensor, scene, request.trajectory, seed)
-    if not np.isfinite(simulation.frames.readings).all():
+    # what overflows is refused below, all of it at once
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        simulation = simulate(sensor, scene, request.trajectory, seed)
+    times = () if simulation.frames.time_s is None else simulation.frames.time_s
+    drawn = list(simulation.parameters.values())
+    if not all(np.isfinite(part).all() for part in (simulation.frames.readings, times, drawn)):
         message = "the readings of this scene overflow; bring gain, ranges and noise nearer to 1"
         raise RefusedError(message)
     ranges = [None if math.isnan(value) else value for value in simulation.range_m.tolist()]

@@ -171,6 +171,16 @@ async def test_unphysical_frame_has_a_status(
     assert bad["roots_m"] == []
 
 
+async def test_multitude_of_aliases(client: httpx.AsyncClient) -> None:
+    noise = {"read": [1e-6, 1e-6]}
+    body = {
+        "sensor": {"kind": "sine_wave", "frequency_hz": 1e20, "noise": noise},
+        "scene": {"background": {"strength": 1.0, "distance_m": 3.0, "shadow": "object"}},
+        "frames": {"i": [0.1], "q": [0.1]},
+    }
+    assert_problem(await client.post("/v1/estimates", json=body), 422)
+
+
 @pytest.mark.parametrize("content", [b"", b"{", b"nope", b"\xff\xfe", b"[" * 100_000])
 async def test_malformed_body(client: httpx.AsyncClient, content: bytes) -> None:
     for route in ("estimates", "posteriors", "simulations"):
