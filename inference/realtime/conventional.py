@@ -65,8 +65,9 @@ def _pulsed_range(flat: Array, r0: float, ct1: float, ct2: float) -> Array:
     out = np.empty(flat.size // 2)
     for i in range(out.size):
         late, whole = flat[2 * i] - ct1, flat[2 * i + 1] - ct2
-        good = (late > 0.0) & (late <= whole) & (whole < math.inf)
-        out[i] = r0 * (late / whole) if good else math.nan
+        r = r0 * (late / whole)
+        good = (r > 0.0) & (late > 0.0) & (late <= whole) & (whole < math.inf)
+        out[i] = r if good else math.nan
     return out
 
 
@@ -115,7 +116,14 @@ def _pulsed(
         variance = var1 + first - shared + share * share * (var2 + second - shared)
         variance += (1.0 - share) * (1.0 - share) * shared
         sd = r0 * inverse * math.sqrt(variance)
-        good = (low <= r) & (r <= high) & (late > 0.0) & (late <= whole) & (whole < math.inf)
+        good = (
+            (low <= r)
+            & (r <= high)
+            & (r > 0.0)
+            & (late > 0.0)
+            & (late <= whole)
+            & (whole < math.inf)
+        )
         good &= (sd < math.inf) & (abs(raw1) < full[0]) & (abs(raw2) < full[1])
         roots[i] = r if good else math.nan
         sds[i] = sd if good else math.nan

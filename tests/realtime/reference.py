@@ -347,7 +347,9 @@ def reference_roots(case: Case, m1: Any, m2: Any, high: float | None = None) -> 
             unit = mp.mpf(max(case.r, 1e-3))
             scaled = [c * unit ** (len(coefficients) - 1 - n) for n, c in enumerate(coefficients)]
             top = max(abs(c) for c in scaled)
-            every = mp.polyroots([c / top for c in scaled], maxsteps=2000, extraprec=800)
+            every = mp.polyroots(
+                [c / top for c in scaled[::-1]], maxsteps=2000, extraprec=800, asc=True
+            )
             real = [z.real * unit for z in every if abs(z.imag) <= mp.mpf(10) ** -35 * abs(z)]
             roots = sorted(
                 r for r in real if 0 < r < high or (r == high and not case.has_background)
@@ -390,7 +392,7 @@ def sensitivity(case: Case, r: Any, m1: float, m2: float) -> float:
             def equation(x: Any, a: Any, b: Any) -> Any:
                 if not case.pulsed:
                     b = mp.hypot(a, b)
-                return mp.polyval(_polynomial(case, a, b), x)
+                return mp.polyval(_polynomial(case, a, b)[::-1], x, asc=True)
         elif case.technique == "conventional":
             return float(
                 (abs(mp.mpf(m1) * m2) * 2 / (mp.mpf(m1) ** 2 + mp.mpf(m2) ** 2)) / (case.k * r)
