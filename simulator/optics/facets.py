@@ -1,7 +1,8 @@
 """The thesis's own grid of facets, kept to reproduce and to judge its numbers.
 
 It is a midpoint-like rule on an equal-angle polar grid whose facets count wholly or not at all, so
-it converges as 1/N at best (errata, section 8, "Convergence"); `simulator.optics.quadrature` is
+it converges as 1/N^2 on a shell or plane and as 1/N, unevenly, once the object has an edge
+(errata, section 8, "Convergence"); `simulator.optics.quadrature` is
 the one to use.
 """
 

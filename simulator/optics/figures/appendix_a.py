@@ -72,7 +72,8 @@ def _figure_a_6(figure: Figure) -> None:
         # A'/A = -N/r turns the derivative by atan(k r / N) back (errata, first 23); it approaches,
         # so that the amplitude grows and the phase is not turned by pi
         n = np.interp(middle, grid, power)
-        return middle, x[_WINDOW:], np.angle(change) + np.arctan(_K * middle / n)
+        half = _WINDOW // 2
+        return middle, x[half : half + middle.size], np.angle(change) + np.arctan(_K * middle / n)
 
     ax = axes(
         figure,
@@ -89,10 +90,13 @@ def _figure_a_6(figure: Figure) -> None:
     fast_r, _, fast_phase = moving(20.0)
     ax.plot(fast_r, fast_phase * degrees, "r-", lw=1.2, label="vector differentiation, 20 m/s")
     ax.plot(r, np.angle(still + scatter) * degrees, "g-", label="conventional, with backscatter")
-    # the static part is what is left after amplitude and phase of the moving one are taken away:
-    # weighted towards near frames, where the derivative is strong
-    modelled = np.abs(_at(slow_r, grid, phasors)) * np.exp(1j * slow_phase)
-    weight = np.abs(np.gradient(np.abs(modelled)))
+    # the static part is what is left after the moving one is taken away, whose phase the derivative
+    # gives to noise / change, and to about 1e-3 in any case
+    amplitude = np.abs(_at(slow_r, grid, phasors))
+    n = np.interp(slow_r, grid, power)
+    change = n * 2.5 * _SAMPLE_S * _WINDOW / slow_r
+    weight = 1.0 / ((_NOISE / change) ** 2 + (1e-3 * amplitude) ** 2)
+    modelled = amplitude * np.exp(1j * slow_phase)
     found = np.sum(weight * (slow_x - modelled)) / np.sum(weight)
     ax.plot(
         r,

@@ -70,10 +70,12 @@ def _error(figure: Figure, scene: str, number: str, column: int) -> None:
     ax = axes(figure, title, "distance d [m]", "relative error of the facets", y_log=True)
     exact = _exact(scene)[column]
     floor = 1e-16
+    least = 1.0
     for n in _GRIDS:
-        error = np.abs(_facets(scene, n)[column] / exact - 1.0)
-        ax.plot(_DISTANCES, np.maximum(error, floor), ".-", label=f"n = {n}")
-    ax.set_ylim(floor / 2, 1.0)
+        error = np.maximum(np.abs(_facets(scene, n)[column] / exact - 1.0), floor)
+        ax.plot(_DISTANCES, error, ".-", label=f"n = {n}")
+        least = min(least, float(np.min(error)))
+    ax.set_ylim(least / 3, 0.1 if least > 1e-10 else 1e-12)
     ax.legend(ncols=2, loc="upper right")
     note(figure, _NOTE + f"; errors below {floor:g} are drawn there")
 

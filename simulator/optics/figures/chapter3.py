@@ -148,14 +148,16 @@ def _figure_3_5(figure: Figure) -> None:
 
 
 def _figure_3_6(figure: Figure) -> None:
-    surfaces = [("diffuse", Material())]
-    surfaces += [(f"m = {m:g}", _shiny(m)) for m in (0.5, 0.2, 0.1, 0.05, 0.01)]
-    curves = [(name, _sweep(0.8, 0.8, material=material)) for name, material in surfaces]
+    surfaces = [("diffuse alone", Material(diffuse=0.5))]
+    for m in (0.5, 0.2, 0.1, 0.05, 0.01):
+        material = _shiny(m).model_copy(update={"diffuse": 0.5, "specular": 0.5})
+        surfaces.append((f"with specular, m = {m:g}", material))
+    curves = [(name, _sweep(0.4, 0.4, material=material)) for name, material in surfaces]
     _curves(
         figure,
         "Figure 3-6: rectangles of different surface properties",
         curves,
-        "0.8 m x 0.8 m (its edge 0.4 m from the axis), Beckmann distribution, F = 0.669",
+        "0.4 m x 0.4 m, k_d = k_s = 0.5, Beckmann distribution, F = 0.669",
     )
 
 

@@ -1,5 +1,7 @@
 """Axes and notes that the figures share."""
 
+import textwrap
+
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -25,4 +27,4 @@ def axes(
 
 def note(figure: Figure, text: str) -> None:
     """State below the axes the parameters that the thesis's caption lacks."""
-    figure.supxlabel(text, fontsize=7, color="0.35")
+    figure.supxlabel("\n".join(textwrap.wrap(text, 115)), fontsize=7, color="0.35")
