@@ -78,23 +78,27 @@ class Pose(Validated):
         Its centre [m]; the default sensor sits at the origin and looks along +z.
     normal : (float, float, float)
         Normal of the face; both faces reflect, so the sign does not matter.
-    width_axis : (float, float, float)
-        Direction of the width, as far as it is orthogonal to the normal.
+    width_axis : (float, float, float), optional
+        Direction of the width, as far as it is orthogonal to the normal. Left out: the x axis, or
+        the y axis for a normal within 25 degrees of x.
     """
 
     position_m: Position
     normal: Unit = (0.0, 0.0, -1.0)
-    width_axis: Unit = (1.0, 0.0, 0.0)
+    width_axis: Unit | None = None
 
     @pydantic.model_validator(mode="after")
     def _spans(self) -> "Pose":
-        if math.hypot(*cross(self.normal, self.width_axis)) < 1e-6:
+        if self.width_axis and math.hypot(*cross(self.normal, self.width_axis)) < 1e-6:
             raise ValueError("normal and width_axis must not be parallel")
         return self
 
     def axes(self) -> tuple[Vector, Vector, Vector]:
         """Return the orthonormal directions of width, height and normal."""
-        v = normalised(cross(self.normal, self.width_axis))
+        width = self.width_axis
+        if width is None:
+            width = (1.0, 0.0, 0.0) if abs(self.normal[0]) < 0.9 else (0.0, 1.0, 0.0)
+        v = normalised(cross(self.normal, width))
         return cross(v, self.normal), v, self.normal
 
     def moved(self, offset_m: Vector) -> "Pose":
@@ -117,7 +121,7 @@ class Pose(Validated):
             update={
                 "position_m": centre,
                 "normal": normalised(rotated(self.normal, axis, angle_rad)),
-                "width_axis": normalised(rotated(self.width_axis, axis, angle_rad)),
+                "width_axis": normalised(rotated(self.axes()[0], axis, angle_rad)),
             }
         )
 
