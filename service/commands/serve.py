@@ -38,6 +38,8 @@ def _run(args: argparse.Namespace) -> int:
         create_app(settings),
         host=args.host,
         port=args.port,
+        # a line a request goes to standard output, which is for results
+        access_log=False,
         # an open connection must not hold up the end
         timeout_graceful_shutdown=round(settings.shutdown_s),
     )
