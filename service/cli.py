@@ -2,7 +2,7 @@
 
 Results go to standard output as JSON, everything else to standard error. The exit code is 0 for an
 answer, 2 for input that breaks a rule, 3 for input without an honest answer, 4 for a failure of
-the program, 130 after Ctrl-C.
+the program (1 for one that nobody foresaw, with its traceback), 130 after Ctrl-C.
 """
 
 import argparse

@@ -58,7 +58,10 @@ def _run(args: argparse.Namespace) -> int:
         )
         record = asyncio.run(_infer(request))
     write_result(json.dumps(full(record), allow_nan=False).encode())
-    return 0 if record.problem is None else 3
+    if record.problem is None:
+        return 0
+    sys.stderr.write(f"hybridtof: error: {record.problem['detail']}\n")
+    return 3 if record.problem["status"] < 500 else 4
 
 
 async def _infer(request: "PosteriorRequest") -> "JobRecord":

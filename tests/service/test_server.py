@@ -19,6 +19,9 @@ import pytest
 from tests.service.conftest import FRAMES, SCENE, SENSOR
 
 
+pytestmark = pytest.mark.slow
+
+
 def fake_server(sleep: float, max_body_bytes: int = 10**6) -> tuple[str, ...]:
     """Command of a server whose posteriors take six times ``sleep`` seconds."""
     arguments = (str(sleep), str(max_body_bytes))
@@ -152,15 +155,14 @@ def test_ctrl_c_ends_an_inference(tmp_path: Path) -> None:
     (tmp_path / "frames.json").write_text(json.dumps(FRAMES))
     command = hybridtof("infer", str(tmp_path / "frames.json"), "--scene",
                         str(tmp_path / "scene.json"), "--target-ess", "1000000")  # fmt: skip
-    process = subprocess.Popen(
+    with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment()
-    )
-    while not (workers := children(process.pid)):
-        assert process.poll() is None
-        time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=30)
-    assert process.returncode == 128 + signal.SIGINT
+    ) as process:
+        while not (workers := children(process.pid)) and process.poll() is None:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=30)
+    assert process.returncode == 128 + signal.SIGINT, err
     assert out == ""
     assert err.endswith("hybridtof: interrupted\n")
     assert "Traceback" not in err
