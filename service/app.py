@@ -32,7 +32,7 @@ def create_app(settings: Settings | None = None, fold: Fold = posterior_fold) ->
     Returns
     -------
     FastAPI
-        An ASGI application; jobs run between its start and its end (ASGI lifespan).
+        An ASGI application; jobs run from its start to its end (ASGI lifespan).
     """
     settings = settings or Settings()
     pool = ProcessPool(settings.workers)

@@ -18,7 +18,6 @@ import pytest
 
 from tests.service.conftest import FRAMES, SCENE, SENSOR
 
-
 pytestmark = pytest.mark.slow
 
 
