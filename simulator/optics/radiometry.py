@@ -30,6 +30,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
+Points = int | tuple[int, int]
 AnySurface = Rectangle | Disk | Plane | Sphere
 
 _STATUS: dict[int, Status] = {
@@ -98,11 +99,13 @@ def _pack_shell(shell: Shell, emitter: Emitter, detector: Detector) -> Array:
     )
 
 
-def _rules(points: int | None) -> tuple[Array, Array]:
+def _rules(points: Points | None) -> tuple[Array, Array]:
     if points is None:
         return GAUSS_KRONROD, GAUSS_KRONROD
-    rule = gauss_rule(points)
-    return rule, rule
+    outer, inner = points if isinstance(points, tuple) else (points, points)
+    if not (1 <= outer <= 1000 and 1 <= inner <= 1000):
+        raise InvalidInputError.at("/points", "must be between 1 and 1000")
+    return gauss_rule(outer), gauss_rule(inner)
 
 
 def _lights(values: Array, errors: Array, states: Counts, modulation: Modulation) -> list[Light]:
@@ -139,7 +142,7 @@ def observe_batch(
     modulation: Modulation | None = None,
     *,
     tolerance: float = 1e-11,
-    points: int | None = None,
+    points: Points | None = None,
 ) -> list[Light]:
     """Return what each of several surfaces would send on its own.
 
@@ -153,8 +156,9 @@ def observe_batch(
         Default: neither pulse nor sine wave; flux and distance only.
     tolerance : float
         Relative, of the flux.
-    points : int, optional
-        A fixed Gauss rule of that many points a piece instead of adaptive quadrature.
+    points : int or (int, int), optional
+        Fixed Gauss rules of that many points (across rays, along a ray) a piece instead of adaptive
+        quadrature.
 
     Returns
     -------
@@ -191,7 +195,7 @@ def observe(
     modulation: Modulation | None = None,
     *,
     tolerance: float = 1e-11,
-    points: int | None = None,
+    points: Points | None = None,
 ) -> Light:
     """Return what a surface sends to the detector; see `observe_batch`."""
     return observe_batch(

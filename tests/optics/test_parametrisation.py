@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from simulator.errors import InvalidInputError
 from simulator.optics.closed_forms import disk_distance, disk_flux, disk_shadow
@@ -17,10 +18,12 @@ from simulator.optics.parametrisation import (
     fit_shadow,
 )
 
-RANGES = np.logspace(-1, 0.3, 40)
+Array = NDArray[np.float64]
+
+RANGES: Array = np.logspace(-1, 0.3, 40)
 
 
-def _flux(c0: float, c1: float, c2: float, r: np.ndarray = RANGES) -> np.ndarray:  # type: ignore[type-arg]
+def _flux(c0: float, c1: float, c2: float, r: Array = RANGES) -> Array:
     return np.asarray(c0 * c2 / (r * r * (r * r + c1 * r + c0)))
 
 
@@ -161,6 +164,7 @@ def test_power_law() -> None:
         effective_power_law(RANGES[::-1], RANGES)
 
 
+@pytest.mark.slow
 def test_committed_misfit_table_is_what_the_code_measures() -> None:
     table = model_misfit()
     measured = {row.scene_class: row for row in measure()}

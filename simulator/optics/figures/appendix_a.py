@@ -64,7 +64,7 @@ def _figure_a_6(figure: Figure) -> None:
         """Return distance, readings, and phase from the derivative of an approaching object."""
         step = speed * _SAMPLE_S
         count = int((3.0 - 0.3) / step)
-        r = 3.0 - step * np.arange(count)
+        r = 3.0 - step * np.arange(count, dtype=np.float64)
         x = _at(r, grid, phasors) + scatter
         x = x + _NOISE * (rng.standard_normal(count) + 1j * rng.standard_normal(count))
         change = x[_WINDOW:] - x[:-_WINDOW]

@@ -42,7 +42,7 @@ def _sweep(
     material: Material | None = None,
     distances: Array = _DISTANCES,
 ) -> tuple[Array, Array]:
-    material = material or Material()
+    material = Material() if material is None else material
     plates = [
         Rectangle(
             width_m=width, height_m=height, pose=pose(float(d)), material=material or Material()

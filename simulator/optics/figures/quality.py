@@ -38,7 +38,7 @@ def _convergence(figure: Figure) -> None:
     )
     ahead, tilted = Pose(position_m=(0, 0, 1)), Pose(position_m=(0.2, 0.1, 1), normal=(0.3, 0, -1))
     glossy = Material(diffuse=0.0, specular=1.0, roughness=0.1)
-    surfaces = {
+    surfaces: dict[str, Plane | Disk | Rectangle | Sphere] = {
         "plane": Plane(pose=ahead),
         "disk": Disk(radius_m=0.4, pose=ahead),
         "disk, tilted": Disk(radius_m=0.4, pose=tilted),
