@@ -73,7 +73,9 @@ def direction(kind: int, u: float, p: Array) -> tuple[float, float]:
     q = quadratic(u, c0, c1)
     b = -2.0 - u * (2.0 * u + c1) / q  # d log Phi / d log u
     if kind == DIFFERENTIAL_RATIO:
-        return b, u * (1.0 + b)
+        # b and 1 + b as polynomials, because 1 + b may cancel
+        under, over = u * (4.0 * u + 3.0 * c1) + 2.0 * c0, u * (3.0 * u + 2.0 * c1) + c0
+        return -under / q, -u * over / q
     # u dPhi_bg/du over Phi
     qs = quadratic(u, float(p[C0_SHADOW]), float(p[C1_SHADOW]))
     rate = float(p[CONTRAST]) * (u * u) * (q / c0)

@@ -79,15 +79,15 @@ def target_of(task: Task, rate: Net) -> Targets:
     """
     sensor = task.sensor
     with np.errstate(all="ignore"):
-        # scaled, so that nothing overflows
+        # scaled by a power of two, so that nothing overflows or rounds
         size = np.maximum(np.abs(rate.first), np.abs(rate.second))
         still = size == 0
-        safe = np.where(still, 1.0, size)
-        d1, d2 = rate.first / safe, rate.second / safe
+        exponent = np.frexp(np.where(np.isfinite(size), size, 1.0))[1]
+        d1, d2 = np.ldexp(rate.first, -exponent), np.ldexp(rate.second, -exponent)
         usable = (rate.state == 0) & ~still
         if isinstance(sensor, PulsedSensor):
             ratio = d1 / d2
-            variance = rate.variance(1.0 / safe / d2, -ratio / safe / d2)
+            variance = rate.variance(1.0 / rate.second, -ratio / rate.second)
             sd = sensor.r0 * np.sqrt(variance)
             top = np.where(usable, sensor.r0 * d1, np.nan)
             contact = (ratio <= 0) & (sensor.r0 * ratio > -NOISE_BAND * sd)
@@ -95,7 +95,8 @@ def target_of(task: Task, rate: Net) -> Targets:
         length = np.hypot(d1, d2)
         angle = np.arctan2(d2, d1) - sensor.phase_offset_rad
         phase = np.mod(angle, np.pi)
-        sd = np.sqrt(rate.variance(-d2 / length / length / safe, d1 / length / length / safe))
+        size = np.ldexp(length, exponent)
+        sd = np.sqrt(rate.variance(-d2 / length / size, d1 / length / size))
         band = np.minimum(NOISE_BAND * sd, 0.25 * np.pi)
         contact = (phase > np.pi - band) | (phase == 0)
         return Targets(np.where(usable, phase, np.nan), np.ones_like(phase), sd, contact, still)

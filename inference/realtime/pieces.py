@@ -8,6 +8,7 @@ background (errata, section 5).
 
 import dataclasses
 import math
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,9 @@ from inference.realtime.curves import (
     C0,
     C0_SHADOW,
     C1,
+    C1_SHADOW,
     CANCELLING_RATIO,
+    CONTRAST,
     DIFFERENTIAL_PHASE,
     DIFFERENTIAL_RATIO,
     DISTANCE,
@@ -91,7 +94,8 @@ def pieces_of(kind: int, p: Array, low: float, high: float) -> Pieces:
     folds = np.isin(ends, turns)
     if kind == BOTH_PHASE:
         return _unwrapped(p, points, turns)
-    values = np.array([[value(kind, u, p) for u in pair] for pair in ends.tolist()])
+    at = _exact_ratio if kind in (DIFFERENTIAL_RATIO, BOTH_RATIO) else value
+    values = np.array([[at(kind, u, p) for u in pair] for pair in ends.tolist()])
     for i, (left, right) in enumerate(ends.tolist()):
         inside = direction(kind, math.sqrt(left) * math.sqrt(right), p)[0] if poles else 0.0
         for side, end in enumerate((left, right)):
@@ -99,6 +103,21 @@ def pieces_of(kind: int, p: Array, low: float, high: float) -> Pieces:
                 numerator = direction(kind, end, p)[1]
                 values[i, side] = math.copysign(math.inf, numerator * math.copysign(1.0, inside))
     return Pieces(ends, values, folds)
+
+
+def _exact_ratio(kind: int, u: float, p: Array) -> float:
+    """Evaluate a ratio exactly: at a turning point its value decides how many roots there are."""
+    r, c0, c1, far, c0s, c1s, contrast = (
+        Fraction(float(x))
+        for x in (u, p[C0], p[C1], p[DISTANCE], p[C0_SHADOW], p[C1_SHADOW], p[CONTRAST])
+    )
+    q = r * (r + c1) + c0
+    # numerator and denominator of d(r Phi + R Phi_bg) / d(Phi + Phi_bg), times r^3 Q^2 / c0
+    top, bottom = -r * (3 * r * r + 2 * c1 * r + c0), -(4 * r * r + 3 * c1 * r + 2 * c0)
+    if kind == BOTH_RATIO:
+        rate = contrast / c0 * c0s * (2 * r + c1s) * r**3 * (q / (r * (r + c1s) + c0s)) ** 2
+        top, bottom = top + far * rate, bottom + rate
+    return float(top / bottom) if bottom else math.inf
 
 
 def _roots(coefficients: tuple[float, ...], low: float, high: float) -> list[float]:
