@@ -18,8 +18,8 @@ SHORT = 64
 MAX_ENTRIES = 2_000_000
 
 _TOKENS = re.compile(rb'"(?:[^"\\]|\\.)*"|[\[\]{}]', re.DOTALL)
-# more digits than any 64-bit integer has: such a number is read as the float that it is close to
-_MAX_DIGITS = 19
+# a longer text is no 64-bit integer: such a number is read as the float that it is close to
+_MAX_DIGITS = 20
 
 
 class _Repeated(dict[str, Any]):

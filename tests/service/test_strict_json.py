@@ -83,7 +83,8 @@ def test_numbers_without_end() -> None:
     assert decode(b"1" * 5000) == math.inf
     assert decode(b"1e400") == math.inf
     assert math.isnan(decode(b"NaN"))
-    assert decode(b"123456789012345678") == 123456789012345678
+    for exact in (2**63, -(2**63), 2**64 - 1):
+        assert decode(str(exact).encode()) == exact
 
 
 @pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf, "1.5", None, True, [1.0], {}])
