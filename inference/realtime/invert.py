@@ -94,8 +94,8 @@ def invert(
                     u = solve_between(kind, ends[j, 0], ends[j, 1], goal, 1.0, p)
                 else:
                     u = solve_between(kind, ends[j, 0], ends[j, 1], top[i], bottom[i], p)
-                # neighbouring pieces share their end, where a double root is one root; two roots that
-                # rounding cannot tell apart stay two
+                # neighbouring pieces share their end, where a double root is one root; but two
+                # roots that rounding cannot tell apart stay two
                 if goal != values[j, 0] or abs(u - last) > 4e-16 * u:
                     roots[i, found] = u
                     slopes[i, found] = slope(kind, u, p)
