@@ -19,6 +19,7 @@ __all__ = [
     "RECTANGLE",
     "ROUND",
     "build_chart",
+    "shell_chart",
 ]
 
 Array = NDArray[np.float64]
@@ -37,6 +38,24 @@ _INFINITE = 1e5
 @compiled
 def _dot(a: Array, b: Array) -> float:
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@compiled
+def _arms(surface: Array, head: Array) -> tuple[Array, Array]:
+    """Return emitter and detector as seen from the surface's centre."""
+    to_e, to_d = np.empty(3), np.empty(3)
+    for i in range(3):
+        to_e[i] = head[i] - surface[1 + i]
+        to_d[i] = head[6 + i] - surface[1 + i]
+    return to_e, to_d
+
+
+@compiled
+def _lobes(width: float) -> Array:
+    """Return the radii at which a lobe is cut into pieces."""
+    lobes = np.empty(3)
+    lobes[0], lobes[1], lobes[2] = 1.5 * width, 4.0 * width, 8.0 * width
+    return lobes
 
 
 @compiled
@@ -95,11 +114,13 @@ def _half_plane(chart: Array, direction: Array, height: float, reach: float) -> 
 def _flat(surface: Array, head: Array, table: Array, material: Array, late: float) -> Chart:
     chart = np.zeros(33)
     chart[0] = FLAT
-    chart[1:10] = surface[4:13]
-    to_e, to_d = head[0:3] - surface[1:4], head[6:9] - surface[1:4]
+    for i in range(1, 10):
+        chart[i] = surface[3 + i]
+    to_e, to_d = _arms(surface, head)
     height_i, height_o = _dot(to_e, surface[10:13]), _dot(to_d, surface[10:13])
     if height_i < 0.0 or (height_i == 0.0 and height_o < 0.0):
-        chart[7:10] = -chart[7:10]
+        for i in range(7, 10):
+            chart[i] = -chart[i]
         height_i, height_o = -height_i, -height_o
     none = np.empty(0)
     empty = (np.empty((0, 3)), np.zeros(3))
@@ -115,8 +136,9 @@ def _flat(surface: Array, head: Array, table: Array, material: Array, late: floa
     ue, ve, ud, vd = _dot(to_e, u), _dot(to_e, v), _dot(to_d, u), _dot(to_d, v)
     share = height_i / (height_i + height_o)
     qu, qv = ue + (ud - ue) * share, ve + (vd - ve) * share
-    chart[12:15] = u * (qu - ue) + v * (qv - ve) - chart[7:10] * height_i
-    chart[15:18] = u * (qu - ud) + v * (qv - vd) - chart[7:10] * height_o
+    for i in range(3):
+        chart[12 + i] = u[i] * (qu - ue) + v[i] * (qv - ve) - chart[7 + i] * height_i
+        chart[15 + i] = u[i] * (qu - ud) + v[i] * (qv - vd) - chart[7 + i] * height_o
     chart[18], chart[19] = height_i, height_o
     both = 2.0 * height_o * share  # harmonic mean: the slope of the half vector is rho / both
     chart[11] = min(height_i, height_o)
@@ -146,7 +168,8 @@ def _flat(surface: Array, head: Array, table: Array, material: Array, late: floa
         if line[2] == -math.inf:
             return OUT_OF_VIEW, chart, empty, marks
         if line[2] < math.inf:
-            lines[edges] = line
+            for j in range(3):
+                lines[edges, j] = line[j]
             edges += 1
     rings = np.empty(2)
     count = 0
@@ -160,7 +183,7 @@ def _flat(surface: Array, head: Array, table: Array, material: Array, late: floa
         count += 1
     lobes = none
     if material[1] > 0.0:
-        lobes = np.array([1.5, 4.0, 8.0]) * material[2] * both
+        lobes = _lobes(material[2] * both)
         chart[32] = 1.0 if together and material[0] == 0.0 else 0.0
     features = np.empty((0, 3))
     spread = _spread(head)
@@ -179,12 +202,17 @@ def _flat(surface: Array, head: Array, table: Array, material: Array, late: floa
 @compiled
 def _frame(chart: Array) -> None:
     """Complete the axis in chart[7:10] to an orthonormal frame."""
-    n = chart[7:10]
-    helper = np.zeros(3)
-    helper[np.argmin(np.abs(n))] = 1.0
-    side = np.cross(n, helper)
-    chart[1:4] = side / math.sqrt(_dot(side, side))
-    chart[4:7] = np.cross(n, chart[1:4])
+    x, y, z = chart[7], chart[8], chart[9]
+    # across the smaller of two components
+    if abs(x) < abs(y):
+        size = math.hypot(y, z)
+        chart[1], chart[2], chart[3] = 0.0, z / size, -y / size
+    else:
+        size = math.hypot(x, z)
+        chart[1], chart[2], chart[3] = -z / size, 0.0, x / size
+    chart[4] = y * chart[3] - z * chart[2]
+    chart[5] = z * chart[1] - x * chart[3]
+    chart[6] = x * chart[2] - y * chart[1]
 
 
 @compiled
@@ -193,21 +221,24 @@ def _round(surface: Array, head: Array, material: Array, late: float) -> Chart:
     chart[0] = SPHERE
     radius = surface[13]
     chart[10] = radius
-    to_e, to_d = head[0:3] - surface[1:4], head[6:9] - surface[1:4]
+    to_e, to_d = _arms(surface, head)
     size_e, size_d = math.sqrt(_dot(to_e, to_e)), math.sqrt(_dot(to_d, to_d))
     none = np.empty(0)
     empty = (np.empty((0, 3)), np.zeros(3))
     marks = (none, np.empty((0, 3)), np.empty((0, 4)), none, none)
     if size_e <= radius or size_d <= radius:
         return INSIDE, chart, empty, marks
-    axis = to_e / size_e + to_d / size_d
+    axis = np.empty(3)
+    for i in range(3):
+        axis[i] = to_e[i] / size_e + to_d[i] / size_d
     length = math.sqrt(_dot(axis, axis))
     if length < 1e-9:  # emitter and detector on opposite sides
         return OPPOSITE, chart, empty, marks
-    chart[7:10] = axis / length
+    for i in range(3):
+        chart[7 + i] = axis[i] / length
+        chart[12 + i] = radius * chart[7 + i] - to_e[i]
+        chart[15 + i] = radius * chart[7 + i] - to_d[i]
     _frame(chart)
-    chart[12:15] = surface[1:4] + radius * chart[7:10] - head[0:3]
-    chart[15:18] = surface[1:4] + radius * chart[7:10] - head[6:9]
     # the farther horizon of the two, as an angle at the centre
     angle_e = math.acos(min(_dot(chart[7:10], to_e) / size_e, 1.0))
     gap_e, gap_d = size_e - radius, size_d - radius
@@ -224,11 +255,13 @@ def _round(surface: Array, head: Array, material: Array, late: float) -> Chart:
     together = to_e[0] == to_d[0] and to_e[1] == to_d[1] and to_e[2] == to_d[2]
     planes = np.empty((4, 4))
     for i in range(2):
-        direction = head[9:12] if i == 0 else head[3:6]
+        first = 9 - 6 * i
         arm = to_d if i == 0 else to_e
-        planes[i, :3], planes[i, 3] = direction, _dot(direction, arm) / radius
-    planes[2, :3], planes[2, 3] = to_e, radius
-    planes[3, :3], planes[3, 3] = to_d, radius
+        for j in range(3):
+            planes[i, j] = head[first + j]
+            planes[3 - i, j] = arm[j]
+        planes[i, 3] = _dot(head[first : first + 3], arm) / radius
+        planes[3 - i, 3] = radius
     rings = np.empty(2)
     count = 0
     if material[1] > 0.0 and material[5] == 0.0:
@@ -243,14 +276,16 @@ def _round(surface: Array, head: Array, material: Array, late: float) -> Chart:
             count += 1
     lobes = none
     if material[1] > 0.0:
-        lobes = np.array([1.5, 4.0, 8.0]) * material[2] * gap / size
+        lobes = _lobes(material[2] * gap / size)
     features = np.empty((0, 3))
     spread = _spread(head)
     along = -_dot(head[3:6], to_e)
     across2 = size_e * size_e - along * along
     if spread >= 0.0 and along > 0.0 and across2 < radius * radius:
         run = along - math.sqrt(radius * radius - across2)
-        hit = (to_e + run * head[3:6]) / radius
+        hit = np.empty(3)
+        for i in range(3):
+            hit[i] = (to_e[i] + run * head[3 + i]) / radius
         cosine = _dot(hit, chart[7:10])
         # Lambert's equal-area projection about the axis
         stretch = math.sqrt(2.0 / (1.0 + cosine)) if cosine > -0.999 else 0.0
@@ -264,18 +299,21 @@ def _round(surface: Array, head: Array, material: Array, late: float) -> Chart:
 
 
 @compiled
-def _shell(backdrop: Array, head: Array) -> Chart:
+def shell_chart(backdrop: Array, head: Array) -> Chart:
     """Chart of a shell around the sensor, by directions from the detector."""
     chart = np.zeros(33)
     chart[0] = SHELL
-    chart[7:10] = head[9:12]
+    for i in range(3):
+        chart[7 + i] = head[9 + i]
     _frame(chart)
     chart[11] = 1.0
-    chart[20:33] = backdrop
+    for i in range(13):
+        chart[20 + i] = backdrop[i]
     circle = np.zeros(3)
     circle[2] = 0.5 * math.pi
     planes = np.zeros((1, 4))
-    planes[0, :3] = head[3:6]
+    for i in range(3):
+        planes[0, i] = head[3 + i]
     features = np.empty((0, 3))
     spread = _spread(head)
     if spread >= 0.0:
@@ -291,21 +329,17 @@ def _shell(backdrop: Array, head: Array) -> Chart:
 
 
 @compiled
-def build_chart(
-    surface: Array, head: Array, table: Array, material: Array, late: float, backdrop: Array | None
-) -> Chart:
+def build_chart(surface: Array, head: Array, table: Array, material: Array, late: float) -> Chart:
     """Return the chart of a surface, its region and its marks.
 
     Parameters
     ----------
     surface : ndarray, shape (15,)
-        Row of a surface; of length 0 for the backdrop itself.
+        Row of a surface.
     head, table, material : ndarray
         Packed emitter and detector, table of the emitter, reflectance.
     late : float
         r0 of a pulse [m], 0 for none.
-    backdrop : ndarray or None
-        A shell.
 
     Returns
     -------
@@ -316,8 +350,6 @@ def build_chart(
     region, marks : tuple of ndarray
         See `simulator.optics.quadrature.integrate`.
     """
-    if backdrop is not None and surface.size == 0:
-        return _shell(backdrop, head)
     if surface[0] == ROUND:
         return _round(surface, head, material, late)
     return _flat(surface, head, table, material, late)

@@ -13,7 +13,7 @@ from simulator.compiled import compiled
 from simulator.errors import InvalidInputError
 from simulator.optics import charts
 from simulator.optics.brdf import pack_material
-from simulator.optics.charts import build_chart
+from simulator.optics.charts import build_chart, shell_chart
 from simulator.optics.detectors import Detector
 from simulator.optics.emitters import Emitter, Narrow, pack_pattern
 from simulator.optics.light import Light, Modulation, Status, dark
@@ -58,9 +58,10 @@ def _observe_many(
     states = np.zeros((count, 2), dtype=np.int64)
     late = 1.0 / signal[1] if signal[1] > 0.0 else 0.0
     for i in range(count):
-        status, chart, region, marks = build_chart(
-            surfaces[i], head, table, materials[i], late, backdrop
-        )
+        if backdrop is not None and surfaces.shape[1] == 0:
+            status, chart, region, marks = shell_chart(backdrop, head)
+        else:
+            status, chart, region, marks = build_chart(surfaces[i], head, table, materials[i], late)
         states[i, 0] = status
         if status != 0:
             continue

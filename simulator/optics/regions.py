@@ -121,6 +121,18 @@ def _corners(lines: Array, circle: Array) -> Array:
 
 
 @compiled
+def _sort(values: Array, count: int) -> None:
+    """Sort the first values by insertion: they are few, and numpy's sort is long to compile."""
+    for i in range(1, count):
+        value = values[i]
+        j = i
+        while j > 0 and values[j - 1] > value:
+            values[j] = values[j - 1]
+            j -= 1
+        values[j] = value
+
+
+@compiled
 def sectors(
     lines: Array, circle: Array, rings: Array, features: Array
 ) -> tuple[Array, Array, float]:
@@ -151,8 +163,11 @@ def sectors(
     reference = np.array([1.0, 0.0])
     size = 0.0
     if corners.shape[0] > 0:
-        x, y = np.mean(corners[:, 0]), np.mean(corners[:, 1])
-        size = np.max(np.abs(corners))
+        x, y = 0.0, 0.0
+        for i in range(corners.shape[0]):
+            x += corners[i, 0] / corners.shape[0]
+            y += corners[i, 1] / corners.shape[0]
+            size = max(size, abs(corners[i, 0]), abs(corners[i, 1]))
     elif circle[2] > 0.0 and _inside(lines, circle, circle[0], circle[1], 0.0):
         x, y = circle[0], circle[1]
         size = circle[2] + math.hypot(x, y)
@@ -169,10 +184,12 @@ def sectors(
         if circle[2] > 0.0:
             nearest = min(nearest, max(math.hypot(circle[0], circle[1]) - circle[2], 0.0))
     k = lines.shape[0]
-    events = np.empty((corners.shape[0] + k * (1 + 2 * rings.size) + 2 + 5 * len(features) + 3, 2))
+    events = np.empty(
+        (corners.shape[0] + k * (1 + 2 * rings.size) + 2 + 5 * features.shape[0] + 3, 2)
+    )
     count = 0
     for i in range(corners.shape[0]):
-        events[count] = corners[i]
+        events[count, 0], events[count, 1] = corners[i, 0], corners[i, 1]
         count += 1
     # where an edge comes nearest, and where it leaves a ring
     for i in range(k):
@@ -186,7 +203,7 @@ def sectors(
             number, points = _crossings(lines[i], 0.0, 0.0, rings[j])
             for m in range(number):
                 if _inside(lines, circle, points[m, 0], points[m, 1], slack):
-                    events[count] = points[m]
+                    events[count, 0], events[count, 1] = points[m, 0], points[m, 1]
                     count += 1
     if circle[2] > 0.0:
         size_c = math.hypot(circle[0], circle[1])
@@ -197,7 +214,7 @@ def sectors(
                 events[count, 0] = c * circle[0] - turn * circle[1]
                 events[count, 1] = turn * circle[0] + c * circle[1]
                 count += 1
-    for i in range(len(features)):
+    for i in range(features.shape[0]):
         fx, fy, width = features[i, 0], features[i, 1], features[i, 2]
         distance = math.hypot(fx, fy)
         if distance > 0.0:
@@ -216,10 +233,11 @@ def sectors(
             )
             used += 1
     angles[used], angles[used + 1] = -math.pi, math.pi
-    angles = np.sort(angles[: used + 2])
-    panels = np.empty((2 * angles.size, 5))
+    used += 2
+    _sort(angles, used)
+    panels = np.empty((used, 5))
     number = 0
-    for i in range(angles.size - 1):
+    for i in range(used - 1):
         low, high = angles[i], angles[i + 1]
         if not high - low > 1e-15:
             continue

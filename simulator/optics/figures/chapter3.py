@@ -42,11 +42,10 @@ def _sweep(
     material: Material | None = None,
     distances: Array = _DISTANCES,
 ) -> tuple[Array, Array]:
-    material = Material() if material is None else material
+    if material is None:
+        material = Material()
     plates = [
-        Rectangle(
-            width_m=width, height_m=height, pose=pose(float(d)), material=material or Material()
-        )
+        Rectangle(width_m=width, height_m=height, pose=pose(float(d)), material=material)
         for d in distances
     ]
     lights = observe_batch(plates, tolerance=1e-8)
