@@ -45,6 +45,9 @@ class InvalidInputError(HybridTofError, ValueError):
         self.problems = problems
         super().__init__("; ".join(f"{p.pointer or '/'}: {p.message}" for p in problems))
 
+    def __reduce__(self) -> tuple[type["InvalidInputError"], tuple[Problem, ...]]:
+        return type(self), self.problems  # so that it survives the way between processes
+
     @classmethod
     def at(cls, pointer: str, message: str) -> "InvalidInputError":
         """Build the error of a single field."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.proposal import Mixture
 
-__all__ = ["Ensemble", "advance", "new_ensemble"]
+__all__ = ["Ensemble", "advance", "forget", "new_ensemble"]
 
 Array = NDArray[np.float64]
 
@@ -73,6 +73,16 @@ def new_ensemble(coords: Array, log_prob: Array, seed: np.random.SeedSequence) -
         np.empty((0, walkers)),
         np.zeros(walkers, dtype=np.int64),
         (np.asarray(state[1], dtype=np.uint32), int(state[2])),
+    )
+
+
+def forget(ensemble: Ensemble) -> Ensemble:
+    """Return the ensemble where it stands, without its past."""
+    return dataclasses.replace(
+        ensemble,
+        chain=ensemble.chain[:0],
+        chain_log_prob=ensemble.chain_log_prob[:0],
+        accepted=np.zeros_like(ensemble.accepted),
     )
 
 

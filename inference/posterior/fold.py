@@ -19,15 +19,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.collapsed import CollapsedDensity
-from inference.posterior.diagnostics import effective_sample_size, split_r_hat
-from inference.posterior.ensemble import Ensemble, advance, new_ensemble
+from inference.posterior.diagnostics import (
+    autocorrelation_time,
+    effective_sample_size,
+    split_r_hat,
+)
+from inference.posterior.ensemble import Ensemble, advance, forget, new_ensemble
 from inference.posterior.importance import MAX_K_HAT, WeightedDraws, draw_weighted
 from inference.posterior.job import Checkpoint, Job, chains, prepare
-from inference.posterior.proposal import Mixture, mixture_of
+from inference.posterior.proposal import Mixture, adapted, mixture_of
 from inference.posterior.start import Optimum, climb, find_optima, refine
 from inference.posterior.summary import summarise
 from inference.posterior.tempering import tempered_walkers
-from inference.posterior.verdict import Verdict, judge
+from inference.posterior.verdict import Chains, Verdict, judge
 from simulator.errors import RefusedError
 
 __all__ = [
@@ -52,6 +56,9 @@ _IMPORTANCE_DRAWS = 2000
 _MOST_IMPORTANCE_DRAWS = 200_000
 _CHUNK_S = 0.4  # of the first chunk; later ones grow to about a second
 _MOST_STEPS = 20_000
+_MOST_ADAPTATIONS = 4
+_FAST = 6.0  # steps of autocorrelation below which the proposal needs no adaptation
+_PILOT_DRAWS = 6000
 _EVALUATION_S = 1.2e-6  # a frame under one parameter vector, for sizing chunks only
 
 
@@ -60,7 +67,7 @@ class Task:
     """One ensemble's share of a chunk."""
 
     job: Job
-    mixture: Mixture
+    proposal: Mixture
     ensemble: Ensemble
     steps: int
 
@@ -119,7 +126,7 @@ def start(job: Job) -> Checkpoint:
         known = Verdict(True, ())
         if not np.isfinite(density(np.empty((1, 0)))[0]):
             raise RefusedError("no range allowed by the scene explains every frame")
-        return Checkpoint("importance", None, (), None, 1, known, None, None, True)
+        return Checkpoint("importance", None, None, 0, (), None, 1, known, None, None, True)
     optima = find_optima(density, job.stream(0))
     tempered, calls = tempered_walkers(density, job.stream(1), WALKERS)
     if len(tempered):
@@ -148,11 +155,23 @@ def start(job: Job) -> Checkpoint:
                 else (f"the effective sample size is {weighted.ess:.0f}, below the target",),
             )
             return Checkpoint(
-                "importance", mixture, (), weighted, calls, verdict, weighted.ess, None, True
+                "importance",
+                mixture,
+                mixture,
+                0,
+                (),
+                weighted,
+                calls,
+                verdict,
+                weighted.ess,
+                None,
+                True,
             )
     ensembles = _ensembles(density, mixture, tempered, job)
     calls += WALKERS * len(ensembles)
-    return Checkpoint("emcee", mixture, ensembles, None, calls, pending, None, None, False)
+    return Checkpoint(
+        "emcee", mixture, mixture, 0, ensembles, None, calls, pending, None, None, False
+    )
 
 
 def _with(optima: list[Optimum], found: Optimum | None) -> list[Optimum]:
@@ -211,19 +230,19 @@ def tasks(job: Job, checkpoint: Checkpoint) -> tuple[Task, ...]:
 
     The size of a chunk is counted in evaluations, never timed, so that it is the same everywhere.
     """
-    if checkpoint.finished or checkpoint.mixture is None:
+    proposal = checkpoint.proposal
+    if checkpoint.finished or proposal is None:
         return ()
     done = checkpoint.ensembles[0].steps
     step_s = 5e-4 + WALKERS * int(job.usable.sum()) * _EVALUATION_S
     seconds = _CHUNK_S if done == 0 else 2 * _CHUNK_S
     steps = int(min(max(seconds / step_s, 20), 500, _MOST_STEPS - done))
-    mixture = checkpoint.mixture
-    return tuple(Task(job, mixture, ensemble, steps) for ensemble in checkpoint.ensembles)
+    return tuple(Task(job, proposal, ensemble, steps) for ensemble in checkpoint.ensembles)
 
 
 def run(task: Task) -> Piece:
     """Run one part of a chunk."""
-    ensemble = advance(task.job.density(), task.mixture, task.ensemble, task.steps)
+    ensemble = advance(task.job.density(), task.proposal, task.ensemble, task.steps)
     return Piece(ensemble, task.steps * WALKERS)
 
 
@@ -235,6 +254,8 @@ def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoi
         calls=checkpoint.calls + sum(piece.calls for piece in pieces),
     )
     kept = chains(job, checkpoint)
+    if checkpoint.adaptations < _MOST_ADAPTATIONS and _is_slow(kept):
+        return _adapt(job, checkpoint, kept)
     verdict = judge(kept, job.settings.target_ess)
     columns = np.moveaxis(kept.z, -1, 0)
     least = min(effective_sample_size(draws) for draws in columns)
@@ -245,6 +266,29 @@ def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoi
         ess=least if math.isfinite(least) else None,
         r_hat=worst if math.isfinite(worst) else None,
         finished=verdict.converged or checkpoint.ensembles[0].steps >= _MOST_STEPS,
+    )
+
+
+def _is_slow(kept: Chains) -> bool:
+    """Tell whether some parameter needs more than a few steps to be forgotten."""
+    steps = kept.z.shape[2]
+    taus = [autocorrelation_time(x.reshape(-1, steps).T) for x in np.moveaxis(kept.z, -1, 0)]
+    return not max(taus) < _FAST  # a parameter that does not move has no finite time
+
+
+def _adapt(job: Job, checkpoint: Checkpoint, kept: Chains) -> Checkpoint:
+    """Adapt the proposal to what was drawn so far, and forget the draws."""
+    if checkpoint.optima is None:
+        raise ValueError("nothing was sampled")
+    rng = job.stream(6 + checkpoint.adaptations)
+    flat = kept.z.reshape(-1, kept.z.shape[-1])
+    pilot = flat[np.linspace(0, len(flat) - 1, min(len(flat), _PILOT_DRAWS)).astype(int)]
+    return dataclasses.replace(
+        checkpoint,
+        proposal=adapted(checkpoint.optima, pilot, rng),
+        adaptations=checkpoint.adaptations + 1,
+        ensembles=tuple(forget(ensemble) for ensemble in checkpoint.ensembles),
+        verdict=Verdict(False, ("the proposal was still being adapted",)),
     )
 
 

@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 MAX_MODES = 64
 _KNOT_SPACING = 0.0365  # 192 knots over the default prior's seven e-folds
 _FEWEST_KNOTS = 192
-_NEGLIGIBLE = 42.0  # nats below the best mode: exp(-42) is below rounding
+_NEGLIGIBLE = 30.0  # nats below the best: exp(-30) of a mass changes no digit that counts
 _STEP = 0.7  # of the trapezoidal rule, in standard deviations
 _HALF = 10  # its points on either side of the mode
 _REACH = 9.0  # standard deviations of a normal prior beyond which nothing is left
@@ -331,16 +331,16 @@ def _march(
     for sign in (-1.0, 1.0):
         end = mode[3] if sign < 0.0 else mode[4]
         edge = mode[0]
-        width = min(mode[2], 0.25, mode[4] - mode[3])
+        width = min(1.7 * mode[2], 0.4, mode[4] - mode[3])
         while (end - edge) * sign > 0.0:
             slope = slope_and_curvature(edge, frame, *scene)[0]
-            if abs(slope) * width > 6.0:
-                width = 6.0 / abs(slope)
+            if abs(slope) * width > 8.0:
+                width = 8.0 / abs(slope)
             # the slope may grow within the panel: it is looked at from the far end as well
             while True:
                 width = min(max(width, 1e-15 * (1.0 + abs(edge))), (end - edge) * sign)
                 slope = slope_and_curvature(edge + sign * width, frame, *scene)[0]
-                if abs(slope) * width < 12.0 or width < 1e-13 * (1.0 + abs(edge)):
+                if abs(slope) * width < 16.0 or width < 1e-13 * (1.0 + abs(edge)):
                     break
                 width *= 0.5
             last = (end - edge) * sign <= 1.25 * width
@@ -363,7 +363,7 @@ def _march(
             edge += sign * width
             if last or highest < best - _NEGLIGIBLE:
                 break
-            width = min(1.5 * width, 0.4)
+            width = min(1.6 * width, 0.7)
     return total
 
 

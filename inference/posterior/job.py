@@ -1,10 +1,12 @@
 """What is to be inferred, and where the work stands."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.posterior.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.ensemble import Ensemble
 from inference.posterior.importance import WeightedDraws
@@ -14,8 +16,9 @@ from inference.posterior.verdict import Chains, Verdict, chains_of
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
-from simulator.scene import Scene
-from simulator.sensor import Sensor
+from simulator.scene import Scene, parse_scene
+from simulator.sensor import Sensor, parse_sensor
+from simulator.validated import parse
 
 __all__ = ["Checkpoint", "Job", "chains", "prepare"]
 
@@ -55,6 +58,28 @@ class Job:
         limit = np.asarray(self.sensor.full_scale)
         return np.asarray((np.abs(self.frames.readings) < limit).all(axis=1))
 
+    def to_bytes(self) -> bytes:
+        """Return the job for a store."""
+        arrays: dict[str, NDArray[Any]] = {}
+        meta = {
+            "sensor": self.sensor.model_dump(mode="json"),
+            "scene": self.scene.model_dump(mode="json", exclude_unset=True),
+            "settings": self.settings.model_dump(mode="json"),
+            "frames": pack_parts(self.frames, "frames", arrays),
+        }
+        return pack(meta, arrays)
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> "Job":
+        """Read what `to_bytes` wrote."""
+        meta, arrays = unpack(data)
+        return cls(
+            parse_sensor(meta["sensor"]),
+            parse_scene(meta["scene"]),
+            unpack_parts(meta["frames"], arrays),
+            parse(SamplerSettings, meta["settings"]),
+        )
+
     def density(self) -> CollapsedDensity:
         """Return the collapsed density of the usable frames."""
         return collapsed_density(self.sensor, self.scene, self.frames.select(self.usable))
@@ -72,8 +97,12 @@ class Checkpoint:
     ----------
     method : "emcee" or "importance"
         What is being done.
-    mixture : Mixture or None
+    optima : Mixture or None
         Laplace approximations at the optima; None where nothing is unknown.
+    proposal : Mixture or None
+        What the independent move proposes from; adapted to pilot draws that are then thrown away.
+    adaptations : int
+        How often it was adapted.
     ensembles : tuple of Ensemble
         Empty with importance sampling.
     weighted : WeightedDraws or None
@@ -89,7 +118,9 @@ class Checkpoint:
     """
 
     method: str
-    mixture: Mixture | None
+    optima: Mixture | None
+    proposal: Mixture | None
+    adaptations: int
     ensembles: tuple[Ensemble, ...]
     weighted: WeightedDraws | None
     calls: int
@@ -97,6 +128,21 @@ class Checkpoint:
     ess: float | None
     r_hat: float | None
     finished: bool
+
+    def to_bytes(self) -> bytes:
+        """Return the checkpoint for a store."""
+        arrays: dict[str, NDArray[Any]] = {}
+        meta = {
+            field.name: pack_parts(getattr(self, field.name), field.name, arrays)
+            for field in dataclasses.fields(self)
+        }
+        return pack(meta, arrays)
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> "Checkpoint":
+        """Read what `to_bytes` wrote."""
+        meta, arrays = unpack(data)
+        return cls(**{name: unpack_parts(item, arrays) for name, item in meta.items()})
 
 
 def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSettings) -> Job:
@@ -151,7 +197,7 @@ def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSetti
 
 def chains(job: Job, checkpoint: Checkpoint) -> Chains:
     """Return the kept draws of an emcee checkpoint."""
-    if checkpoint.mixture is None:
+    if checkpoint.optima is None:
         raise ValueError("nothing was sampled")
     names = parameters_of(job.sensor, job.scene).names
-    return chains_of(checkpoint.ensembles, checkpoint.mixture.nearest, names)
+    return chains_of(checkpoint.ensembles, checkpoint.optima.nearest, names)

@@ -179,9 +179,9 @@ def _cross_check(
     verdict: Verdict, job: Job, checkpoint: Checkpoint, z: Array, ess: float
 ) -> tuple[Verdict, float | None]:
     """Hold the draws' means to importance sampling, where that can be trusted."""
-    if checkpoint.mixture is None:
+    if checkpoint.proposal is None:
         return verdict, None
-    weighted = draw_weighted(job.density(), checkpoint.mixture, job.stream(5), _CHECK_DRAWS)
+    weighted = draw_weighted(job.density(), checkpoint.proposal, job.stream(5), _CHECK_DRAWS)
     if not weighted.k_hat < MAX_K_HAT or not weighted.ess > 100:
         return verdict, weighted.k_hat
     other = weighted.weights @ weighted.z

@@ -1,0 +1,83 @@
+"""Jobs and checkpoints as bytes: numpy archives without pickle, for any store."""
+
+import dataclasses
+import io
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.posterior.ensemble import Ensemble
+from inference.posterior.importance import WeightedDraws
+from inference.posterior.proposal import Mixture
+from inference.posterior.verdict import Verdict
+from simulator.frames import Frames
+
+__all__ = ["pack", "pack_parts", "unpack", "unpack_parts"]
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def pack(meta: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """Write plain JSON data and named arrays.
+
+    Parameters
+    ----------
+    meta : mapping
+        JSON data; floats survive exactly.
+    arrays : mapping of str to ndarray
+        Any shape, no objects.
+
+    Returns
+    -------
+    bytes
+        An npz archive.
+    """
+    buffer = io.BytesIO()
+    text = np.frombuffer(json.dumps(meta).encode(), dtype=np.uint8)
+    np.savez(buffer, allow_pickle=False, meta=text, **arrays)
+    return buffer.getvalue()
+
+
+def unpack(data: bytes) -> tuple[dict[str, Any], Arrays]:
+    """Read what `pack` wrote."""
+    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    meta: dict[str, Any] = json.loads(arrays.pop("meta").tobytes())
+    return meta, arrays
+
+
+# frozen dataclasses of arrays, numbers and one another; anything else is a mistake
+_PARTS = {part.__name__: part for part in (Ensemble, Frames, Mixture, Verdict, WeightedDraws)}
+
+
+def pack_parts(value: Any, path: str, arrays: Arrays) -> Any:
+    """Describe a value in JSON, its arrays put aside under their path."""
+    if isinstance(value, np.ndarray):
+        arrays[path] = value
+        return {"array": path}
+    if dataclasses.is_dataclass(value) and type(value).__name__ in _PARTS:
+        fields = {
+            field.name: pack_parts(getattr(value, field.name), f"{path}.{field.name}", arrays)
+            for field in dataclasses.fields(value)
+        }
+        return {"part": type(value).__name__, "fields": fields}
+    if isinstance(value, tuple):
+        return {"tuple": [pack_parts(v, f"{path}.{i}", arrays) for i, v in enumerate(value)]}
+    if value is None or isinstance(value, str | bool | int | float):
+        return value
+    raise TypeError(f"{path}: cannot archive {type(value).__name__}")
+
+
+def unpack_parts(description: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
+    """Rebuild what `pack_parts` described."""
+    if not isinstance(description, dict):
+        return description
+    if "array" in description:
+        return arrays[description["array"]]
+    if "tuple" in description:
+        return tuple(unpack_parts(item, arrays) for item in description["tuple"])
+    fields = {name: unpack_parts(item, arrays) for name, item in description["fields"].items()}
+    return _PARTS[description["part"]](**fields)
