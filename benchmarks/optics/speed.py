@@ -58,9 +58,7 @@ def main() -> None:
             line = f"{name}, {label}: {seconds * 1e6:.0f} us a rectangle, batched"
             if name == "diffuse":
                 lights = observe_batch(bodies, **arguments)  # type: ignore[arg-type]
-                worst = max(
-                    abs(a.flux / b.flux - 1) for a, b in zip(lights, exact, strict=True)
-                )
+                worst = max(abs(a.flux / b.flux - 1) for a, b in zip(lights, exact, strict=True))
                 line += f", {baseline / seconds:.0f} times the baseline, worst error {worst:.1e}"
             print(line)
 

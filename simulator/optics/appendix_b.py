@@ -30,8 +30,8 @@ System = Literal["pulsed", "sine_wave"]
 DISTANCES_M: Array = np.logspace(-2, 0, 40)
 FREQUENCY_HZ = 5e6
 
-# at 10 points a piece the true plates are converged to 1e-9 (benchmarks/optics)
-_POINTS = 10
+# converges the true plates to 3e-10 (benchmarks/optics)
+_POINTS = (20, 10)
 _GRID = 100
 
 

@@ -228,6 +228,8 @@ def _round(surface: Array, head: Array, material: Array, late: float) -> Chart:
     marks = (none, np.empty((0, 3)), np.empty((0, 4)), none, none)
     if size_e <= radius or size_d <= radius:
         return INSIDE, chart, empty, marks
+    if _dot(head[9:12], to_d) >= radius or _dot(head[3:6], to_e) >= radius:
+        return OUT_OF_VIEW, chart, empty, marks
     axis = np.empty(3)
     for i in range(3):
         axis[i] = to_e[i] / size_e + to_d[i] / size_d

@@ -9,14 +9,14 @@ from scipy.constants import speed_of_light
 
 __all__ = ["Light", "Modulation", "Status", "add", "dark", "scaled"]
 
-Status = Literal["lit", "edge_on", "opposite_faces", "out_of_view", "underflow"]
+Status = Literal["lit", "edge_on", "opposite_faces", "out_of_view", "dark"]
 
 _REASON: dict[Status, str] = {
     "lit": "",
     "edge_on": "emitter or detector lies in the plane of the surface, which is seen edge-on",
     "opposite_faces": "emitter and detector see opposite faces of the surface",
     "out_of_view": "no part of the surface is in front of both emitter and detector",
-    "underflow": "what the surface returns is below the smallest number",
+    "dark": "the surface lies outside the emitter's cone, or returns less than the smallest number",
 }
 
 

@@ -95,7 +95,7 @@ def observe_narrow(
     )
     flux = value * ri * ri * (ri / height_i) / (ro * ro)
     if flux == 0.0:
-        status: Status = "out_of_view" if float(to_d @ head[9:12]) <= 0 else "underflow"
+        status: Status = "out_of_view" if float(to_d @ head[9:12]) <= 0 else "dark"
         return dark(status)
     path = 0.5 * (ri + ro)
     phase = modulation.wave_number * path

@@ -117,7 +117,7 @@ def _lights(values: Array, errors: Array, states: Counts, modulation: Modulation
         flux = float(value[0])
         status = _STATUS[int(state)]
         if flux == 0.0:
-            lights.append(dark("underflow" if status == "lit" else status))
+            lights.append(dark("dark" if status == "lit" else status))
             continue
         lights.append(
             Light(
