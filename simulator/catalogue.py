@@ -1,4 +1,4 @@
-"""The thesis's scenes by name: the 108 plates of Appendix B and the scenes of its figures."""
+"""The thesis's scenes by name: the 108 plates of Appendix B."""
 
 import math
 import re

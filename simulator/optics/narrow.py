@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulator.errors import InvalidInputError
-from simulator.optics import charts
+from simulator.optics import marks
 from simulator.optics.brdf import pack_material
 from simulator.optics.detectors import Detector
 from simulator.optics.emitters import Emitter
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 def _hit(surface: Array, origin: Array, direction: Array) -> tuple[float, Array] | None:
     """Return distance along the ray and outward normal where it meets the surface, or None."""
     arm = origin - surface[1:4]
-    if surface[0] == charts.ROUND:
+    if surface[0] == marks.ROUND:
         radius = float(surface[13])
         along = -float(arm @ direction)
         size = float(np.linalg.norm(arm))
@@ -47,7 +47,7 @@ def _hit(surface: Array, origin: Array, direction: Array) -> tuple[float, Array]
     distance = -height / slope
     point = arm + distance * direction
     x, y = float(point @ surface[4:7]), float(point @ surface[7:10])
-    if surface[0] == charts.RECTANGLE:
+    if surface[0] == marks.RECTANGLE:
         inside = abs(x) <= surface[13] and abs(y) <= surface[14]
     else:
         inside = math.hypot(x, y) <= surface[13]

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.optics import charts
+from simulator.optics import marks
 from simulator.optics.detectors import Detector
 from simulator.optics.emitters import Emitter
 from simulator.optics.surfaces import Disk, Plane, Rectangle, Sphere, pack_surface
@@ -21,7 +21,7 @@ def _probes(surface: Array, eye: Array) -> Array:
     """Return points of a surface, shape (n, 3), its rim included."""
     steps = np.linspace(-1.0, 1.0, _SIDE)
     x, y = (a.ravel() for a in np.meshgrid(steps, steps))
-    if surface[0] == charts.ROUND:
+    if surface[0] == marks.ROUND:
         axis = eye - surface[1:4]
         distance = float(np.linalg.norm(axis))
         axis = axis / distance
@@ -33,16 +33,16 @@ def _probes(surface: Array, eye: Array) -> Array:
         around = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * np.cross(axis, side)
         points = np.cos(angle)[:, None] * axis + np.sin(angle)[:, None] * around
         return np.asarray(surface[1:4] + surface[13] * points)
-    if surface[0] == charts.RECTANGLE:
+    if surface[0] == marks.RECTANGLE:
         a, b = surface[13] * x, surface[14] * y
     else:
         # square onto disk ring by ring; an infinite plane is probed out to where it goes dark
         height = abs(float((eye - surface[1:4]) @ surface[10:13]))
-        radius = surface[13] if surface[0] == charts.DISK else 20.0 * height
+        radius = surface[13] if surface[0] == marks.DISK else 20.0 * height
         ring, turn = radius * np.maximum(np.abs(x), np.abs(y)), np.arctan2(y, x)
         a, b = ring * np.cos(turn), ring * np.sin(turn)
     centre = surface[1:4]
-    if surface[0] == charts.PLANE:
+    if surface[0] == marks.PLANE:
         centre = eye - ((eye - centre) @ surface[10:13]) * surface[10:13]
     return np.asarray(centre + a[:, None] * surface[4:7] + b[:, None] * surface[7:10])
 
@@ -51,7 +51,7 @@ def _blocked(surface: Array, eye: Array, points: Array) -> NDArray[np.bool_]:
     """Return for each point whether the surface crosses its line to the eye."""
     rays = points - eye
     clear = 1.0 - 1e-9
-    if surface[0] == charts.ROUND:
+    if surface[0] == marks.ROUND:
         arm = eye - surface[1:4]
         a = np.einsum("ij,ij->i", rays, rays)
         b = rays @ arm
@@ -65,7 +65,7 @@ def _blocked(surface: Array, eye: Array, points: Array) -> NDArray[np.bool_]:
         share = -height / slope
         hit = eye + share[:, None] * rays - surface[1:4]
         x, y = hit @ surface[4:7], hit @ surface[7:10]
-    if surface[0] == charts.RECTANGLE:
+    if surface[0] == marks.RECTANGLE:
         inside = (np.abs(x) < surface[13]) & (np.abs(y) < surface[14])
     else:
         inside = np.hypot(x, y) < surface[13]

@@ -11,14 +11,16 @@ from numpy.typing import NDArray
 
 from simulator.compiled import compiled
 from simulator.errors import InvalidInputError
-from simulator.optics import charts
+from simulator.optics import marks as kinds
 from simulator.optics.brdf import pack_material
-from simulator.optics.charts import build_chart, shell_chart
+from simulator.optics.charts import build_chart
 from simulator.optics.detectors import Detector
 from simulator.optics.emitters import Emitter, Narrow, pack_pattern
 from simulator.optics.light import Light, Modulation, Status, dark
 from simulator.optics.narrow import observe_narrow
-from simulator.optics.quadrature import COMPONENTS, GAUSS_KRONROD, gauss_rule, integrate
+from simulator.optics.quadrature import GAUSS_KRONROD, gauss_rule, integrate
+from simulator.optics.rays import COMPONENTS
+from simulator.optics.round_charts import shell_chart
 from simulator.optics.surfaces import Disk, Plane, Rectangle, Shell, Sphere, pack_surface
 
 __all__ = [
@@ -34,10 +36,10 @@ Points = int | tuple[int, int]
 AnySurface = Rectangle | Disk | Plane | Sphere
 
 _STATUS: dict[int, Status] = {
-    charts.LIT: "lit",
-    charts.EDGE_ON: "edge_on",
-    charts.OPPOSITE: "opposite_faces",
-    charts.OUT_OF_VIEW: "out_of_view",
+    kinds.LIT: "lit",
+    kinds.EDGE_ON: "edge_on",
+    kinds.OPPOSITE: "opposite_faces",
+    kinds.OUT_OF_VIEW: "out_of_view",
 }
 
 
@@ -112,7 +114,7 @@ def _rules(points: Points | None) -> tuple[Array, Array]:
 def _lights(values: Array, errors: Array, states: Counts, modulation: Modulation) -> list[Light]:
     lights = []
     for value, error, (state, _) in zip(values, errors, states, strict=True):
-        if state == charts.INSIDE:
+        if state == kinds.INSIDE:
             raise InvalidInputError.at("/surface", "emitter or detector lies inside the sphere")
         flux = float(value[0])
         status = _STATUS[int(state)]

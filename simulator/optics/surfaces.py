@@ -7,7 +7,7 @@ import numpy as np
 import pydantic
 from numpy.typing import NDArray
 
-from simulator.optics import charts
+from simulator.optics import marks
 from simulator.optics.brdf import Material
 from simulator.optics.vectors import Pose, Position
 from simulator.validated import Validated
@@ -122,19 +122,19 @@ Surface = Annotated[Rectangle | Disk | Plane | Sphere, pydantic.Field(discrimina
 
 
 def pack_surface(surface: Rectangle | Disk | Plane | Sphere) -> Array:
-    """Return the row of `simulator.optics.charts` for a surface."""
+    """Return the row of `simulator.optics.marks` for a surface."""
     row = np.zeros(15)
     if isinstance(surface, Sphere):
-        row[0], row[13] = charts.ROUND, surface.radius_m
+        row[0], row[13] = marks.ROUND, surface.radius_m
         row[1:4] = surface.centre_m
         return row
     u, v, n = surface.pose.axes()
     row[1:4], row[4:7], row[7:10], row[10:13] = surface.pose.position_m, u, v, n
     if isinstance(surface, Rectangle):
-        row[0] = charts.RECTANGLE
+        row[0] = marks.RECTANGLE
         row[13], row[14] = 0.5 * surface.width_m, 0.5 * surface.height_m
     elif isinstance(surface, Disk):
-        row[0], row[13] = charts.DISK, surface.radius_m
+        row[0], row[13] = marks.DISK, surface.radius_m
     else:
-        row[0], row[13] = charts.PLANE, math.inf
+        row[0], row[13] = marks.PLANE, math.inf
     return row

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from simulator.validated import Validated
 
 __all__ = [
-    "Direction",
     "Pose",
     "Position",
     "Unit",
@@ -43,7 +42,6 @@ def normalised(vector: Vector) -> Vector:
 
 Position = Annotated[Vector, pydantic.Strict(False)]
 Unit = Annotated[Vector, pydantic.Strict(False), pydantic.AfterValidator(normalised)]
-Direction = Unit
 
 
 def dot(a: Vector, b: Vector) -> float:
