@@ -213,7 +213,7 @@ def find_modes(
             if not bend > 0.0:
                 bend = curvature
         density = log_integrand(u, frame, *scene)
-        if not density > modes[j, 1]:  # a varying covariance misled the search: keep the knot
+        if not density > modes[j, 1]:  # rounding hid the top: keep the knot
             u = modes[j, 0]
             density = modes[j, 1]
             slope, curvature = slope_and_curvature(u, frame, *scene)

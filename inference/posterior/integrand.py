@@ -132,6 +132,51 @@ def precision_times(
 
 
 @compiled
+def _covariance_slope(
+    pull: Pair,
+    mean: Pair,
+    mean_slope: Pair,
+    signal: Pair,
+    signal_slope: Pair,
+    read: Pair,
+    shot: float | None,
+    relative: float | None,
+    pulsed: bool,
+) -> float:
+    """Return what the change of the covariance adds to the slope of the log density.
+
+    With w = V^-1 e it is (w^T V' w - tr(V^-1 V')) / 2, V' from the independent parts.
+    """
+    if shot is not None or relative is not None:
+        own1, own2, shared, s1, s2 = noise_parts(read, shot, relative, pulsed, mean, signal)
+        d1, d2, dk, t1, t2 = 0.0, 0.0, 0.0, 0.0, 0.0
+        if shot is not None:
+            d1 = shot * mean_slope[0] * math.copysign(1.0, mean[0])
+            d2 = shot * mean_slope[1] * math.copysign(1.0, mean[1])
+            if pulsed:
+                dk = d1 if abs(mean[0]) < abs(mean[1]) else d2
+            d1, d2 = d1 - dk, d2 - dk
+        if relative is not None:
+            t1, t2 = relative * signal_slope[0], relative * signal_slope[1]
+        unit = read[1]
+        determinant = _determinant(
+            own1 / unit / unit, own2 / unit / unit, shared / unit / unit, s1 / unit, s2 / unit
+        )
+        scale = determinant * unit * unit
+        p11 = (own2 + shared + s2 * s2) / unit / unit / scale
+        p22 = (own1 + shared + s1 * s1) / unit / unit / scale
+        p12 = -(shared + s1 * s2) / unit / unit / scale
+        w1, w2 = pull
+        square = d1 * w1 * w1 + d2 * w2 * w2 + dk * (w1 + w2) ** 2
+        square += 2.0 * (w1 * t1 + w2 * t2) * (w1 * s1 + w2 * s2)
+        q1, q2 = precision_times((s1, s2), mean, signal, read, shot, relative, pulsed)
+        trace = d1 * p11 + d2 * p22 + dk * (p11 + 2.0 * p12 + p22) + 2.0 * (t1 * q1 + t2 * q2)
+        return 0.5 * (square - trace)
+    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
+        return 0.0
+
+
+@compiled
 def log_integrand(
     u: float,
     frame: Triple,
@@ -192,16 +237,16 @@ def slope_and_curvature(
     shot: float | None,
     relative: float | None,
 ) -> Pair:
-    """Return the slope of `log_integrand` along u and its Gauss-Newton curvature.
+    """Return the slope of `log_integrand` along u and its Gauss-Newton curvature, never negative.
 
-    The covariance is held fixed, so that the slope is exact for read noise alone and a guide for
-    the search otherwise; the curvature is never negative.
+    The curvature holds the covariance fixed.
     """
     r = math.exp(u)
     gain = frame[2]
     o1, o2 = object_readings(r, r0, wave, gain * shape[0], shape[1], shape[2])
     t1, t2 = object_slopes(r, r0, wave, gain * shape[0], shape[1], shape[2])
     m1, m2 = o1, o2
+    signal_slope = (t1, t2)
     if background is not None:
         b1, b2 = background_readings(r, r0, wave, background)
         a1, a2 = background_slopes(r, r0, wave, background)
@@ -210,8 +255,13 @@ def slope_and_curvature(
     if crosstalk is not None:
         m1, m2 = m1 + crosstalk[0], m2 + crosstalk[1]
     e1, e2 = frame[0] - m1, frame[1] - m2
-    p1, p2 = precision_times((t1, t2), (m1, m2), (o1, o2), read, shot, relative, wave is None)
+    pulsed = wave is None
+    p1, p2 = precision_times((t1, t2), (m1, m2), (o1, o2), read, shot, relative, pulsed)
+    pull = precision_times((e1, e2), (m1, m2), (o1, o2), read, shot, relative, pulsed)
+    change = _covariance_slope(
+        pull, (m1, m2), (t1, t2), (o1, o2), signal_slope, read, shot, relative, pulsed
+    )
     return (
-        e1 * p1 + e2 * p2 + range_slope(r, u, law),
+        e1 * p1 + e2 * p2 + change + range_slope(r, u, law),
         t1 * p1 + t2 * p2 + law[5] * law[5] + r * r * law[3] * law[3],
     )
