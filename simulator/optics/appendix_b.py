@@ -30,8 +30,8 @@ System = Literal["pulsed", "sine_wave"]
 DISTANCES_M: Array = np.logspace(-2, 0, 40)
 FREQUENCY_HZ = 5e6
 
-# converges the true plates to 3e-10 (benchmarks/optics)
-_POINTS = (20, 10)
+# converges the true plates to 1e-8 (benchmarks/optics)
+_POINTS = (16, 10)
 _GRID = 100
 
 

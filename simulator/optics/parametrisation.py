@@ -110,6 +110,17 @@ class _Linear:
     rank: int
 
 
+def _inverse(r: Array) -> Array:
+    """Return the inverse of an upper triangle of two or three columns by back-substitution."""
+    n = r.shape[0]
+    inverse = np.zeros((n, n))
+    for j in range(n):
+        inverse[j, j] = 1.0 / r[j, j]
+        for i in range(j - 1, -1, -1):
+            inverse[i, j] = -float(r[i, i + 1 : j + 1] @ inverse[i + 1 : j + 1, j]) / r[i, i]
+    return inverse
+
+
 def _solve(matrix: Array, target: Array) -> _Linear:
     """Solve least squares by QR with columns scaled to unit length and pivoting for the rank."""
     scale = np.linalg.norm(matrix, axis=0)
@@ -120,8 +131,8 @@ def _solve(matrix: Array, target: Array) -> _Linear:
     solution = np.zeros(columns)
     inverse = np.full((columns, columns), np.nan)
     if rank == columns:
-        solution[order] = linalg.solve_triangular(r, q.T @ target)
-        inverse_r = linalg.solve_triangular(r, np.eye(columns))
+        inverse_r = _inverse(r)
+        solution[order] = inverse_r @ (q.T @ target)
         inverse[np.ix_(order, order)] = inverse_r @ inverse_r.T
     residuals = matrix @ (solution / scale) - target
     freedom = matrix.shape[0] - columns
