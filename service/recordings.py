@@ -71,7 +71,7 @@ class Recording:
     @property
     def span_s(self) -> float:
         """Length of a histogram [s]."""
-        return self.bin_width_s * self.counts.shape[1]
+        return float(self.bin_width_s * self.counts.shape[1])
 
     @property
     def bin_range_m(self) -> Array:
