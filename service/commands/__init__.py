@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from service import reproduce
 from service.commands import estimate, infer, serve, simulate
+from service.demo import command as demo
 
 __all__ = ["COMMANDS", "AddParser"]
 
@@ -19,4 +20,5 @@ COMMANDS: tuple[AddParser, ...] = (
     estimate.add_parser,
     infer.add_parser,
     reproduce.add_parser,
+    demo.add_parser,
 )

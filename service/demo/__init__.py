@@ -1,0 +1,1 @@
+"""``hybridtof demo``: from readings to distances through the running service."""
