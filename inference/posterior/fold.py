@@ -56,8 +56,8 @@ _IMPORTANCE_DRAWS = 2000
 _MOST_IMPORTANCE_DRAWS = 200_000
 _CHUNK_S = 0.4  # of the first chunk; later ones grow to about a second
 _MOST_STEPS = 20_000
-_MOST_ADAPTATIONS = 4
-_FAST = 6.0  # steps of autocorrelation below which the proposal needs no adaptation
+_MOST_ADAPTATIONS = 2
+_FAST = 10.0  # steps of autocorrelation below which the proposal needs no adaptation
 _PILOT_DRAWS = 6000
 _EVALUATION_S = 1.2e-6  # a frame under one parameter vector, for sizing chunks only
 

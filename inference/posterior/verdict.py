@@ -179,7 +179,7 @@ def _transitions(chains: Chains) -> str | None:
     return None
 
 
-_GATES = (_shared_streams, _start, _acceptance, _length, _agreement, _means, _transitions)
+_GATES = (_shared_streams, _acceptance, _length, _agreement, _means, _transitions)
 
 
 def judge(chains: Chains, target_ess: int) -> Verdict:
@@ -195,11 +195,13 @@ def judge(chains: Chains, target_ess: int) -> Verdict:
     Returns
     -------
     Verdict
-        With every gate that failed; one that fails at the start of the list can make those after
-        it meaningless.
+        With every gate that failed, in order; the first is the one to mend first.
     """
     if chains.z.shape[2] < 4:
         return Verdict(False, ("too few steps were made to judge them",))
+    outside = _start(chains)
+    if outside is not None:
+        return Verdict(False, (outside,))  # nothing can be computed from infinities
     reasons = [reason for gate in _GATES if (reason := gate(chains)) is not None]
     for name, draws in zip(chains.names, np.moveaxis(chains.z, -1, 0), strict=True):
         ess = effective_sample_size(draws)

@@ -1,0 +1,205 @@
+"""The fold: the same answer in any number of pieces, in any place; refusals before any work."""
+
+import dataclasses
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+
+from inference.posterior import fold
+from inference.posterior.infer import infer
+from inference.posterior.posterior import Posterior
+from inference.posterior.settings import SamplerSettings
+from simulator.errors import InvalidInputError, RefusedError
+from simulator.frames import Frames
+from simulator.scene import parse_scene
+from simulator.sensor import parse_sensor
+from tests.posterior.scenes import OBJECT, data, example, sensor_of
+
+QUICK = SamplerSettings(seed=7, target_ess=50, max_seconds=60)
+
+
+def same(a: Posterior, b: Posterior) -> bool:
+    first, second = (p.to_json() | {"runtime": None} for p in (a, b))
+    return first == second and np.array_equal(a.draws.parameters, b.draws.parameters)
+
+
+def run(job: fold.Job, through: Callable[[fold.Checkpoint], fold.Checkpoint]) -> Posterior:
+    checkpoint = through(fold.start(job))
+    while pieces := [fold.run(task) for task in fold.tasks(job, checkpoint)]:
+        checkpoint = through(fold.merge(job, checkpoint, pieces))
+    return fold.summarise(job, checkpoint, 0.0, 0.0)
+
+
+def test_stored_and_read_again_between_chunks_is_the_same_to_the_last_bit() -> None:
+    job = fold.prepare(*example("pulsed", crosstalk=True), QUICK)
+    again = fold.Job.from_bytes(job.to_bytes())
+    plain = run(job, lambda c: c)
+    stored = run(again, lambda c: fold.Checkpoint.from_bytes(c.to_bytes()))
+    assert same(plain, stored)
+
+
+def test_an_executor_changes_nothing() -> None:
+    request = example("sine_wave", crosstalk=False)
+    with ThreadPoolExecutor(2) as executor:
+        assert same(infer(*request, QUICK), infer(*request, QUICK, executor))
+
+
+def test_another_seed_gives_other_draws_and_no_seed_is_returned() -> None:
+    request = example("pulsed", crosstalk=False)
+    first = infer(*request, QUICK)
+    second = infer(*request, QUICK.model_copy(update={"seed": 8}))
+    drawn = infer(*request, QUICK.model_copy(update={"seed": None}))
+    assert first.seed == 7
+    assert not np.array_equal(first.draws.parameters, second.draws.parameters)
+    assert drawn.seed >= 0
+
+
+def test_progress_ends_where_the_job_ends() -> None:
+    job = fold.prepare(*example("pulsed", crosstalk=False), QUICK)
+    checkpoint = fold.start(job)
+    before = fold.progress(job, checkpoint)
+    assert before.steps == 0
+    assert not before.finished
+    while pieces := [fold.run(task) for task in fold.tasks(job, checkpoint)]:
+        checkpoint = fold.merge(job, checkpoint, pieces)
+    after = fold.progress(job, checkpoint)
+    assert after.finished
+    assert after.ess is not None
+    assert after.ess >= 50
+
+
+def test_stopped_before_the_first_chunk_there_is_still_an_answer() -> None:
+    job = fold.prepare(*example("pulsed", crosstalk=False), QUICK)
+    posterior = fold.summarise(job, fold.start(job), 0.0, 0.0)
+    assert not posterior.verdict.converged
+    assert np.isfinite(posterior.range_m.q50).all()
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        ({"motion": "tangential"}, "differential"),
+        ({"discrepancy": 0.05}, "discrepancy"),
+        ({"crosstalk": {"values": [0.0, 0.0], "optional": True}}, "optional"),
+    ],
+)
+def test_what_the_posterior_cannot_answer_is_refused_with_a_remedy(
+    scene: dict[str, Any], words: str
+) -> None:
+    sensor, _, frames = example("pulsed", crosstalk=False)
+    with pytest.raises(RefusedError, match=words):
+        fold.prepare(sensor, parse_scene(scene), frames, QUICK)
+
+
+def test_a_scene_that_breaks_a_rule_is_named_below_scene() -> None:
+    sensor, _, frames = example("pulsed", crosstalk=False)
+    with pytest.raises(InvalidInputError) as caught:
+        fold.prepare(sensor, parse_scene({"object": {"c0": -1.0}}), frames, QUICK)
+    assert caught.value.problems[0].pointer == "/scene/object/c0"
+
+
+def test_all_frames_saturated_is_refused() -> None:
+    _, scene, frames = example("pulsed", crosstalk=False)
+    sensor = parse_sensor(
+        {
+            "kind": "pulsed",
+            "pulse_width_s": 1e-7,
+            "noise": {"read": [1e-6, 1e-6]},
+            "full_scale": [1e-9, 1e-9],
+        }
+    )
+    with pytest.raises(RefusedError, match="saturated"):
+        fold.prepare(sensor, scene, frames, QUICK)
+
+
+def test_a_saturated_frame_is_left_open_and_the_others_are_answered() -> None:
+    plain = sensor_of("pulsed")
+    frames = data(plain).frames
+    limit = float(np.sort(frames.readings[:, 1])[-3])
+    sensor = parse_sensor({**plain.model_dump(exclude_none=True), "full_scale": [limit, limit]})
+    posterior = infer(sensor, parse_scene({}), frames, QUICK)
+    saturated = frames.readings[:, 1] >= limit
+    assert saturated.sum() == 3
+    assert np.isnan(posterior.range_m.q50[saturated]).all()
+    assert np.isfinite(posterior.range_m.q50[~saturated]).all()
+    assert posterior.to_json()["range_m"]["q50"][int(np.flatnonzero(saturated)[0])] is None
+
+
+def test_empty_frames_have_no_range_and_fix_the_crosstalk() -> None:
+    sensor = sensor_of("pulsed")
+    scene = parse_scene(
+        {
+            "object": OBJECT,
+            "crosstalk": [{"prior": "normal", "mean": 0.0, "sd": 0.1}] * 2,
+        }
+    )
+    rng = np.random.default_rng(5)
+    readings = np.array([0.002, 0.01]) + 7.72e-6 * rng.standard_normal((9, 2))
+    frames = Frames(readings, object_present=np.zeros(9, dtype=bool))
+    posterior = infer(sensor, scene, frames, QUICK)
+    assert np.isnan(posterior.range_m.q50).all()
+    for name, column in (("crosstalk.w1", 0), ("crosstalk.w2", 1)):
+        summary = posterior.parameters[name]
+        # the mean of nine readings, known to a third of their noise
+        assert summary.mean == pytest.approx(readings[:, column].mean(), abs=5 * summary.mcse_mean)
+        assert summary.sd == pytest.approx(7.72e-6 / 3, rel=0.2)
+
+
+def test_nothing_unknown_needs_no_sampling() -> None:
+    sensor = sensor_of("pulsed")
+    simulation = data(sensor)
+    posterior = infer(sensor, parse_scene({"object": OBJECT}), simulation.frames, QUICK)
+    assert posterior.verdict.converged
+    assert posterior.parameters == {}
+    error = np.abs(posterior.range_m.q50 - simulation.range_m) / posterior.range_m.sd
+    # twenty normal variates: one beyond 5 has a probability of 1e-5
+    assert error.max() < 5
+
+
+def test_one_frame_is_answered_and_what_it_cannot_tell_is_marked() -> None:
+    sensor, scene, frames = example("pulsed", crosstalk=True)
+    # two numbers for six unknowns leave a thin sheet on which no ensemble gets far: the answer
+    # need not converge, but must neither fail nor claim knowledge
+    settings = QUICK.model_copy(update={"max_seconds": 4.0})
+    posterior = infer(sensor, scene, frames.select(slice(0, 1)), settings)
+    status = {row.parameter: row.status for row in posterior.identifiability}
+    assert set(status) == {*posterior.parameters, "range_m"}
+    assert "identified" not in {status["object.c0"], status["object.c1"], status["object.c2"]}
+    assert status["range_m"] != "identified"
+
+
+def test_readings_far_off_any_model_are_a_misfit_not_a_failure() -> None:
+    sensor, _, frames = example("pulsed", crosstalk=False)
+    wild = dataclasses.replace(frames, readings=frames.readings[::-1] * [1.0, -1.0])
+    posterior = infer(sensor, parse_scene({"object": OBJECT}), wild, QUICK)
+    assert posterior.fit.misfit
+    assert posterior.to_json()["fit"]["misfit"] is True
+
+
+def test_importance_is_refused_where_it_cannot_be_trusted() -> None:
+    sensor = sensor_of("pulsed")
+    wall = {"strength": 0.017, "distance_m": 3.0}
+    truth = {"background": {**wall, "shadow": {"c0": 0.056, "c1": 0.02}}}
+    frames = data(sensor, truth, 40, seed=0).frames
+    settings = QUICK.model_copy(update={"method": "importance"})
+    with pytest.raises(RefusedError, match="k-hat"):
+        infer(sensor, parse_scene({"background": wall}), frames, settings)
+
+
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+def test_importance_agrees_with_ensembles(kind: str) -> None:
+    request = example(kind, crosstalk=True)
+    weighted = infer(*request, SamplerSettings(method="importance", seed=3))
+    walked = infer(*request, SamplerSettings(seed=4))
+    assert weighted.runtime.k_hat is not None
+    assert weighted.runtime.k_hat < 0.5
+    assert walked.verdict.converged
+    for name, summary in walked.parameters.items():
+        other = weighted.parameters[name]
+        error = np.hypot(summary.mcse_mean, other.mcse_mean)
+        # five parameters, two kinds: a false alarm once in 5e4 runs
+        assert abs(summary.mean - other.mean) < 4.9 * error
+        assert other.rhat is None
