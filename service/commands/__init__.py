@@ -9,6 +9,7 @@ from collections.abc import Callable
 from service import reproduce
 from service.commands import estimate, infer, serve, simulate
 from service.demo import command as demo
+from service.report import command as report
 
 __all__ = ["COMMANDS", "AddParser"]
 
@@ -21,4 +22,5 @@ COMMANDS: tuple[AddParser, ...] = (
     infer.add_parser,
     reproduce.add_parser,
     demo.add_parser,
+    report.add_parser,
 )

@@ -1,0 +1,1 @@
+"""``hybridtof report``: error against run time for every technique and the posterior."""
