@@ -111,9 +111,8 @@ def _techniques(scene: ReportScene, made: Simulation) -> Iterator[Row]:
         run = functools.partial(estimate, scene.sensor, known, made.frames, [name])
         estimates, seconds = _best(run)
         (result,) = estimates.results
-        reach = 2 * np.nan_to_num(result.roots_sd_m, nan=np.inf)
-        with np.errstate(invalid="ignore"):
-            held = (np.abs(result.roots_m - made.range_m[:, None]) <= reach).any(axis=1)
+        off = np.abs(result.roots_m - made.range_m[:, None])
+        held = np.asarray(np.any(off <= 2 * result.roots_sd_m, axis=1))
         ambiguous = np.mean(result.status == Status.AMBIGUOUS)
         words = [remark, f"{ambiguous:.0%} ambiguous" if ambiguous > 0 else ""]
         text = ", ".join(filter(None, words))
