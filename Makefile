@@ -5,10 +5,10 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check lint format types fast lock clean
+.PHONY: help setup demo report picture notebook-data test check lint format types fast lock clean
 
 help: ## Show the targets
-	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 14
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
 
 $(READY): pyproject.toml requirements/dev.txt
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if (3, 11) <= v <= (3, 13) else "hybridtof needs Python 3.11 to 3.13; name one with make PYTHON=...")'
@@ -18,6 +18,18 @@ $(READY): pyproject.toml requirements/dev.txt
 	@touch $(READY)
 
 setup: $(READY) ## Create .venv with the locked dependencies
+
+demo: $(READY) ## Readings to distances through the running service: a table, out/demo.png
+	$(BIN)/hybridtof demo --out out
+
+report: $(READY) ## Error against run time of every technique: a table, out/report.json, out/report.png
+	$(BIN)/hybridtof report --quick --out out
+
+picture: $(READY) ## Make the README's picture anew
+	$(BIN)/hybridtof demo --out docs
+
+notebook-data: $(READY) ## Make the notebook's frames anew
+	$(BIN)/hybridtof simulate --scene notebooks/simulated.json --from-m 0.15 --to-m 1.2 --frames 30 --spacing log --seed 7 --output notebooks/frames.csv > /dev/null
 
 test: $(READY) ## Run every test
 	$(BIN)/python -m pytest -n 2 --dist loadgroup
