@@ -16,7 +16,8 @@ NAMES = sorted(path.name for path in NOTEBOOKS.glob("*.ipynb"))
 
 def read(name: str) -> nbformat.NotebookNode:
     text = (NOTEBOOKS / name).read_text(encoding="utf-8")
-    return nbformat.from_dict(json.loads(text))  # type: ignore[no-untyped-call]
+    notebook: nbformat.NotebookNode = nbformat.from_dict(json.loads(text))  # type: ignore[no-untyped-call]
+    return notebook
 
 
 def test_there_are_notebooks() -> None:
