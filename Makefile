@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report picture notebook-data test check lint format types fast lock clean
+.PHONY: help setup demo report readme picture notebook-data test check lint format types fast lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -24,6 +24,9 @@ demo: $(READY) ## Readings to distances through the running service: a table, ou
 
 report: $(READY) ## Error against run time of every technique: a table, out/report.json, out/report.png
 	$(BIN)/hybridtof report --quick --out out
+
+readme: $(READY) ## Write the table of techniques into the README anew
+	$(BIN)/python -m service.technique_table README.md
 
 picture: $(READY) ## Make the README's picture anew
 	$(BIN)/hybridtof demo --out docs

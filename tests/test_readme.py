@@ -1,0 +1,111 @@
+"""What the README says is what the code does."""
+
+import json
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from inference.realtime.registry import TECHNIQUES
+from service.app import create_app
+from service.cli import main
+from service.commands import COMMANDS
+from service.settings import Settings
+from service.technique_table import END, START, technique_table
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+DOCUMENTS = [
+    *sorted(ROOT.glob("*.md")),
+    *sorted((ROOT / "docs").glob("*.md")),
+    ROOT / "benchmarks" / "README.md",
+]
+
+
+@pytest.fixture
+def anyio_backend() -> str:
+    return "asyncio"
+
+
+def block(mark: str) -> str:
+    """The code block below a mark."""
+    found = re.search(rf"<!-- {mark} -->\n```\w*\n(.*?)\n```", README, re.DOTALL)
+    assert found is not None
+    return found[1]
+
+
+def rounded(value: Any) -> Any:
+    """Numbers to two digits more than an error bar has: what the README prints."""
+    if isinstance(value, float):
+        return float(f"{value:.2g}")
+    if isinstance(value, list):
+        return [rounded(item) for item in value]
+    return value
+
+
+@pytest.mark.anyio
+async def test_curl_example() -> None:
+    words = shlex.split(block("executed by tests/test_readme.py"))
+    assert words[:3] == ["curl", "-s", "http://127.0.0.1:8000/v1/estimates"]
+    assert words[3] == "-H"
+    assert words[5] == "-d"
+    assert len(words) == 7
+    name, _, value = words[4].partition(": ")
+    async with httpx.AsyncClient(
+        transport=httpx.ASGITransport(create_app(Settings(workers=1))),
+        base_url="http://127.0.0.1:8000",
+    ) as client:
+        response = await client.post(
+            words[2].removeprefix("http://127.0.0.1:8000"),
+            content=words[6].encode(),
+            headers={name: value},
+        )
+    assert response.status_code == 200
+    (result,) = response.json()["results"]
+    assert result["technique"] == response.json()["chosen"] == "background_cancelling"
+    printed = json.loads(block("compared by tests/test_readme.py"))
+    assert len(printed) == len(result["frames"])
+    for shown, frame in zip(printed, result["frames"], strict=True):
+        assert shown.keys() == frame.keys()
+        for key, value in shown.items():
+            if key in ("range_m", "roots_m") and value is not None:
+                # five digits are printed
+                assert frame[key] == pytest.approx(value, rel=1e-4)
+            else:
+                assert rounded(frame[key]) == rounded(value), key
+
+
+def test_table_of_techniques() -> None:
+    shown = README.split(START)[1].split(END)[0].strip()
+    assert shown == technique_table(), "run `make readme`"
+    assert all(f"| `{name}` |" in shown for name in TECHNIQUES)
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_links_lead_somewhere(path: Path) -> None:
+    for target in re.findall(r"\]\(([^)#]+)", path.read_text(encoding="utf-8")):
+        if "://" not in target:
+            assert (path.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_commands_exist(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = path.read_text(encoding="utf-8")
+    for module in re.findall(r"python -m (benchmarks[.\w]*\w)\b(?!\.<)", text):
+        assert (ROOT / (module.replace(".", "/") + ".py")).exists(), module
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for target in re.findall(r"`make ([a-z-]+)", text):
+        assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
+    for command in set(re.findall(r"hybridtof ([a-z]+)\b", text)) & {"serve", "report", "demo"}:
+        with pytest.raises(SystemExit) as caught:
+            main([command, "--help"])
+        assert caught.value.code == 0
+    capsys.readouterr()
+    assert len(COMMANDS) >= 7
+
+
+def test_picture_is_small() -> None:
+    assert (ROOT / "docs" / "demo.png").stat().st_size < 250_000
