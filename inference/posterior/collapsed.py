@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.frame_integral import (
-    MAX_MODES,
     find_modes,
     frame_log_likelihood,
     integration_bounds,
-    knot_count,
     tabulate,
 )
 from inference.posterior.integrand import Pair, Quad, Triple, gaussian, log_top
@@ -67,7 +65,8 @@ def _log_likelihoods(
     relative: float | None,
 ) -> None:
     """Fill out[i, j] with the log likelihood of frame j under parameter vector i."""
-    modes = np.empty((MAX_MODES, 6))
+    strongest = frames[:, 2].max()
+    unit = (read[0] / strongest, read[1] / strongest)
     for i in range(shapes.shape[0]):
         shape = (shapes[i, 0], shapes[i, 1], shapes[i, 2])
         crosstalk = crosstalk_of(crosstalks, i)
@@ -77,10 +76,10 @@ def _log_likelihoods(
         if not bounds[1] > bounds[0] or not math.isfinite(law[0]):
             out[i, :] = -math.inf
             continue
-        table = np.empty((6, knot_count(bounds)))
+        table = tabulate(bounds, shape, background, law, r0, wave, unit)
         values = np.empty(table.shape[1])
+        modes = np.empty((values.size // 2 + 1, 6))
         scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative)
-        tabulate(table, bounds, shape, background, law, r0, wave)
         for j in range(frames.shape[0]):
             frame = (frames[j, 0], frames[j, 1], frames[j, 2])
             if present is not None and not present[j]:

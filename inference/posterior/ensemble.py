@@ -13,6 +13,7 @@ from inference.posterior.proposal import Mixture
 __all__ = ["Ensemble", "advance", "forget", "new_ensemble"]
 
 Array = NDArray[np.float64]
+Stream = tuple[NDArray[np.uint32], int, int, float]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -31,8 +32,9 @@ class Ensemble:
         Their log density.
     accepted : ndarray of int, shape (walkers,)
         Accepted proposals.
-    random : (ndarray of uint32, int)
-        Key and position of this ensemble's own Mersenne twister.
+    random : (ndarray of uint32, int, int, float)
+        Key and position of this ensemble's own Mersenne twister, and whether and which normal
+        variate it still holds back: they come in pairs.
     """
 
     coords: Array
@@ -40,12 +42,17 @@ class Ensemble:
     chain: Array
     chain_log_prob: Array
     accepted: NDArray[np.int64]
-    random: tuple[NDArray[np.uint32], int]
+    random: Stream
 
     @property
     def steps(self) -> int:
         """Number of steps made."""
         return int(self.chain.shape[0])
+
+
+def _stream(state: Any) -> Stream:
+    """Return what matters of a RandomState's own tuple."""
+    return np.asarray(state[1], dtype=np.uint32), int(state[2]), int(state[3]), float(state[4])
 
 
 def new_ensemble(coords: Array, log_prob: Array, seed: np.random.SeedSequence) -> Ensemble:
@@ -72,7 +79,7 @@ def new_ensemble(coords: Array, log_prob: Array, seed: np.random.SeedSequence) -
         np.empty((0, walkers, d)),
         np.empty((0, walkers)),
         np.zeros(walkers, dtype=np.int64),
-        (np.asarray(state[1], dtype=np.uint32), int(state[2])),
+        _stream(state),
     )
 
 
@@ -86,13 +93,14 @@ def forget(ensemble: Ensemble) -> Ensemble:
     )
 
 
-def _moves(mixture: Mixture) -> list[tuple[Any, float]]:
+def _moves(mixture: Mixture, share: float) -> list[tuple[Any, float]]:
     """Independent jumps between the optima, and local moves that know nothing of them."""
+    rest = 1.0 - share
     return [
-        (emcee.moves.MHMove(mixture.propose), 0.6),
-        (emcee.moves.DEMove(sigma=0.2), 0.15),
-        (emcee.moves.DESnookerMove(), 0.1),
-        (emcee.moves.StretchMove(), 0.15),
+        (emcee.moves.MHMove(mixture.propose), share),
+        (emcee.moves.DEMove(sigma=0.2), 0.4 * rest),
+        (emcee.moves.DESnookerMove(), 0.2 * rest),
+        (emcee.moves.StretchMove(), 0.4 * rest),
     ]
 
 
@@ -118,24 +126,24 @@ def advance(
         With the steps appended.
     """
     walkers, d = ensemble.coords.shape
-    sampler = emcee.EnsembleSampler(walkers, d, density, moves=_moves(mixture), vectorize=True)
-    key, position = ensemble.random
+    sampler = emcee.EnsembleSampler(
+        walkers, d, density, moves=_moves(mixture, mixture.share), vectorize=True
+    )
     state = emcee.State(
         ensemble.coords.copy(),
         log_prob=ensemble.log_prob.copy(),
-        random_state=("MT19937", key, position, 0, 0.0),
+        random_state=("MT19937", *ensemble.random),
     )
     # the setter swallows errors: make sure that the stream is this ensemble's own
     sampler.random_state = state.random_state
-    if not np.array_equal(sampler.random_state[1], key):
+    if not np.array_equal(sampler.random_state[1], ensemble.random[0]):
         raise RuntimeError("emcee did not take the ensemble's random state")
     state = sampler.run_mcmc(state, steps, skip_initial_state_check=True)
-    stream = sampler.random_state
     return Ensemble(
         np.array(state.coords),
         np.array(state.log_prob),
         np.concatenate([ensemble.chain, sampler.get_chain()]),
         np.concatenate([ensemble.chain_log_prob, sampler.get_log_prob()]),
         ensemble.accepted + sampler.backend.accepted.astype(np.int64),
-        (np.asarray(stream[1], dtype=np.uint32), int(stream[2])),
+        _stream(sampler.random_state),
     )

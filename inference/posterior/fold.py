@@ -54,8 +54,9 @@ Array = NDArray[np.float64]
 WALKERS = 32
 _IMPORTANCE_DRAWS = 2000
 _MOST_IMPORTANCE_DRAWS = 200_000
-_CHUNK_S = 0.4  # of the first chunk; later ones grow to about a second
+_CHUNK_S = 0.33  # of the first chunk; later ones grow to about a second
 _MOST_STEPS = 20_000
+_TRIAL_DRAWS = 400
 _MOST_ADAPTATIONS = 2
 _FAST = 10.0  # steps of autocorrelation below which the proposal needs no adaptation
 _PILOT_DRAWS = 6000
@@ -167,6 +168,10 @@ def start(job: Job) -> Checkpoint:
                 None,
                 True,
             )
+    trial = draw_weighted(density, mixture, job.stream(8), _TRIAL_DRAWS)
+    calls += _TRIAL_DRAWS
+    if trial.ess > 0.5 * _TRIAL_DRAWS:  # jumps that are mostly accepted forget fastest
+        mixture = dataclasses.replace(mixture, share=0.8)
     ensembles = _ensembles(density, mixture, tempered, job)
     calls += WALKERS * len(ensembles)
     return Checkpoint(

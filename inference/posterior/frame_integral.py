@@ -1,7 +1,7 @@
 """The inner integral: a frame's range integrated out, adaptively.
 
-The curve of mean readings is tabulated once for all frames of a parameter vector. Every local
-maximum of a frame's density on the table is refined by a bracketed Gauss-Newton iteration and
+The curve of mean readings is tabulated once for all frames of a parameter vector, more finely
+where it turns. Every local maximum of a frame's density on the table is refined by a bracketed Gauss-Newton iteration and
 integrated on its own interval between valleys: by a short trapezoidal rule where the peak is
 narrow, interior and passes its checks, otherwise by Gauss-Legendre panels that march outward.
 """
@@ -27,20 +27,20 @@ from simulator.compiled import compiled
 from simulator.readings import background_readings, object_readings
 
 __all__ = [
-    "MAX_MODES",
     "falls_off",
     "find_modes",
     "frame_log_likelihood",
     "integration_bounds",
-    "knot_count",
     "tabulate",
 ]
 
 Array = NDArray[np.float64]
 
-MAX_MODES = 64
 _KNOT_SPACING = 0.0365  # 192 knots over the default prior's seven e-folds
 _FEWEST_KNOTS = 192
+_MOST_KNOTS = 16384
+_TURN = 0.7  # cosine of the largest turn of the curve at a knot
+_VISIBLE = 0.3  # standard deviations of a reading below which a turn of the curve is not seen
 _NEGLIGIBLE = 30.0  # nats below the best: exp(-30) of a mass changes no digit that counts
 _STEP = 0.7  # of the trapezoidal rule, in standard deviations
 _HALF = 10  # its points on either side of the mode
@@ -58,44 +58,120 @@ def integration_bounds(law: Law) -> Pair:
     """Return the interval of u = log r that holds all the prior's mass but rounding."""
     low, high = law[6], law[7]
     if law[3] > 0.0:
-        low = max(low, law[2] - _REACH / law[3])
-        high = min(high, law[2] + _REACH / law[3])
-    if law[5] > 0.0:
-        low = max(low, math.exp(law[4] - _REACH / law[5]))
-        high = min(high, math.exp(law[4] + _REACH / law[5]))
+        # from the point of the support where the density is largest: it may be an end
+        centre = min(max(law[2], low), high)
+        low, high = max(low, centre - _REACH / law[3]), min(high, centre + _REACH / law[3])
     if not high > low or not high > 0.0:
         return 0.0, -1.0
-    return math.log(max(low, 1e-6 * high)), math.log(high)
+    # only a law that is not one of log r has next to nothing near zero
+    floor = 1e-6 * high if law[1] > -1.0 else 1e-300
+    first, last = math.log(max(low, floor)), math.log(high)
+    if law[5] > 0.0:
+        # the density along u is a normal one: one of r that is normal in log r has its factor 1/r
+        centre = min(max(law[4], first), last)
+        first, last = max(first, centre - _REACH / law[5]), min(last, centre + _REACH / law[5])
+    return first, last
 
 
 @compiled
-def knot_count(bounds: Pair) -> int:
-    """Return the number of table knots for an interval of u."""
-    return max(_FEWEST_KNOTS, math.ceil((bounds[1] - bounds[0]) / _KNOT_SPACING) + 1)
-
-
-@compiled
-def tabulate(
+def _fill(
     table: Array,
-    bounds: Pair,
+    k: int,
+    u: float,
     shape: Triple,
     background: Quad | None,
     law: Law,
     r0: float,
     wave: Pair | None,
 ) -> None:
-    """Fill a table of shape (6, knots): u, log prior, object's readings, scene's readings."""
-    n = table.shape[1]
+    """Fill one column of a table."""
+    r = math.exp(u)
+    o1, o2 = object_readings(r, r0, wave, shape[0], shape[1], shape[2])
+    table[0, k], table[1, k] = u, log_range_density(r, u, law)
+    table[2, k], table[3, k] = o1, o2
+    table[4, k], table[5, k] = o1, o2
+    if background is not None:
+        b1, b2 = background_readings(r, r0, wave, background)
+        table[4, k], table[5, k] = o1 + b1, o2 + b2
+
+
+@compiled
+def _sharp_turns(split: NDArray[np.bool_], table: Array, unit: Pair) -> int:
+    """Mark the segments next to knots where the curve turns sharply and visibly; count them."""
+    split[:] = False
+    x1 = (table[4, 1] - table[4, 0]) / unit[0]
+    y1 = (table[5, 1] - table[5, 0]) / unit[1]
+    length1 = x1 * x1 + y1 * y1
+    for k in range(1, table.shape[1] - 1):
+        x2 = (table[4, k + 1] - table[4, k]) / unit[0]
+        y2 = (table[5, k + 1] - table[5, k]) / unit[1]
+        length2 = x2 * x2 + y2 * y2
+        along = x1 * x2 + y1 * y2
+        if max(length1, length2) > _VISIBLE**2 and (
+            along <= 0.0 or along * along < _TURN**2 * length1 * length2
+        ):
+            split[k - 1] = split[k - 1] or length1 > _VISIBLE**2
+            split[k] = length2 > _VISIBLE**2
+        x1, y1, length1 = x2, y2, length2
+    count = 0
+    for k in range(split.size):
+        # a segment of a few roundings is as short as it can be
+        split[k] = split[k] and table[0, k + 1] - table[0, k] > 1e-12 * (1.0 + abs(table[0, k]))
+        count += split[k]
+    return count
+
+
+@compiled
+def tabulate(
+    bounds: Pair,
+    shape: Triple,
+    background: Quad | None,
+    law: Law,
+    r0: float,
+    wave: Pair | None,
+    unit: Pair,
+) -> Array:
+    """Tabulate the curve of mean readings, knots closer where it turns.
+
+    Between knots the distance of a reading from the curve has one minimum as long as the curve is
+    near straight there. Evenly spaced knots miss the turns of a sine wave over many wavelengths,
+    and the narrow peak of a flux with c1 near -2 sqrt(c0).
+
+    Parameters
+    ----------
+    bounds : (float, float)
+        From `integration_bounds`.
+    shape, background, law, r0, wave
+        As for `log_integrand`.
+    unit : (float, float)
+        Smallest noise of the two readings over the gain factors of all frames: what is visible.
+
+    Returns
+    -------
+    ndarray, shape (6, knots)
+        u, log prior, object's readings, scene's readings; readings without gain factor and
+        crosstalk.
+    """
+    n = max(_FEWEST_KNOTS, math.ceil((bounds[1] - bounds[0]) / _KNOT_SPACING) + 1)
+    table = np.empty((6, n))
     for k in range(n):
         u = bounds[0] + (bounds[1] - bounds[0]) * k / (n - 1)
-        r = math.exp(u)
-        o1, o2 = object_readings(r, r0, wave, shape[0], shape[1], shape[2])
-        table[0, k], table[1, k] = u, log_range_density(r, u, law)
-        table[2, k], table[3, k] = o1, o2
-        table[4, k], table[5, k] = o1, o2
-        if background is not None:
-            b1, b2 = background_readings(r, r0, wave, background)
-            table[4, k], table[5, k] = o1 + b1, o2 + b2
+        _fill(table, k, u, shape, background, law, r0, wave)
+    while True:
+        split = np.empty(n - 1, dtype=np.bool_)
+        more = _sharp_turns(split, table, unit)
+        if more == 0 or n + more > _MOST_KNOTS:
+            return table
+        finer = np.empty((6, n + more))
+        k = 0
+        for j in range(n):
+            finer[:, k] = table[:, j]
+            k += 1
+            if j < n - 1 and split[j]:
+                middle = 0.5 * (table[0, j] + table[0, j + 1])
+                _fill(finer, k, middle, shape, background, law, r0, wave)
+                k += 1
+        table, n = finer, n + more
 
 
 @compiled
@@ -147,7 +223,7 @@ def find_modes(
 
     Parameters
     ----------
-    modes : ndarray, shape (MAX_MODES, 6)
+    modes : ndarray, shape (at least half of the knots, 6)
         Filled with u, log density, standard deviation, left and right end of the mode's interval;
         the last column is left for `frame_log_likelihood`.
     values : ndarray, shape (knots,)
@@ -176,8 +252,7 @@ def find_modes(
             valley = k
         rises = k == 0 or values[k] > values[k - 1]
         falls = k == n - 1 or values[k] >= values[k + 1]
-        # a peak beyond the last slot stays inside the interval of the one before it
-        if not (rises and falls) or count == MAX_MODES:
+        if not (rises and falls):
             continue
         modes[count, 0], modes[count, 1], modes[count, 2] = table[0, k], values[k], k
         modes[count, 3], modes[count, 4] = table[0, valley], table[0, n - 1]
@@ -378,7 +453,7 @@ def frame_log_likelihood(
 
     Parameters
     ----------
-    modes : ndarray, shape (MAX_MODES, 6)
+    modes : ndarray, shape (at least count, 6)
         From `find_modes`; the last column is filled with the log of each mode's mass.
     count : int
         Number of modes.

@@ -33,11 +33,14 @@ class Mixture:
         Lower triangular scale factors.
     weights : ndarray, shape (m,)
         Sum to one.
+    share : float
+        Of the steps of an ensemble that propose from it.
     """
 
     centres: Array
     factors: Array
     weights: Array
+    share: float = 0.5
 
     def log_density(self, z: Array) -> Array:
         """Return the log density at z of shape (n, d), shape (n,)."""

@@ -8,12 +8,10 @@ from numpy.typing import NDArray
 
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.frame_integral import (
-    MAX_MODES,
     falls_off,
     find_modes,
     frame_log_likelihood,
     integration_bounds,
-    knot_count,
     tabulate,
 )
 from inference.posterior.integrand import Pair, SceneArguments, Triple, log_integrand
@@ -83,18 +81,19 @@ def _draw_ranges(
     relative: float | None,
 ) -> None:
     """Fill out[i, j] with log r."""
-    modes = np.empty((MAX_MODES, 6))
     grid = np.empty((2 * _SIDE + 1, 2))
+    strongest = frames[:, 2].max()
+    unit = (read[0] / strongest, read[1] / strongest)
     for i in range(shapes.shape[0]):
         shape = (shapes[i, 0], shapes[i, 1], shapes[i, 2])
         crosstalk = crosstalk_of(crosstalks, i)
         background = background_of(backgrounds, i)
         law = law_of(laws, i)
         bounds = integration_bounds(law)
-        table = np.empty((6, knot_count(bounds)))
+        table = tabulate(bounds, shape, background, law, r0, wave, unit)
         values = np.empty(table.shape[1])
+        modes = np.empty((values.size // 2 + 1, 6))
         scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative)
-        tabulate(table, bounds, shape, background, law, r0, wave)
         for j in range(frames.shape[0]):
             out[i, j] = math.nan
             if present is not None and not present[j]:
