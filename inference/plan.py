@@ -1,6 +1,7 @@
 """Which real-time technique a scene needs, and why the others are left out."""
 
 import dataclasses
+import math
 
 from inference.estimates import LeftOut
 from inference.realtime.known import Known, known_of
@@ -8,9 +9,11 @@ from inference.realtime.registry import ELSEWHERE, TECHNIQUES
 from inference.realtime.technique import Technique
 from simulator.frames import Frames
 from simulator.scene import Scene
-from simulator.sensor import Sensor
+from simulator.sensor import Sensor, SineWaveSensor
 
 __all__ = ["Plan", "obstacle", "plan"]
+
+_MOST_HALF_TURNS = 1000.0  # of phase to the background, each of which may hold a root
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,6 +72,16 @@ def obstacle(
             return "is made for a background, and the scene states none"
     elif "background" not in technique.immune_to:
         return "is not immune to the scene's background"
+    elif isinstance(sensor, SineWaveSensor) and technique.uses_background:
+        distance = scene.background.distance_m
+        turns = (
+            sensor.wave_number * distance / math.pi if isinstance(distance, float | int) else 0.0
+        )
+        if turns > _MOST_HALF_TURNS:
+            return (
+                f"the background lies {turns:.3g} half turns of phase away, and a frame may have "
+                "as many roots; a lower frequency would tell them apart"
+            )
     missing = [path for path in technique.needs if not known.has(path)]
     if missing:
         return f"needs {_plural(missing)} as known numbers"

@@ -20,7 +20,7 @@ from simulator.trajectories import SampledTrajectory
 from tests.posterior.scenes import KINDS, SIGNAL_AT_1M
 
 FRAMES = 12
-RANGES = {"prior": "loguniform", "low": 0.1, "high": 2.0}
+LOW, HIGH = 0.1, 2.0  # ranges [m], their logarithm uniform
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,7 +39,7 @@ def setting(kind: str, crosstalk: bool, snr: float) -> tuple[Sensor, Scene]:
             "c0": {"prior": "lognormal", "median": 0.08, "sigma": 0.7},
             "c2": {"prior": "lognormal", "median": 0.1, "sigma": 0.5},
         },
-        "range_m": RANGES,
+        "range_m": {"prior": "loguniform", "low": LOW, "high": HIGH},
     }
     if crosstalk:
         scene["crosstalk"] = [{"prior": "normal", "mean": 0.0, "sd": SIGNAL_AT_1M}] * 2
@@ -50,7 +50,7 @@ def setting(kind: str, crosstalk: bool, snr: float) -> tuple[Sensor, Scene]:
 def ranks(sensor: Sensor, scene: Scene, seed: int) -> Ranks:
     """Draw a truth and its readings, infer, rank."""
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(77,)))
-    truth = np.exp(rng.uniform(np.log(RANGES["low"]), np.log(RANGES["high"]), FRAMES))  # type: ignore[arg-type]
+    truth = np.exp(rng.uniform(np.log(LOW), np.log(HIGH), FRAMES))
     simulation = simulate(sensor, scene, SampledTrajectory(range_m=truth.tolist()), rng)
     settings = SamplerSettings(seed=seed, target_ess=200)
     job = fold.prepare(sensor, scene, simulation.frames, settings)

@@ -310,3 +310,14 @@ def test_nothing_depends_on_the_unit_of_the_readings(
     assert one.status.tolist() == other.status.tolist()
     np.testing.assert_allclose(one.roots_m, other.roots_m, rtol=1e-9)
     np.testing.assert_allclose(one.roots_sd_m, other.roots_sd_m, rtol=1e-6)
+
+
+def test_a_background_beyond_a_thousand_half_turns_is_left_out() -> None:
+    """Each half turn may hold a root: without a bound a frame would fill the memory."""
+    sensor = parse_sensor(
+        {"kind": "sine_wave", "frequency_hz": 1e9, "noise": {"read": [1e-6, 1e-6]}}
+    )
+    scene = parse_scene({"background": {"strength": 1.0, "distance_m": 1e6, "shadow": "object"}})
+    left_out = {item.name: item.reason for item in plan(sensor, scene).left_out}
+    for name in ("background_cancelling", "background_intensity"):
+        assert "half turns" in left_out[name]
