@@ -1,9 +1,10 @@
 """The inner integral: a frame's range integrated out, adaptively.
 
 The curve of mean readings is tabulated once for all frames of a parameter vector, more finely
-where it turns. Every local maximum of a frame's density on the table is refined by a bracketed Gauss-Newton iteration and
-integrated on its own interval between valleys: by a short trapezoidal rule where the peak is
-narrow, interior and passes its checks, otherwise by Gauss-Legendre panels that march outward.
+where it turns. Every local maximum of a frame's density on the table is refined by a bracketed
+Gauss-Newton iteration and integrated on its own interval between valleys: by a short rule where the
+peak is narrow, interior and passes its checks, otherwise by Gauss-Legendre panels that march
+outward.
 """
 
 import math
@@ -267,6 +268,7 @@ def find_modes(
         lower = table[0, max(k - 1, 0)]
         upper = table[0, min(k + 1, n - 1)]
         u = modes[j, 0]
+        density = modes[j, 1]
         slope, curvature = slope_and_curvature(u, frame, *scene)
         bend = curvature
         moved = upper - lower
@@ -280,18 +282,22 @@ def find_modes(
             if not lower < trial < upper or abs(trial - u) > 0.7 * moved:
                 trial = 0.5 * (lower + upper)
             moved = abs(trial - u)
-            last_slope, last_u, u = slope, u, trial
-            slope, curvature = slope_and_curvature(u, frame, *scene)
             if moved * math.sqrt(curvature) < 1e-3 or upper - lower < 1e-14 * (1.0 + abs(u)):
                 break
+            value = log_integrand(trial, frame, *scene)
+            if not value >= density:
+                # beyond a dip, as noise that grows with the signal makes them: the top lies nearer
+                if trial > u:
+                    upper = trial
+                else:
+                    lower = trial
+                continue
+            last_slope, last_u = slope, u
+            u, density = trial, value
+            slope, curvature = slope_and_curvature(u, frame, *scene)
             bend = (last_slope - slope) / (u - last_u)
             if not bend > 0.0:
                 bend = curvature
-        density = log_integrand(u, frame, *scene)
-        if not density > modes[j, 1]:  # rounding hid the top: keep the knot
-            u = modes[j, 0]
-            density = modes[j, 1]
-            slope, curvature = slope_and_curvature(u, frame, *scene)
         modes[j, 0], modes[j, 1] = u, density
         modes[j, 2] = 1.0 / math.sqrt(curvature) if curvature > 0.0 else math.inf
     return count
