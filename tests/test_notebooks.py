@@ -1,6 +1,5 @@
 """Notebooks run, are stored without outputs, and their data can be made anew."""
 
-import json
 from pathlib import Path
 
 import nbformat
@@ -15,8 +14,8 @@ NAMES = sorted(path.name for path in NOTEBOOKS.glob("*.ipynb"))
 
 
 def read(name: str) -> nbformat.NotebookNode:
-    text = (NOTEBOOKS / name).read_text(encoding="utf-8")
-    notebook: nbformat.NotebookNode = nbformat.from_dict(json.loads(text))  # type: ignore[no-untyped-call]
+    path = NOTEBOOKS / name
+    notebook: nbformat.NotebookNode = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
     return notebook
 
 
