@@ -1,0 +1,127 @@
+"""The adaptive inner integral against a slow reference, and its cost against a fixed grid.
+
+    python -m benchmarks.inner_integral [--cases 5000] [--seed 1] [--worst 5]
+
+Cases are random frames, ordinary and extreme (`tests.posterior.reference.random_case`); the
+reference takes about 0.1 s each. Cost is a ratio: frames of a call of 32 parameter vectors and 40
+frames, by the compiled adaptive kernel and by numpy on a fixed grid of Gauss-Legendre nodes.
+"""
+
+import argparse
+import functools
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.posterior.collapsed import CollapsedDensity, collapsed_density
+from inference.posterior.start import find_optima
+from simulator.sensor import PulsedSensor
+from tests.posterior.reference import Case, random_case, reference
+from tests.posterior.scenes import example
+
+Array = NDArray[np.float64]
+
+LIMIT = 1e-3  # nat
+VECTORS = 32
+NODES = 192  # of the baseline: as many as the adaptive rule looks at before it refines anything
+
+
+def adaptive(case: Case) -> float:
+    density = collapsed_density(case.sensor, case.scene, case.frames)
+    return float(density.log_likelihood(np.zeros((1, 0)))[0])
+
+
+def accuracy(count: int, seed: int, worst: int) -> None:
+    rng = np.random.default_rng(seed)
+    errors, cases = [], []
+    for _ in range(count):
+        case = random_case(rng)
+        errors.append(abs(adaptive(case) - reference(case)))
+        cases.append(case)
+    found = np.nan_to_num(np.array(errors), nan=math.inf)
+    print(
+        f"{count} cases, seed {seed}: median {np.median(found):.1e} nat, 99th percentile "
+        f"{np.quantile(found, 0.99):.1e}, worst {found.max():.1e}, "
+        f"{int((found > LIMIT).sum())} above {LIMIT:g}",
+        flush=True,
+    )
+    for k in np.argsort(-found)[:worst]:
+        print(f"  case {k}: {found[k]:.1e} nat; {cases[k]}")
+
+
+def fixed_grid(density: CollapsedDensity, z: Array) -> Array:
+    """Log likelihoods on a fixed grid in log r: what a plain numpy program would do."""
+    terms = density.parameters.terms(z)
+    low, high = (np.log(terms.ranges[0, k]) for k in (6, 7))
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    u = low + 0.5 * (high - low) * (1 + nodes)
+    r = np.exp(u)
+    c0, c1, c2 = (column[:, None] for column in terms.object.T)
+    flux = density.gain * c0 * c2 / (r**2 * (r**2 + c1 * r + c0))
+    if density.wave is None:
+        means = np.stack([flux * r / density.r0, flux])
+    else:
+        phase = density.wave[0] * r + density.wave[1]
+        means = np.stack([flux * np.cos(phase), flux * np.sin(phase)])
+    if terms.crosstalk is not None:
+        means = means + terms.crosstalk.T[:, :, None]
+    square = np.zeros((len(z), density.frames.shape[0], NODES))
+    for k in range(2):
+        square += ((density.frames[:, k, None] - means[k][:, None, :]) / density.read[k]) ** 2
+    lowest = square.min(axis=2)
+    mass = np.exp(-0.5 * (square - lowest[:, :, None])) @ (0.5 * weights)
+    constant = math.log(2 * math.pi * density.read[0] * density.read[1])
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(mass) - 0.5 * lowest - constant)
+
+
+def seconds_per_call(call: Callable[[Array], Array], z: Array) -> float:
+    call(z)
+    best = math.inf
+    for _ in range(20):
+        begin = time.perf_counter()
+        call(z)
+        best = min(best, time.perf_counter() - begin)
+    return best
+
+
+def cost() -> None:
+    print(
+        f"\n| scene | sensor | adaptive [us/frame] | {NODES} fixed nodes | ratio | worst of fixed |"
+    )
+    print("|---|---|---|---|---|---|")
+    for kind in ("pulsed", "sine_wave"):
+        for crosstalk in (False, True):
+            sensor, scene, frames = example(kind, crosstalk, frames=40)
+            density = collapsed_density(sensor, scene, frames)
+            rng = np.random.default_rng(0)
+            top = find_optima(density, rng)[0]
+            z = top.z + rng.standard_normal((VECTORS, top.z.size)) @ top.factor.T
+            evaluations = VECTORS * len(frames)
+            fast = seconds_per_call(density.frame_log_likelihoods, z)
+            plain = seconds_per_call(functools.partial(fixed_grid, density), z)
+            off = np.abs(fixed_grid(density, z) - density.frame_log_likelihoods(z)).max()
+            print(
+                f"| object{' and crosstalk' if crosstalk else ''} "
+                f"| {'pulsed' if isinstance(sensor, PulsedSensor) else 'sine wave'} "
+                f"| {1e6 * fast / evaluations:.2f} | {1e6 * plain / evaluations:.2f} "
+                f"| {fast / plain:.2f} | {off:.1e} nat |",
+                flush=True,
+            )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=5000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--worst", type=int, default=0, help="print so many of the worst cases")
+    arguments = parser.parse_args()
+    accuracy(arguments.cases, arguments.seed, arguments.worst)
+    cost()
+
+
+if __name__ == "__main__":
+    main()
