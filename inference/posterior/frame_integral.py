@@ -437,7 +437,8 @@ def _march(
                     both = _add(near, far)
                     error = abs(math.expm1(both - mass)) if mass > -math.inf else 0.0
                     mass, highest = both, max(high1, high2)
-                    if error <= 1e-8 or mass < total - 20.0:
+                    # a log mass of a million nats is itself known to no better than its rounding
+                    if error <= 1e-8 + 1e-15 * abs(mass) or mass < total - 20.0:
                         break
                     width, mass, highest, last = 0.5 * width, near, high1, False
             total = _add(total, mass)

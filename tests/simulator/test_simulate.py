@@ -122,9 +122,7 @@ def test_noise_has_the_stated_covariance() -> None:
         for j in range(2):
             error = math.sqrt((wanted[i, i] * wanted[j, j] + wanted[i, j] ** 2) / n)
             assert abs(found[i, j] - wanted[i, j]) < 5 * error
-        assert (
-            stats.norm.sf(abs(readings[:, i].mean() - mean[i]) / math.sqrt(wanted[i, i] / n)) > 1e-6
-        )
+        assert abs(readings[:, i].mean() - mean[i]) < 5 * math.sqrt(wanted[i, i] / n)
 
 
 @pytest.mark.parametrize("factor", [2.0**-40, 2.0**40])
