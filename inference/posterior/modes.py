@@ -9,7 +9,7 @@ __all__ = ["range_modes"]
 
 Array = NDArray[np.float64]
 
-_NEIGHBOURS = 10  # draws on either side that a gap is held against
+_NEIGHBOURS = 20  # draws on either side that a gap is held against
 _GAP = 2.0  # times their span
 
 
@@ -18,7 +18,7 @@ def range_modes(ranges: Array) -> tuple[Mode, ...]:
 
     A gap between two neighbouring draws separates modes where it is wider than twice the span of
     the ten draws on either side; among draws of one smooth density that happens by chance with
-    probability 3^-10 a gap. Modes of fewer than ten draws are not told apart from tails.
+    probability 3^-20 a gap. Modes of fewer than twenty draws are not told apart from tails.
 
     Parameters
     ----------
