@@ -4,11 +4,7 @@ import math
 import secrets
 from typing import Any
 
-import numpy as np
-
-from service.checks import system
 from service.schemas import SimulationRequest
-from simulator.errors import RefusedError
 from simulator.simulate import simulate
 
 __all__ = ["simulation_of"]
@@ -31,23 +27,15 @@ def simulation_of(request: SimulationRequest) -> dict[str, Any]:
     Raises
     ------
     InvalidInputError
-        With pointers into the request.
+        With pointers into the request, also where a reading is beyond what a number can hold.
     RefusedError
-        Where readings of this scene are beyond what a number can hold.
+        Where the priors of the scene all but exclude one another.
     """
-    sensor, scene = system(request.sensor, request.scene)
     seed = secrets.randbelow(2**53) if request.seed is None else request.seed
-    # what overflows is refused below, all of it at once
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        simulation = simulate(sensor, scene, request.trajectory, seed)
-    times = () if simulation.frames.time_s is None else simulation.frames.time_s
-    drawn = list(simulation.parameters.values())
-    if not all(np.isfinite(part).all() for part in (simulation.frames.readings, times, drawn)):
-        message = "the readings of this scene overflow; bring gain, ranges and noise nearer to 1"
-        raise RefusedError(message)
+    simulation = simulate(request.sensor, request.scene, request.trajectory, seed)
     ranges = [None if math.isnan(value) else value for value in simulation.range_m.tolist()]
     return {
-        "frames": simulation.frames.to_columns(sensor),
+        "frames": simulation.frames.to_columns(request.sensor),
         "truth": {"range_m": ranges, "parameters": simulation.parameters},
         "seed": seed,
     }

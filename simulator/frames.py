@@ -15,7 +15,9 @@ from simulator.validated import Validated
 __all__ = ["FrameColumns", "Frames", "frames_from_columns"]
 
 Array = NDArray[np.float64]
-Column = Annotated[list[float], pydantic.Field(max_length=2_000_000)]
+# a bad column is answered by its first bad entry, not by one problem for each of a million
+_BOUNDS = pydantic.Field(max_length=2_000_000, fail_fast=True)
+Column = Annotated[list[float], _BOUNDS]
 
 
 class FrameColumns(Validated):
@@ -30,8 +32,8 @@ class FrameColumns(Validated):
     dw2_dt: Column | None = None
     di_dt: Column | None = None
     dq_dt: Column | None = None
-    gain: Annotated[list[Annotated[float, pydantic.Field(gt=0)]], pydantic.Field()] | None = None
-    object_present: list[bool] | None = None
+    gain: Annotated[list[Annotated[float, pydantic.Field(gt=0)]], _BOUNDS] | None = None
+    object_present: Annotated[list[bool], _BOUNDS] | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -164,7 +166,10 @@ def frames_from_columns(
 def _as_column(name: str, values: ArrayLike) -> tuple[NDArray[Any], str | None]:
     """Return the column as an array, and what is wrong with it."""
     wanted = bool if name == "object_present" else float
-    array = np.asarray(values)
+    try:
+        array = np.asarray(values)
+    except ValueError:  # rows of different lengths
+        return np.empty(0), "must be one-dimensional"
     if array.size == 0:
         return np.empty(0, dtype=wanted), None
     if array.ndim != 1:

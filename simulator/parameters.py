@@ -11,8 +11,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from simulator.errors import RefusedError
 from simulator.priors import Distribution, HalfNormal, LogNormal, LogUniform, Uniform
-from simulator.scene import Quantity, Scene, Stroke, check_scene
+from simulator.scene import Quantity, Scene, Stroke, check_scene, largest
 from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = ["Parameters", "Terms", "Unknown", "parameters_of"]
@@ -26,6 +27,7 @@ _DEFAULT_C1_SD = 0.4
 _DEFAULT_SHADOW_C0 = LogNormal(median=0.75, sigma=0.5).distribution()
 _DEFAULT_SHADOW_C1 = HalfNormal(sd=0.3).distribution()
 _DEFAULT_RANGE = (0.02, 20.0)
+_MOST_REJECTIONS = 1_000_000
 _STROKE_SPREAD = LogNormal(median=0.5, sigma=1.0).distribution()
 
 
@@ -157,6 +159,8 @@ class Parameters:
     def sample(self, rng: np.random.Generator, n: int) -> Array:
         """Draw n vectors z from the prior, joint truncations by rejection.
 
+        The effort is bounded: priors that all but exclude one another are refused.
+
         Parameters
         ----------
         rng : numpy.random.Generator
@@ -167,15 +171,29 @@ class Parameters:
         Returns
         -------
         ndarray, shape (n, d)
+
+        Raises
+        ------
+        RefusedError
+            Where less than about a millionth of the separate priors satisfies c1 > -2 sqrt(c0).
         """
         accepted: list[Array] = []
-        count = 0
+        count = tried = 0
+        size = max(n, 16)
         while count < n:
-            z = rng.standard_normal((max(n - count, 16), len(self)))
+            if tried > _MOST_REJECTIONS * (count + 1):
+                raise RefusedError(
+                    "the priors of c0 and c1 leave less than a millionth of their mass where "
+                    "c1 > -2 sqrt(c0); bring them into agreement with one another"
+                )
+            z = rng.standard_normal((size, len(self)))
             log_weight = self.log_prior(z) + 0.5 * np.einsum("ij,ij->i", z, z)
-            z = z[np.log(rng.uniform(size=len(z))) < log_weight]
+            z = z[np.log(rng.uniform(size=size)) < log_weight]
             accepted.append(z)
             count += len(z)
+            tried += size
+            # larger pieces where few are accepted, without holding many at once
+            size = min(max(n - count, 2 * size if len(z) < size / 2 else 16), 1 << 16)
         return np.concatenate(accepted)[:n]
 
     def _ranges(self, values: Values, background: Array | None, n: int) -> Array:
@@ -183,7 +201,8 @@ class Parameters:
         if isinstance(self.range_prior, Stroke):
             law[:, 1] = -1.0
             law[:, 4] = np.log(values["range_m.centre"])
-            law[:, 5] = 1.0 / values["range_m.spread"]
+            with np.errstate(divide="ignore"):  # far out in z a spread underflows
+                law[:, 5] = 1.0 / values["range_m.spread"]
             law[:, 6], law[:, 7] = self.range_prior.low, self.range_prior.high
         else:
             prior = self.range_prior
@@ -201,7 +220,7 @@ class Parameters:
     def _log_normaliser(self, law: Array) -> Array:
         """Log integral of the unnormalised law over its support, shape (n,)."""
         low, high = law[:, 6], law[:, 7]
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             if isinstance(self.range_prior, Stroke) or self.range_prior.base == "normal":
                 in_log = isinstance(self.range_prior, Stroke) or self.range_prior.log
                 loc, inverse = (law[:, 4], law[:, 5]) if in_log else (law[:, 2], law[:, 3])
@@ -242,7 +261,9 @@ def _add_shape(
     """Add c0 and c1 of the object or the shadow, jointly truncated to c1 > -2 sqrt(c0)."""
     name0, name1 = f"{path}.c0", f"{path}.c1"
     is_object = path == "object"
-    least = (c1 / 2) ** 2 if isinstance(c1, float | int) and c1 < 0 else 0.0
+    # where no c1 can be above a negative bound, no smaller c0 has prior mass
+    greatest = largest(c1)
+    least = (greatest / 2) ** 2 if greatest < 0 else 0.0
     if c0 is None:
         law = _DEFAULT_C0 if is_object else _DEFAULT_SHADOW_C0
 
@@ -298,7 +319,9 @@ def _range_prior(sensor: Sensor, scene: Scene) -> Distribution | Stroke:
     limit = sensor.r0 if isinstance(sensor, PulsedSensor) else math.inf
     if scene.range_m is None:
         high = min(sensor.max_range_m, _DEFAULT_RANGE[1])
-        return LogUniform(low=min(_DEFAULT_RANGE[0], high / 100), high=high).distribution()
+        # a sensor that sees less than 2 cm still has ranges
+        low = _DEFAULT_RANGE[0] if high > _DEFAULT_RANGE[0] else high / 100
+        return LogUniform(low=low, high=high).distribution()
     if isinstance(scene.range_m, Stroke):
         return Stroke(low=scene.range_m.low, high=min(scene.range_m.high, limit))
     return scene.range_m.distribution().truncated(0.0, limit)

@@ -74,7 +74,8 @@ class Distribution:
     high: float
 
     def _coordinate(self, x: Any) -> Array:
-        with np.errstate(divide="ignore"):
+        # below zero a law of log x has no density: nan, which every comparison refuses
+        with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.log(x) if self.log else x, dtype=float)
 
     def _bounds(self, low: Any, high: Any) -> tuple[Array, Array]:
@@ -82,7 +83,8 @@ class Distribution:
         a = self._coordinate(np.maximum(low, self.low))
         b = self._coordinate(np.minimum(high, self.high))
         if self.base == "normal":
-            return (a - self.loc) / self.scale, (b - self.loc) / self.scale
+            with np.errstate(over="ignore"):
+                return (a - self.loc) / self.scale, (b - self.loc) / self.scale
         return a, b
 
     def log_mass(self, low: Any = -np.inf, high: Any = np.inf) -> Array:
@@ -121,21 +123,23 @@ class Distribution:
         Returns
         -------
         ndarray
-            x, increasing in z.
+            x, increasing in z; inf or 0 where the law reaches beyond what a number can hold.
         """
         z = np.asarray(z, dtype=float)
         low = np.maximum(low, 0.0) if self.log else low
         a, b = self._bounds(low, high)
-        if self.base == "normal":
-            if np.all(np.isneginf(a)) and np.all(np.isposinf(b)):
-                position = self.loc + self.scale * z
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            if self.base == "normal":
+                if np.all(np.isneginf(a)) and np.all(np.isposinf(b)):
+                    position = self.loc + self.scale * z
+                else:
+                    position = self.loc + self.scale * self._cut_normal(z, a, b)
             else:
-                position = self.loc + self.scale * self._cut_normal(z, a, b)
-        else:
-            width = b - a
-            # from the nearer end, so that both ends are resolved
-            position = np.where(z < 0, a + width * special.ndtr(z), b - width * special.ndtr(-z))
-        return np.asarray(np.exp(position) if self.log else position)
+                width = b - a
+                # from the nearer end, so that both ends are resolved
+                from_low, from_high = a + width * special.ndtr(z), b - width * special.ndtr(-z)
+                position = np.where(z < 0, from_low, from_high)
+            return np.asarray(np.exp(position) if self.log else position)
 
     @staticmethod
     def _cut_normal(z: Array, a: Array, b: Array) -> Array:
@@ -163,7 +167,7 @@ class Distribution:
         low = np.maximum(low, 0.0) if self.log else low
         a, b = self._bounds(low, high)
         position = self._coordinate(x)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             if self.base == "normal":
                 standard = (position - self.loc) / self.scale
                 if np.all(np.isneginf(a)) and np.all(np.isposinf(b)):
@@ -184,7 +188,7 @@ class Distribution:
         x = np.asarray(x, dtype=float)
         position = self._coordinate(x)
         a, b = self._bounds(self.low, self.high)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             if self.base == "normal":
                 standard = (position - self.loc) / self.scale
                 density = -0.5 * standard**2 - _HALF_LOG_2PI - math.log(self.scale)
@@ -193,7 +197,9 @@ class Distribution:
                 density = -np.log(b - a) + np.zeros_like(position)
             if self.log:
                 density = density - position
-        return np.asarray(np.where((x >= self.low) & (x <= self.high), density, -np.inf))
+        # a law of log x has no density at x = 0, where both of its terms are infinite
+        inside = (x >= self.low) & (x <= self.high) & ~np.isnan(density)
+        return np.asarray(np.where(inside, density, -np.inf))
 
     def truncated(self, low: float = -math.inf, high: float = math.inf) -> "Distribution":
         """Return the same law on a smaller support, renormalised."""
@@ -211,6 +217,8 @@ class Uniform(Validated):
     def _ordered(self) -> "Uniform":
         if not self.low < self.high:
             raise ValueError("low must be below high")
+        if not math.isfinite(self.high - self.low):
+            raise ValueError("high - low is beyond what a number can hold")
         return self
 
     def distribution(self) -> Distribution:
@@ -284,6 +292,8 @@ class TruncatedNormal(Validated):
     def _ordered(self) -> "TruncatedNormal":
         if not self.low < self.high:
             raise ValueError("low must be below high")
+        if not math.isfinite(self.distribution().log_mass()):  # nan: nothing over nothing
+            raise ValueError("the law has no mass between low and high that a number can hold")
         return self
 
     def distribution(self) -> Distribution:

@@ -20,6 +20,7 @@ __all__ = [
     "Shadow",
     "Stroke",
     "check_scene",
+    "largest",
     "parse_scene",
 ]
 
@@ -238,8 +239,8 @@ def _check_support(value: Quantity | None, low: float, high: float, where: str) 
     return []
 
 
-def _largest(value: Quantity | None) -> float:
-    """Return the largest value that a quantity can take."""
+def largest(value: Quantity | None) -> float:
+    """Return the largest value that a quantity can take (None: a default, without a bound)."""
     if value is None:
         return math.inf
     return float(value) if isinstance(value, float | int) else value.distribution().high
@@ -251,7 +252,7 @@ def _check_shape(c0: Quantity | None, c1: Quantity | None, where: str) -> list[P
     if problems or c1 is None:
         return problems
     # with c0 free the widest support decides: a joint prior is refused only where nothing is left
-    least = -2 * math.sqrt(_largest(c0)) if _largest(c0) < math.inf else -math.inf
+    least = -2 * math.sqrt(largest(c0)) if largest(c0) < math.inf else -math.inf
     if isinstance(c1, float | int) and isinstance(c0, float | int):
         if not c1 > least:
             return [Problem(f"{where}/c1", f"must be above -2 sqrt(c0) = {least:g}, is {c1:g}")]

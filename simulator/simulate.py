@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from simulator.compiled import compiled
+from simulator.errors import InvalidInputError
 from simulator.frames import Frames
+from simulator.overflow import check_drawn, check_readings
 from simulator.parameters import Terms, parameters_of
 from simulator.readings import background_readings, noise_parts, object_readings
 from simulator.scene import Scene
@@ -158,12 +160,19 @@ def simulate(
     Raises
     ------
     InvalidInputError
-        Where `check_scene` refuses the scene.
+        Where `check_scene` refuses the scene, and where a reading is beyond what a number can
+        hold. Pointers are those of a request: below "/sensor", "/scene", "/trajectory".
+    RefusedError
+        Where the priors of the scene all but exclude one another.
     """
     rng = np.random.default_rng(seed)
-    parameters = parameters_of(sensor, scene)
+    try:
+        parameters = parameters_of(sensor, scene)
+    except InvalidInputError as error:
+        raise error.below("/scene") from None
     z = parameters.sample(rng, 1)
-    natural = parameters.natural(z)[0]
+    drawn = dict(zip(parameters.names, parameters.natural(z)[0].tolist(), strict=True))
+    check_drawn(scene, drawn)
     ranges = trajectory.ranges()
     factor = np.ones(ranges.size)
     present = None
@@ -173,16 +182,19 @@ def simulate(
         if trajectory.object_present is not None:
             present = np.asarray(trajectory.object_present)
             ranges = np.where(present, ranges, np.inf)
-    if scene.discrepancy is not None:
-        factor = factor * _discrepancy(rng, ranges, scene.discrepancy)
-    moments = _moments(sensor, parameters.terms(z), ranges, factor)
-    readings = moments[:, :2] + _noise(rng, *moments[:, 2:].T)
+    # overflow shows in the result, which is checked
+    with np.errstate(over="ignore", invalid="ignore"):
+        if scene.discrepancy is not None:
+            factor = factor * _discrepancy(rng, ranges, scene.discrepancy)
+        moments = _moments(sensor, parameters.terms(z), ranges, factor)
+        readings = moments[:, :2] + _noise(rng, *moments[:, 2:].T)
+    check_readings(sensor, trajectory, factor, moments, readings)
     if sensor.full_scale is not None:
         limit = np.asarray(sensor.full_scale)
         readings = np.clip(readings, -limit, limit)
     frames = Frames(readings, time_s=trajectory.times(), object_present=present)
     truth = np.where(np.isfinite(ranges), ranges, np.nan)
-    return Simulation(frames, truth, dict(zip(parameters.names, natural.tolist(), strict=True)))
+    return Simulation(frames, truth, drawn)
 
 
 def _noise(

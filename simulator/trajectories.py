@@ -1,7 +1,7 @@
 """Trajectories: the true range of every frame, and when it was taken."""
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import numpy as np
 import pydantic
@@ -13,6 +13,8 @@ __all__ = ["RadialTrajectory", "SampledTrajectory", "Trajectory"]
 
 Positive = Annotated[float, pydantic.Field(gt=0)]
 MAX_FRAMES = 1_000_000
+_BOUNDS = pydantic.Field(min_length=1, max_length=MAX_FRAMES, fail_fast=True)
+T = TypeVar("T", list[float] | None, list[bool] | None)
 
 
 class SampledTrajectory(Validated):
@@ -31,19 +33,18 @@ class SampledTrajectory(Validated):
         False where the scene is empty.
     """
 
-    range_m: Annotated[list[Positive], pydantic.Field(min_length=1, max_length=MAX_FRAMES)]
-    time_s: list[float] | None = None
-    amplitude: list[Positive] | None = None
-    object_present: list[bool] | None = None
+    range_m: Annotated[list[Positive], _BOUNDS]
+    time_s: Annotated[list[float], _BOUNDS] | None = None
+    amplitude: Annotated[list[Positive], _BOUNDS] | None = None
+    object_present: Annotated[list[bool], _BOUNDS] | None = None
 
-    @pydantic.model_validator(mode="after")
-    def _equal_lengths(self) -> "SampledTrajectory":
-        n = len(self.range_m)
-        for name in ("time_s", "amplitude", "object_present"):
-            column = getattr(self, name)
-            if column is not None and len(column) != n:
-                raise ValueError(f"{name} has {len(column)} entries where range_m has {n}")
-        return self
+    @pydantic.field_validator("time_s", "amplitude", "object_present")
+    @classmethod
+    def _as_long_as_the_ranges(cls, column: T, info: pydantic.ValidationInfo) -> T:
+        ranges = info.data.get("range_m")  # missing where it is wrong itself
+        if column is not None and ranges is not None and len(column) != len(ranges):
+            raise ValueError(f"has {len(column)} entries where range_m has {len(ranges)}")
+        return column
 
     def ranges(self) -> NDArray[np.float64]:
         """Return the ranges [m], shape (n,)."""
