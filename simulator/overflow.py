@@ -82,15 +82,18 @@ def check_readings(
     mean = moments[frame, :2]
     if not math.isfinite(factor[frame]):
         raise InvalidInputError.at("/scene/discrepancy", f"the error of the flux {_BEYOND}")
-    if np.isfinite(mean).all() and not np.isfinite(moments[frame]).all():
+    largest = float(np.abs(mean).max())
+    if math.isfinite(largest):
         noise = sensor.noise
-        if not all(math.isfinite(sd * sd) for sd in noise.read):
-            name = "read"
-        elif not np.isfinite(noise.shot * np.abs(mean)).all():
-            name = "shot"
-        else:
-            name = "relative"
-        raise InvalidInputError.at(f"/sensor/noise/{name}", f"the noise of frame {frame} {_BEYOND}")
+        sds = {
+            "read": max(noise.read),
+            "shot": math.sqrt(noise.shot) * math.sqrt(largest),
+            "relative": float(np.abs(moments[frame, 5:]).max()),
+        }
+        name = max(sds, key=sds.__getitem__)
+        if sds[name] >= largest:
+            message = f"the noise of frame {frame} {_BEYOND}"
+            raise InvalidInputError.at(f"/sensor/noise/{name}", message)
     if isinstance(trajectory, SampledTrajectory):
         amplitude = 1.0 if trajectory.amplitude is None else trajectory.amplitude[frame]
         column = "range_m" if amplitude <= 1.0 else "amplitude"
