@@ -66,7 +66,6 @@ def _log_likelihoods(
 ) -> None:
     """Fill out[i, j] with the log likelihood of frame j under parameter vector i."""
     strongest = frames[:, 2].max()
-    unit = (read[0] / strongest, read[1] / strongest)
     for i in range(shapes.shape[0]):
         shape = (shapes[i, 0], shapes[i, 1], shapes[i, 2])
         crosstalk = crosstalk_of(crosstalks, i)
@@ -76,7 +75,7 @@ def _log_likelihoods(
         if not bounds[1] > bounds[0] or not math.isfinite(law[0]):
             out[i, :] = -math.inf
             continue
-        table = tabulate(bounds, shape, background, law, r0, wave, unit)
+        table = tabulate(bounds, shape, crosstalk, background, law, r0, wave, read, shot, strongest)
         values = np.empty(table.shape[1])
         modes = np.empty((values.size // 2 + 1, 6))
         scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative)

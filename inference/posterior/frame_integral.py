@@ -68,7 +68,6 @@ def integration_bounds(law: Law) -> Pair:
     floor = 1e-6 * high if law[1] > -1.0 else 1e-300
     first, last = math.log(max(low, floor)), math.log(high)
     if law[5] > 0.0:
-        # the density along u is a normal one: one of r that is normal in log r has its factor 1/r
         centre = min(max(law[4], first), last)
         first, last = max(first, centre - _REACH / law[5]), min(last, centre + _REACH / law[5])
     return first, last
@@ -97,8 +96,21 @@ def _fill(
 
 
 @compiled
-def _sharp_turns(split: NDArray[np.bool_], table: Array, unit: Pair) -> int:
-    """Mark the segments next to knots where the curve turns sharply and visibly; count them."""
+def _changes_sign(before: float, after: float, unit: float) -> bool:
+    """Tell whether a quantity changes sign over a visible step."""
+    return (before < 0.0) != (after < 0.0) and abs(after - before) > unit
+
+
+@compiled
+def _too_coarse(
+    split: NDArray[np.bool_],
+    table: Array,
+    offset: Pair,
+    unit: Pair,
+    pulsed: bool,
+    shot: float | None,
+) -> int:
+    """Mark the segments of a table that want a knot in their middle; count them."""
     split[:] = False
     x1 = (table[4, 1] - table[4, 0]) / unit[0]
     y1 = (table[5, 1] - table[5, 0]) / unit[1]
@@ -114,6 +126,15 @@ def _sharp_turns(split: NDArray[np.bool_], table: Array, unit: Pair) -> int:
             split[k - 1] = split[k - 1] or length1 > _VISIBLE**2
             split[k] = length2 > _VISIBLE**2
         x1, y1, length1 = x2, y2, length2
+    if shot is not None:
+        # shot noise vanishes where a mean reading does, and the difference's where both are equal
+        for k in range(split.size):
+            a1, a2 = table[4, k] + offset[0], table[4, k + 1] + offset[0]
+            b1, b2 = table[5, k] + offset[1], table[5, k + 1] + offset[1]
+            crosses = _changes_sign(a1, a2, unit[0]) or _changes_sign(b1, b2, unit[1])
+            if pulsed:
+                crosses = crosses or _changes_sign(a1 - b1, a2 - b2, min(unit[0], unit[1]))
+            split[k] = split[k] or crosses
     count = 0
     for k in range(split.size):
         # a segment of a few roundings is as short as it can be
@@ -126,26 +147,29 @@ def _sharp_turns(split: NDArray[np.bool_], table: Array, unit: Pair) -> int:
 def tabulate(
     bounds: Pair,
     shape: Triple,
+    crosstalk: Pair | None,
     background: Quad | None,
     law: Law,
     r0: float,
     wave: Pair | None,
-    unit: Pair,
+    read: Pair,
+    shot: float | None,
+    strongest: float,
 ) -> Array:
     """Tabulate the curve of mean readings, knots closer where it turns.
 
     Between knots the distance of a reading from the curve has one minimum as long as the curve is
     near straight there. Evenly spaced knots miss the turns of a sine wave over many wavelengths,
-    and the narrow peak of a flux with c1 near -2 sqrt(c0).
+    the narrow peak of a flux with c1 near -2 sqrt(c0), and the place where shot noise vanishes.
 
     Parameters
     ----------
     bounds : (float, float)
         From `integration_bounds`.
-    shape, background, law, r0, wave
+    shape, crosstalk, background, law, r0, wave, read, shot
         As for `log_integrand`.
-    unit : (float, float)
-        Smallest noise of the two readings over the gain factors of all frames: what is visible.
+    strongest : float
+        Largest gain factor of the frames: what a turn of the curve is held against.
 
     Returns
     -------
@@ -154,13 +178,17 @@ def tabulate(
         crosstalk.
     """
     n = max(_FEWEST_KNOTS, math.ceil((bounds[1] - bounds[0]) / _KNOT_SPACING) + 1)
+    unit = (read[0] / strongest, read[1] / strongest)
+    offset = (0.0, 0.0)
+    if crosstalk is not None:
+        offset = (crosstalk[0] / strongest, crosstalk[1] / strongest)
     table = np.empty((6, n))
     for k in range(n):
         u = bounds[0] + (bounds[1] - bounds[0]) * k / (n - 1)
         _fill(table, k, u, shape, background, law, r0, wave)
     while True:
         split = np.empty(n - 1, dtype=np.bool_)
-        more = _sharp_turns(split, table, unit)
+        more = _too_coarse(split, table, offset, unit, wave is None, shot)
         if more == 0 or n + more > _MOST_KNOTS:
             return table
         finer = np.empty((6, n + more))
@@ -407,7 +435,8 @@ def _march(
     scene: SceneArguments,
 ) -> float:
     """Integrate a mode's interval by panels from the mode outward; the log of its mass."""
-    shot = scene[7]
+    # halves of a smooth panel are 2^-16 of its error off
+    allowed = 1e-4 if scene[7] is None else 1e-8
     total = -math.inf
     for sign in (-1.0, 1.0):
         end = mode[3] if sign < 0.0 else mode[4]
@@ -428,19 +457,21 @@ def _march(
             if last:
                 width = (end - edge) * sign
             mass, highest = _panel(edge, sign * width, frame, scene)
-            if shot is not None:
-                # the variance has a kink where a mean reading changes sign: halve panels there
-                for _ in range(30):
-                    half = 0.5 * sign * width
-                    near, high1 = _panel(edge, half, frame, scene)
-                    far, high2 = _panel(edge + half, half, frame, scene)
-                    both = _add(near, far)
-                    error = abs(math.expm1(both - mass)) if mass > -math.inf else 0.0
-                    mass, highest = both, max(high1, high2)
-                    # a log mass of a million nats is itself known to no better than its rounding
-                    if error <= 1e-8 + 1e-15 * abs(mass) or mass < total - 20.0:
-                        break
-                    width, mass, highest, last = 0.5 * width, near, high1, False
+            # a panel can be wider than the peak, whose curvature says little of a flat top; and the
+            # variance of shot noise has a kink where a mean reading changes sign
+            for _ in range(30):
+                if mass < total - 20.0:
+                    break
+                half = 0.5 * sign * width
+                near, high1 = _panel(edge, half, frame, scene)
+                far, high2 = _panel(edge + half, half, frame, scene)
+                both = _add(near, far)
+                error = abs(math.expm1(both - mass)) if mass > -math.inf else 0.0
+                mass, highest = both, max(high1, high2)
+                # a log mass of a million nats is itself known to no better than its rounding
+                if error <= allowed + 1e-15 * abs(mass):
+                    break
+                width, mass, highest, last = 0.5 * width, near, high1, False
             total = _add(total, mass)
             edge += sign * width
             if last or highest < best - _NEGLIGIBLE:

@@ -49,7 +49,6 @@ def _best_ranges(
 ) -> None:
     """Fill out[i, j] with u, log density and standard deviation of frame j's best mode."""
     strongest = frames[:, 2].max()
-    unit = (read[0] / strongest, read[1] / strongest)
     for i in range(shapes.shape[0]):
         shape = (shapes[i, 0], shapes[i, 1], shapes[i, 2])
         crosstalk = crosstalk_of(crosstalks, i)
@@ -59,7 +58,7 @@ def _best_ranges(
         out[i, :, 0], out[i, :, 1], out[i, :, 2] = math.nan, -math.inf, math.nan
         if not bounds[1] > bounds[0] or not math.isfinite(law[0]):
             continue
-        table = tabulate(bounds, shape, background, law, r0, wave, unit)
+        table = tabulate(bounds, shape, crosstalk, background, law, r0, wave, read, shot, strongest)
         values = np.empty(table.shape[1])
         modes = np.empty((values.size // 2 + 1, 6))
         scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative)

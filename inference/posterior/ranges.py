@@ -83,14 +83,13 @@ def _draw_ranges(
     """Fill out[i, j] with log r."""
     grid = np.empty((2 * _SIDE + 1, 2))
     strongest = frames[:, 2].max()
-    unit = (read[0] / strongest, read[1] / strongest)
     for i in range(shapes.shape[0]):
         shape = (shapes[i, 0], shapes[i, 1], shapes[i, 2])
         crosstalk = crosstalk_of(crosstalks, i)
         background = background_of(backgrounds, i)
         law = law_of(laws, i)
         bounds = integration_bounds(law)
-        table = tabulate(bounds, shape, background, law, r0, wave, unit)
+        table = tabulate(bounds, shape, crosstalk, background, law, r0, wave, read, shot, strongest)
         values = np.empty(table.shape[1])
         modes = np.empty((values.size // 2 + 1, 6))
         scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative)

@@ -34,7 +34,7 @@ class Case:
         return Frames(np.array([self.reading]))
 
 
-def _parts(case: Case, u: Array) -> tuple[Array, Array, Array, Array]:
+def mean_readings(case: Case, u: Array) -> tuple[Array, Array, Array, Array]:
     """Mean readings of scene and object, written anew from the errata."""
     r = np.exp(u)
     c0, c1, c2 = case.c
@@ -63,7 +63,7 @@ def _parts(case: Case, u: Array) -> tuple[Array, Array, Array, Array]:
 
 def log_density(case: Case, u: Array) -> Array:
     """Log density of (readings, u), the range's prior loguniform on [low, high]."""
-    m1, m2, o1, o2 = _parts(case, u)
+    m1, m2, o1, o2 = mean_readings(case, u)
     noise = case.sensor.noise
     pulsed = isinstance(case.sensor, PulsedSensor)
     # determinant and chi-square as sums of squares; `test_gaussian` holds the identity to mpmath
@@ -87,7 +87,7 @@ def reference(case: Case, points: int = 20001) -> float:
     inner = np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] >= values[2:])) + 1
     ends = [k for k, other in ((0, 1), (points - 1, points - 2)) if values[k] > values[other]]
     tops = []
-    for k in sorted({*inner.tolist(), *ends}):
+    for k in sorted({*inner.tolist(), *ends, int(values.argmax())}):
         a, b = grid[max(k - 1, 0)], grid[min(k + 1, points - 1)]
         found: Any = optimize.minimize_scalar(
             lambda x: -float(log_density(case, np.array([x]))[0]),
@@ -174,7 +174,7 @@ def random_case(rng: np.random.Generator) -> Case:
     case = Case(
         sensor, parse_scene(scene), (c0, c1, c2), crosstalk, background, low, high, (0.0, 0.0)
     )
-    m1, m2, _, _ = _parts(case, np.array([math.log(r)]))
+    m1, m2, _, _ = mean_readings(case, np.array([math.log(r)]))
     read = sensor.noise.read
     spread = 1.0 if rng.random() < 0.8 else 10 ** rng.uniform(0, 3)
     reading = (
