@@ -128,9 +128,10 @@ class Parameters:
         density = -0.5 * np.einsum("ij,ij->i", z, z)
         if any(unknown.log_correction for unknown in self.unknowns):
             values = self._values(z)
-            for unknown in self.unknowns:
-                if unknown.log_correction is not None:
-                    density = density + unknown.log_correction(values)
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
+                for unknown in self.unknowns:
+                    if unknown.log_correction is not None:
+                        density = density + unknown.log_correction(values)
         return np.where(np.isnan(density), -np.inf, density)
 
     def terms(self, z: Array) -> Terms:

@@ -35,10 +35,10 @@ _HALF_LOG_2PI = 0.5 * math.log(2 * math.pi)
 
 def _log_difference(larger: Array, smaller: Array) -> Array:
     """Return log(exp(larger) - exp(smaller)) without cancellation, -inf where they are equal."""
-    gap = np.minimum(smaller - larger, 0.0)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gap = np.minimum(smaller - larger, 0.0)
         result = np.where(gap > -math.log(2), np.log(-np.expm1(gap)), np.log1p(-np.exp(gap)))
-    return np.asarray(larger + result)
+    return np.asarray(np.where(np.isneginf(larger), -np.inf, larger + result))
 
 
 def _log_normal_mass(low: Array, high: Array) -> Array:
@@ -132,14 +132,16 @@ class Distribution:
             if self.base == "normal":
                 if np.all(np.isneginf(a)) and np.all(np.isposinf(b)):
                     position = self.loc + self.scale * z
-                else:
-                    position = self.loc + self.scale * self._cut_normal(z, a, b)
+                    return np.asarray(np.exp(position) if self.log else position)
+                position = self.loc + self.scale * self._cut_normal(z, a, b)
             else:
                 width = b - a
                 # from the nearer end, so that both ends are resolved
                 from_low, from_high = a + width * special.ndtr(z), b - width * special.ndtr(-z)
                 position = np.where(z < 0, from_low, from_high)
-            return np.asarray(np.exp(position) if self.log else position)
+            x = np.exp(position) if self.log else position
+        # exp(log(x)) may leave the support by a rounding, where the density is zero
+        return np.asarray(np.clip(x, np.maximum(low, self.low), np.minimum(high, self.high)))
 
     @staticmethod
     def _cut_normal(z: Array, a: Array, b: Array) -> Array:
