@@ -7,7 +7,7 @@ import pickle
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simulator.errors import HybridTofError, InvalidInputError, Problem, RefusedError
@@ -287,6 +287,7 @@ def test_joint_priors_are_refused_only_where_nothing_is_left(least: float) -> No
             assert _pointers(caught.value) == ["/object/c1"]
 
 
+@settings(deadline=None)
 @given(st.floats(1e-300, 1e300))
 def test_every_known_c1_above_its_limit_is_accepted_and_none_below(c0: float) -> None:
     limit = -2 * math.sqrt(c0)
@@ -382,6 +383,7 @@ def spoiled(draw: st.DrawFn) -> Any:
     return document
 
 
+@settings(deadline=None)
 @given(spoiled() | anything, st.sampled_from([parse_scene, parse_sensor]))
 def test_any_json_is_valid_or_named(document: Any, parse_one: Any) -> None:
     problems: tuple[Problem, ...] = ()
@@ -397,6 +399,7 @@ def test_any_json_is_valid_or_named(document: Any, parse_one: Any) -> None:
         assert leads_somewhere(problem.pointer, document), problem
 
 
+@settings(deadline=None)
 @given(spoiled())
 def test_any_scene_passes_the_check_or_is_named(document: Any) -> None:
     for kind in SENSORS:

@@ -7,7 +7,7 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate
 
@@ -123,6 +123,7 @@ def test_every_law_and_every_cut_of_it_integrates_to_one(name: str) -> None:
         assert ratio == pytest.approx(-float(law.log_mass(*cut)), rel=1e-12, abs=1e-12)
 
 
+@settings(deadline=None)
 @given(
     st.sampled_from(sorted(LAWS)),
     st.floats(-6.0, 6.0),

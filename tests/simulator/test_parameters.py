@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate, stats
 
@@ -205,6 +205,7 @@ SCENES: list[dict[str, Any]] = [
 ]
 
 
+@settings(deadline=None)
 @given(st.sampled_from(SCENES), st.sampled_from([PULSED, SINE]), st.integers(0, 2**32))
 def test_draws_are_physical_and_coordinates_inverse(
     scene: dict[str, Any], sensor: Sensor, seed: int
@@ -222,6 +223,7 @@ def test_draws_are_physical_and_coordinates_inverse(
     assert np.all(np.isfinite(parameters.log_prior(z)))
 
 
+@settings(deadline=None)
 @given(st.sampled_from(SCENES), st.lists(st.floats(-1e3, 1e3), min_size=11, max_size=11))
 def test_far_out_nothing_warns_and_no_prior_is_nan(scene: dict[str, Any], far: list[float]) -> None:
     parameters = made(scene)
