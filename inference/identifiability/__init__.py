@@ -1,0 +1,1 @@
+"""What readings can tell of a scene: rank, Cramer-Rao bounds, and what would help."""

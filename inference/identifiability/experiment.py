@@ -1,0 +1,169 @@
+"""A set of frames at given ranges before a scene with given values: its information."""
+
+import dataclasses
+import functools
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.identifiability.information import Information, eliminate
+from inference.identifiability.sensitivity import (
+    COORDINATES,
+    Sensitivity,
+    sensitivity,
+    whiteners,
+)
+from simulator.parameters import Parameters, Terms
+from simulator.sensor import Sensor
+
+__all__ = ["Experiment", "information"]
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Experiment:
+    """Frames at given ranges, and where in the space of the unknowns they are looked at.
+
+    Attributes
+    ----------
+    sensor : Sensor
+        The sensor.
+    parameters : Parameters
+        The unknowns of the scene.
+    z : ndarray, shape (d,)
+        Their values, in the coordinates whose prior is standard normal.
+    log_r : ndarray, shape (n,)
+        log r of every frame [log m]; nan for a frame without object.
+    gain : ndarray, shape (n,), optional
+        Factor of each frame on the sensor's gain.
+    """
+
+    sensor: Sensor
+    parameters: Parameters
+    z: Array
+    log_r: Array
+    gain: Array | None = None
+
+    @functools.cached_property
+    def terms(self) -> Terms:
+        """Physical values at z."""
+        return self.parameters.terms(self.z[None])
+
+    @functools.cached_property
+    def readings(self) -> Sensitivity:
+        """Mean readings and their derivatives."""
+        return sensitivity(self.sensor, self.terms, self.log_r, self.gain)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Unknowns on which the readings depend: all but those of the ranges' prior."""
+        return tuple(name for name in self.parameters.names if not name.startswith("range_m."))
+
+    @functools.cached_property
+    def units(self) -> Array:
+        """Unit of each coordinate of `sensitivity.COORDINATES` in which it is dimensionless.
+
+        Crosstalk is measured by the light of the scene: the median over the frames of the
+        modulus of the readings without it, for both readings of a sine wave the same.
+        """
+        units = np.ones(len(COORDINATES))
+        if self.terms.crosstalk is not None:
+            light = np.abs(self.readings.mean - self.terms.crosstalk[0])
+            if self.sensor.kind != "pulsed":
+                light = np.repeat(np.hypot(light[:, 0], light[:, 1])[:, None], 2, axis=1)
+            typical = np.median(light, axis=0)
+            units[3:5] = np.where(typical > 0, typical, self.sensor.noise.read)
+        return units
+
+    @functools.cached_property
+    def directions(self) -> Array:
+        """How the coordinates of `sensitivity.COORDINATES` move with each of ``names``, (9, d).
+
+        Along log c0, c1 / sqrt(c0), log c2, the crosstalk in `units`, log B, log R, log c0' and
+        c1' / sqrt(c0'), as in the tables of Cramer-Rao bounds: c0 moves with c1 / sqrt(c0) held
+        where c1 is unknown.
+        """
+        p = self.parameters
+        columns = dict(zip(self._paths, np.diag(self.units), strict=True))
+        shapes = [("object", self.terms.object[0, :2], 0)]
+        if self.terms.background is not None:
+            shapes.append(("background.shadow", self.terms.background[0, 2:], 7))
+        for path, (c0, c1), row in shapes:
+            if path == "object" or not p.shadow_is_object:
+                if f"{path}.c1" in self.names:
+                    columns[f"{path}.c0"][row + 1] = 0.5 * c1 / math.sqrt(c0)
+                continue
+            # the shadow has the object's parameters and moves with them
+            for name in ("c0", "c1"):
+                columns[f"object.{name}"][7:9] = columns[f"object.{name}"][:2]
+        return np.stack([columns[name] for name in self.names] or [np.empty(9)][:0], axis=1)
+
+    @property
+    def _paths(self) -> tuple[str, ...]:
+        """Scene paths of the coordinates."""
+        first, second = self.parameters.crosstalk or ("crosstalk.0", "crosstalk.1")
+        return (*COORDINATES[:3], first, second, *COORDINATES[5:])
+
+    @functools.cached_property
+    def in_si_units(self) -> Array:
+        """Derivatives of the unknowns, in SI units, along their coordinates, shape (d, d)."""
+        values = dict(
+            zip(self.parameters.names, self.parameters.natural(self.z[None])[0], strict=True)
+        )
+        d = len(self.names)
+        result = np.zeros((d, d))
+        for j, name in enumerate(self.names):
+            if name.endswith(".c1"):
+                path = name.removesuffix(".c1")
+                shape = self.terms.object[0] if path == "object" else self._shadow
+                result[j, j] = math.sqrt(shape[0])
+                if f"{path}.c0" in self.names:
+                    result[j, self.names.index(f"{path}.c0")] = 0.5 * shape[1]
+            elif name in (self.parameters.crosstalk or ()):
+                result[j, j] = self.units[self._paths.index(name)]
+            else:
+                result[j, j] = values[name]
+        return result
+
+    @property
+    def _shadow(self) -> Array:
+        if self.terms.background is None:
+            raise ValueError("a scene without background has no shadow")
+        return self.terms.background[0, 2:]
+
+    def whitened(self, whitener: Array | None = None) -> tuple[Array, Array]:
+        """Return whitened derivatives along ``names`` (n, 2, d) and along log r (n, 2).
+
+        Parameters
+        ----------
+        whitener : ndarray, shape (n, 2, 2), optional
+            W with W^T W the inverse covariance of a frame's readings; left out: the sensor's.
+        """
+        of = self.readings
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
+            if whitener is None:
+                whitener = whiteners(self.sensor, of)
+            by_term = np.einsum("nij,njk->nik", whitener, of.by_term)
+            along = np.einsum("nij,nj->ni", whitener, of.by_range)
+            along[np.isnan(self.log_r)] = np.nan
+            return by_term @ self.directions, along
+
+
+def information(experiment: Experiment, whitener: Array | None = None) -> Information:
+    """Return what the readings alone tell of the unknowns, without any prior.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Sensor, unknowns, their values, ranges.
+    whitener : ndarray, shape (n, 2, 2), optional
+        W with W^T W the inverse covariance of a frame's readings; left out: the sensor's.
+
+    Returns
+    -------
+    Information
+        In the dimensionless coordinates of `Experiment.directions`.
+    """
+    return eliminate(experiment.names, *experiment.whitened(whitener))

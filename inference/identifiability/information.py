@@ -1,0 +1,222 @@
+"""Fisher information of whitened readings, every range eliminated: rank and Cramer-Rao bounds."""
+
+import dataclasses
+import functools
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+__all__ = ["Information", "eliminate"]
+
+Array = NDArray[np.float64]
+
+_EPS = float(np.finfo(np.float64).eps)
+# rounding errors of one entry of the projected Jacobian, in units of eps times what was there
+# before the projection: the derivatives have about ten operations each, and twice as many follow
+_OPERATIONS = 30.0
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Information:
+    """What readings tell of d unknowns x, the ranges of all frames being unknown too.
+
+    Nothing of a prior is in it, and nothing of what the scatter itself tells (a covariance that
+    depends on x), which is smaller by the square of the relative noise.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The unknowns.
+    jacobian : ndarray, shape (m, d)
+        Whitened derivatives of the readings along x, across each frame's range direction: one row
+        a frame with an object, two for one without.
+    before : ndarray, shape (m, d)
+        Size of the entries before the projection; rounding errors are in proportion to it.
+    response : ndarray, shape (n, d)
+        d log r_i / dx along which frame i's readings stay as near as they can; nan for a frame
+        without object.
+    own_variance : ndarray, shape (n,)
+        Variance of log r_i with x known; inf where the readings do not depend on r_i, nan for a
+        frame without object.
+    """
+
+    names: tuple[str, ...]
+    jacobian: Array
+    before: Array
+    response: Array
+    own_variance: Array
+
+    @functools.cached_property
+    def _equilibrated(self) -> tuple[Array, Array, Array]:
+        """Column scale, singular values and right singular vectors, rows and columns scaled.
+
+        The rank does not depend on the noise: rows are scaled too.
+        """
+        d = len(self.names)
+        rows = np.linalg.norm(self.before, axis=1)
+        used = rows > 0
+        if d == 0 or not used.any():
+            return np.ones(d), np.zeros(d), np.eye(d)
+        scaled = self.before[used] / rows[used, None]
+        columns = np.linalg.norm(scaled, axis=0)
+        columns = np.where(columns > 0, columns, 1.0)
+        # a second turn: a row of one faint unknown alone counts as much as any other
+        rows = rows[used] * np.linalg.norm(scaled / columns, axis=1)
+        columns = np.linalg.norm(self.before[used] / rows[:, None], axis=0)
+        columns = np.where(columns > 0, columns, 1.0)
+        matrix = self.jacobian[used] / rows[:, None] / columns
+        _, values, vectors = linalg.svd(_triangle(matrix), full_matrices=True)
+        return columns, np.pad(values, (0, d - values.size)), vectors.T
+
+    @property
+    def resolution(self) -> float:
+        """Least singular value of the equilibrated Jacobian that rounding lets one tell from 0."""
+        return _OPERATIONS * _EPS * float(np.sqrt(self.jacobian.size))
+
+    @property
+    def rank(self) -> int:
+        """Number of directions of x that noise-free readings would tell.
+
+        Singular values of the Jacobian with rows and columns scaled to the size that they had
+        before the projection, above `resolution`.
+        """
+        return int(np.sum(self._equilibrated[1] > self.resolution))
+
+    @property
+    def margin(self) -> float:
+        """Least singular value that counts as non-zero, as a multiple of `resolution`."""
+        return float(self._equilibrated[1][self.rank - 1]) / self.resolution if self.rank else 0.0
+
+    @functools.cached_property
+    def singular_values(self) -> Array:
+        """Singular values of the Jacobian, descending, those beyond the rank exactly 0, (d,)."""
+        if not self.names:
+            return np.empty(0)
+        columns = self._columns
+        # graded columns are scaled for the triangle only, which keeps their relative accuracy
+        triangle = _triangle(self.jacobian / columns) * columns
+        values = linalg.svdvals(triangle)
+        values = np.pad(values, (0, len(self.names) - values.size))
+        values[self.rank :] = 0.0
+        return values
+
+    @functools.cached_property
+    def _columns(self) -> Array:
+        columns = np.linalg.norm(self.jacobian, axis=0)
+        return np.where(columns > 0, columns, 1.0)
+
+    @functools.cached_property
+    def null_space(self) -> Array:
+        """Directions of x that leave all readings as they are, shape (d, d - rank)."""
+        columns, _, vectors = self._equilibrated
+        null = vectors[:, self.rank :] / columns[:, None]
+        return np.asarray(null / np.linalg.norm(null, axis=0))
+
+    @functools.cached_property
+    def factor(self) -> Array:
+        """F with F F^T the bound on the covariance inside the space that the readings tell."""
+        columns, _, vectors = self._equilibrated
+        told = vectors[:, : self.rank] / columns[:, None]
+        if self.rank == 0:
+            return np.empty((len(self.names), 0))
+        reduced = self.jacobian @ told
+        sizes = np.linalg.norm(reduced, axis=0)
+        _, values, right = linalg.svd(_triangle(reduced / sizes))
+        return np.asarray((told / sizes) @ right.T / values)
+
+    def sd_of(self, functionals: Array) -> Array:
+        """Return the Cramer-Rao bound on the standard deviation of linear functions of x.
+
+        Parameters
+        ----------
+        functionals : ndarray, shape (k, d)
+            Coefficients, a row each.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            inf where a function has a part that the readings do not tell.
+        """
+        columns, values, vectors = self._equilibrated
+        scaled = functionals / columns
+        size = np.linalg.norm(scaled, axis=1)
+        size = np.where(size > 0, size, 1.0)
+        part = np.linalg.norm(scaled @ vectors[:, self.rank :], axis=1) / size
+        # rounding turns the null space by its size over the gap
+        least = values[self.rank - 1] if self.rank else 1.0
+        told = part <= min(1e-12 + 10 * self.resolution / least, 0.1)
+        return np.where(told, np.linalg.norm(functionals @ self.factor, axis=1), np.inf)
+
+    @functools.cached_property
+    def sd(self) -> Array:
+        """Cramer-Rao bound of every unknown, shape (d,); inf where it is not identifiable."""
+        return self.sd_of(np.eye(len(self.names)))
+
+    @functools.cached_property
+    def range_sd(self) -> Array:
+        """Cramer-Rao bound of every log r, shape (n,); nan for a frame without object."""
+        present = np.isfinite(self.response).all(axis=1) & ~np.isnan(self.own_variance)
+        sd = np.full(self.own_variance.size, np.nan)
+        sd[present] = np.sqrt(self.own_variance[present] + self.sd_of(self.response[present]) ** 2)
+        return sd
+
+    @functools.cached_property
+    def scale_sd(self) -> float:
+        """Cramer-Rao bound of the mean of log r over the frames; nan where none has an object."""
+        present = ~np.isnan(self.own_variance)
+        n = int(present.sum())
+        if n == 0:
+            return float("nan")
+        own = float(self.own_variance[present].sum()) / n / n
+        shared = self.sd_of(self.response[present].mean(axis=0)[None])[0]
+        return float(np.sqrt(own + shared**2))
+
+    def correlation(self) -> Array:
+        """Correlations of the bound, shape (d, d); nan for what is not identifiable."""
+        covariance = self.factor @ self.factor.T
+        sd = np.where(np.isfinite(self.sd), np.sqrt(np.diag(covariance)), np.nan)
+        return np.asarray(covariance / np.outer(sd, sd))
+
+
+def _triangle(matrix: Array) -> Array:
+    """Return R of a QR decomposition with rows sorted by size, which is stable for each row."""
+    order = np.argsort(-np.abs(matrix).max(axis=1, initial=0.0))
+    return np.asarray(linalg.qr(matrix[order], mode="r")[0][: matrix.shape[1]])
+
+
+def eliminate(names: tuple[str, ...], jacobian: Array, along_range: Array) -> Information:
+    """Eliminate the range of every frame.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The unknowns.
+    jacobian : ndarray, shape (n, 2, d)
+        Whitened derivatives of the readings.
+    along_range : ndarray, shape (n, 2)
+        Whitened derivative along log r; zero where the readings do not depend on it, nan for a
+        frame without object.
+
+    Returns
+    -------
+    Information
+    """
+    n, _, d = jacobian.shape
+    empty = np.asarray(np.isnan(along_range).any(axis=1))
+    length = np.linalg.norm(np.where(empty[:, None], 0.0, along_range), axis=1)
+    moves = length > 0
+    unit = np.where(moves[:, None], along_range, 1.0) / np.where(moves, length, 1.0)[:, None]
+    # both components of the projection are one number along the normal: no difference is left
+    # of two vectors, only that of two products
+    normal = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+    across = np.einsum("ni,nid->nd", normal[moves], jacobian[moves])
+    sizes = np.linalg.norm(jacobian, axis=1)
+    rows = np.concatenate([across, jacobian[~moves].reshape(-1, d)])
+    before = np.concatenate([sizes[moves], np.repeat(sizes[~moves], 2, axis=0)])
+    response = np.zeros((n, d))
+    variance = np.full(n, np.inf)
+    response[moves] = -np.einsum("ni,nid->nd", unit[moves], jacobian[moves]) / length[moves, None]
+    variance[moves] = 1 / length[moves] ** 2
+    response[empty], variance[empty] = np.nan, np.nan
+    return Information(names, rows, before, response, variance)
