@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report readme picture notebook-data test check lint format types fast lock clean
+.PHONY: help setup demo report readme picture notebook-data calibrate test check lint format types fast lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -33,6 +33,9 @@ picture: $(READY) ## Make the README's picture anew
 
 notebook-data: $(READY) ## Make the notebook's frames anew
 	$(BIN)/hybridtof simulate --scene notebooks/simulated.json --from-m 0.15 --to-m 1.2 --frames 30 --spacing log --seed 7 --output notebooks/frames.csv > /dev/null
+
+calibrate: $(READY) ## Simulation-based calibration: goes on where it stopped, then docs/calibration.png
+	$(BIN)/python -m benchmarks.calibration --workers 2
 
 test: $(READY) ## Run every test
 	$(BIN)/python -m pytest -n 2 --dist loadgroup

@@ -58,6 +58,8 @@ class Cell:
         Data sets that make the cell complete.
     target_ess : int
         Effective draws wanted of every unknown.
+    ensembles : int
+        Independent ensembles.
     """
 
     kind: str
@@ -66,6 +68,7 @@ class Cell:
     frames: int
     sets: int
     target_ess: int
+    ensembles: int
 
     @property
     def name(self) -> str:
@@ -99,9 +102,9 @@ def _cells() -> Mapping[str, Cell]:
     for scene in SCENES:
         for kind in KINDS:
             if scene in EASY:
-                cells += [Cell(kind, scene, snr, 20, 200, 150) for snr in (10.0, 1000.0)]
+                cells += [Cell(kind, scene, snr, 20, 200, 150, 2) for snr in (10.0, 1000.0)]
             else:
-                cells.append(Cell(kind, scene, 1000.0, 12, 50, 100))
+                cells.append(Cell(kind, scene, 1000.0, 12, 50, 100, 4))
     return {cell.slug: cell for cell in cells}
 
 
