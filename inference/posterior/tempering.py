@@ -54,8 +54,8 @@ def tempered_walkers(
     Returns
     -------
     (ndarray, int)
-        Distinct points of shape (walkers, d) as far as there are so many, the best last to go, and
-        the number of density evaluations.
+        Distinct points of shape (walkers, d) as far as there are so many, by descending density,
+        and the number of density evaluations.
     """
     count = 2 * walkers
     z = density.parameters.sample(rng, 4 * count)
@@ -93,7 +93,7 @@ def tempered_walkers(
             likelihood = np.where(accept, trial_likelihood, likelihood)
         if power == 1.0:
             break
-    total = likelihood + prior
+    # a random half: the better half would lose a mode of little density, however wide
     _, first = np.unique(z, axis=0, return_index=True)
-    order = first[np.argsort(-total[first])][:walkers]
-    return z[order], calls
+    kept = rng.permutation(first)[:walkers]
+    return z[kept[np.argsort(-(likelihood + prior)[kept])]], calls

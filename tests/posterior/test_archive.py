@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
@@ -57,7 +57,11 @@ def same(a: Any, b: Any) -> bool:
     return type(a) is type(b) and a == b
 
 
-@given(st.dictionaries(st.text(), JSON), st.dictionaries(st.from_regex(r"[a-z]{1,8}\Z"), ARRAYS))
+NAMES = st.from_regex(r"[a-z]{1,8}(\.[a-z0-9]{1,8})*", fullmatch=True)  # as paths of fields are
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.dictionaries(st.text(), JSON), st.dictionaries(NAMES, ARRAYS))
 def test_json_and_arrays(meta: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
     arrays.pop("meta", None)  # the one name that is taken
     arrays.pop("file", None)

@@ -149,11 +149,11 @@ def random_case(rng: np.random.Generator) -> Case:
     )
     at = moments(case, case.u)
     common = (case.relative or 0.0) * rng.normal()
-    reading = tuple(
+    first, second = (
         float(m + common * o + size * rng.normal())
         for m, o, size in zip(at.mean, at.signal, case.read, strict=True)
     )
-    return dataclasses.replace(case, frame=(*reading, case.frame[2]))
+    return dataclasses.replace(case, frame=(first, second, case.frame[2]))
 
 
 @pytest.fixture

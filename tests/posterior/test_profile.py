@@ -12,8 +12,10 @@ from inference.posterior.profile import best_ranges, linearise
 from simulator.frames import Frames
 from simulator.readings import background_readings, covariance, object_readings
 from simulator.scene import parse_scene
-from tests.posterior.reference import log_density, random_case
+from tests.posterior.reference import FEW_TERMS, log_density, random_case
 from tests.posterior.scenes import KINDS, UNKNOWN_CROSSTALK, data, sensor_of
+
+pytestmark = pytest.mark.xdist_group("kernels")  # compile each kernel once, in one process
 
 Array = NDArray[np.float64]
 
@@ -50,7 +52,7 @@ def means(density: CollapsedDensity, z: Array, positions: Array) -> Array:
 def test_best_ranges_are_the_tops_of_a_dense_grid() -> None:
     rng = np.random.default_rng(30)
     for _ in range(30):
-        case = random_case(rng)
+        case = random_case(rng, FEW_TERMS)
         density = collapsed_density(case.sensor, case.scene, case.frames)
         u, top, sd = best_ranges(density, np.empty((1, 0)))[0, 0]
         grid = np.linspace(math.log(case.low), math.log(case.high), 100_001)

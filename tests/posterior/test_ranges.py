@@ -16,6 +16,8 @@ from simulator.scene import parse_scene
 from tests.posterior.reference import Case, log_density, mean_readings
 from tests.posterior.scenes import KINDS, sensor_of
 
+pytestmark = pytest.mark.xdist_group("kernels")  # compile each kernel once, in one process
+
 Array = NDArray[np.float64]
 
 PLATE = (0.0769, -0.123, 0.0957)
@@ -71,7 +73,7 @@ def test_draws_have_the_law_of_the_range(name: str) -> None:
     low, high = math.log(case.low), math.log(case.high)
     grid = np.linspace(low, high, 400_001)
     values = log_density(case, grid)
-    mass = integrate.cumulative_trapezoid(np.exp(values - values.max()), grid, initial=0.0)
+    mass = integrate.cumulative_trapezoid(np.exp(values - values.max()), grid, initial=0)
     assert low <= drawn.min() <= drawn.max() <= high
     result = stats.kstest(drawn, lambda u: np.interp(u, grid, mass / mass[-1]))
     assert result.pvalue > 1e-4

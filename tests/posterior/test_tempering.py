@@ -22,8 +22,8 @@ WALKERS = 256
 @pytest.mark.parametrize("crosstalk", [False, True])
 def test_the_same_mean_as_importance_sampling(kind: str, crosstalk: bool) -> None:
     """Of 512 particles moved six times at the last temperature at least a tenth count as
-    independent, and the better half is kept, which makes the mean no worse: bands of five standard
-    errors of 26 draws, one standard deviation."""
+    independent, and half of them are kept: bands of five standard errors of 26 draws, one standard
+    deviation."""
     density = collapsed_density(*example(kind, crosstalk))
     optima = find_optima(density, np.random.default_rng(110))
     weighted = draw_weighted(density, mixture_of(optima), np.random.default_rng(111), 4000)
@@ -49,7 +49,7 @@ def test_walkers_are_distinct_and_stand_where_the_density_is_positive() -> None:
 
 
 class Bumps:
-    """Two bumps of masses 1 : 3 under a standard normal prior, as far as `tempered_walkers` asks."""
+    """Two bumps of masses 1 : 3 under a standard normal prior, as `tempered_walkers` asks."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
