@@ -48,6 +48,7 @@ _HALF = 10  # its points on either side of the mode
 _REACH = 9.0  # standard deviations of a normal prior beyond which nothing is left
 
 _FAR = 12.0  # standard deviations at which a peak must have vanished
+_MOST_PANELS = 300
 _NEARLY_GAUSSIAN = 3e-3  # standard deviation of log r
 
 _HERMITE_NODES, _HERMITE_WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
@@ -347,9 +348,9 @@ def falls_off(
         length = mode[4] - mode[0] if sign > 0.0 else mode[0] - mode[3]
         if length < reach:
             return False
-        near = math.exp(log_integrand(mode[0] + sign * reach, frame, *scene) - mode[1])
+        near = math.exp(min(log_integrand(mode[0] + sign * reach, frame, *scene) - mode[1], 1.0))
         distance = min(_FAR * mode[2], length)
-        far = math.exp(log_integrand(mode[0] + sign * distance, frame, *scene) - mode[1])
+        far = math.exp(min(log_integrand(mode[0] + sign * distance, frame, *scene) - mode[1], 1.0))
         if not near * (distance - reach) + far * (length - distance) < 1e-6 * mode[2]:
             return False
     return True
@@ -381,7 +382,8 @@ def _narrow(
     even, odd = 1.0, 0.0
     for j in range(1, _HALF + 1):
         for sign in (-1.0, 1.0):
-            value = math.exp(log_integrand(u + sign * j * _STEP * sd, frame, *scene) - top)
+            excess = log_integrand(u + sign * j * _STEP * sd, frame, *scene) - top
+            value = math.exp(min(excess, 1.0))
             if j % 2 == 0:
                 even += value
             else:
@@ -442,7 +444,10 @@ def _march(
         end = mode[3] if sign < 0.0 else mode[4]
         edge = mode[0]
         width = min(1.7 * mode[2], 0.4, mode[4] - mode[3])
-        while (end - edge) * sign > 0.0:
+        # at 1e20 nats the density is rounding noise, which never falls off: panels are bounded
+        for _ in range(_MOST_PANELS):
+            if not (end - edge) * sign > 0.0:
+                break
             slope = slope_and_curvature(edge, frame, *scene)[0]
             if abs(slope) * width > 8.0:
                 width = 8.0 / abs(slope)
@@ -468,8 +473,9 @@ def _march(
                 both = _add(near, far)
                 error = abs(math.expm1(both - mass)) if mass > -math.inf else 0.0
                 mass, highest = both, max(high1, high2)
-                # a log mass of a million nats is itself known to no better than its rounding
-                if error <= allowed + 1e-15 * abs(mass):
+                # a log mass of a million nats is itself known to no better than its rounding, and a
+                # panel of a few roundings is as short as it can be
+                if error <= allowed + 1e-14 * abs(mass) or abs(half) < 1e-14 * (1.0 + abs(edge)):
                     break
                 width, mass, highest, last = 0.5 * width, near, high1, False
             total = _add(total, mass)
