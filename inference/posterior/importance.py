@@ -10,7 +10,7 @@ from scipy import special
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.proposal import Mixture
 
-__all__ = ["MAX_K_HAT", "WeightedDraws", "draw_weighted", "pareto_k_hat"]
+__all__ = ["MAX_K_HAT", "WeightedDraws", "draw_weighted", "generalised_pareto", "pareto_k_hat"]
 
 Array = NDArray[np.float64]
 
@@ -47,8 +47,19 @@ class WeightedDraws:
         return float(1.0 / np.sum(self.weights**2))
 
 
-def _generalised_pareto(excess: Array) -> float:
-    """Estimate the shape of excesses over a threshold (Zhang and Stephens 2009)."""
+def generalised_pareto(excess: Array) -> tuple[float, float]:
+    """Estimate shape and scale of excesses over a threshold (Zhang and Stephens 2009).
+
+    Parameters
+    ----------
+    excess : ndarray, shape (n,)
+        Positive, at least five.
+
+    Returns
+    -------
+    (float, float)
+        The shape, drawn a little towards 0.5 (Vehtari et al. 2024), and the scale.
+    """
     x = np.sort(excess)
     n = x.size
     m = 30 + int(math.sqrt(n))
@@ -61,7 +72,7 @@ def _generalised_pareto(excess: Array) -> float:
     best = float(np.sum(b * weights))
     k = float(np.log1p(-best * x).mean())
     # weak prior of shape 0.5, worth ten observations (Vehtari et al. 2024)
-    return (n * k + 10 * 0.5) / (n + 10)
+    return (n * k + 10 * 0.5) / (n + 10), -k / best
 
 
 def pareto_k_hat(log_weights: Array) -> float:
@@ -85,7 +96,7 @@ def pareto_k_hat(log_weights: Array) -> float:
     weights = np.exp(ordered[-tail - 1 :] - ordered[-1])
     excess = weights[1:] - weights[0]
     excess = excess[excess > 0]
-    return _generalised_pareto(excess) if excess.size >= 5 else -math.inf
+    return generalised_pareto(excess)[0] if excess.size >= 5 else -math.inf
 
 
 def draw_weighted(

@@ -5,13 +5,15 @@ evolution moves. Its walkers come from the prior alone, so an ensemble that star
 contradict those that start from the optima.
 """
 
+import dataclasses
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
 from inference.posterior.collapsed import CollapsedDensity
 
-__all__ = ["tempered_walkers"]
+__all__ = ["Population", "temper", "tempered_walkers"]
 
 Array = NDArray[np.float64]
 
@@ -37,6 +39,90 @@ def _next_power(log_likelihood: Array, power: float) -> float:
     return power + float(np.exp(found))
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Population:
+    """Points that were brought from the prior to the posterior.
+
+    Attributes
+    ----------
+    z : ndarray, shape (n, d)
+        Points, some of them equal.
+    log_likelihood, log_prior : ndarray, shape (n,)
+        Of every point; the prior up to the constant of `Parameters.log_prior`.
+    log_evidence : float
+        Log of the mean likelihood over the prior, as the temperatures' weights estimate it.
+    calls : int
+        Density evaluations.
+    """
+
+    z: Array
+    log_likelihood: Array
+    log_prior: Array
+    log_evidence: float
+    calls: int
+
+
+def temper(
+    density: CollapsedDensity, rng: np.random.Generator, count: int, sweeps: int = _SWEEPS
+) -> Population:
+    """Bring a population from the prior to the posterior.
+
+    Parameters
+    ----------
+    density : CollapsedDensity
+        Target.
+    rng : numpy.random.Generator
+        Source of randomness.
+    count : int
+        Size of the population; four times as many are drawn from the prior at first.
+    sweeps : int
+        Moves of the whole population at each temperature.
+
+    Returns
+    -------
+    Population
+        Empty, of evidence zero, where fewer than four draws of the prior explain the frames at all.
+    """
+    z = density.parameters.sample(rng, 4 * count)
+    likelihood = density.log_likelihood(z)
+    calls = len(z)
+    finite = np.isfinite(likelihood)
+    log_evidence = float(np.log(max(finite.mean(), 1e-300)))
+    z, likelihood = z[finite][:count], likelihood[finite][:count]
+    if len(z) < 4:
+        return Population(z[:0], likelihood[:0], likelihood[:0], -np.inf, calls)
+    count, d = z.shape
+    prior = density.parameters.log_prior(z)
+    power = 0.0
+    jump = 2.38 / np.sqrt(2 * d)
+    for _ in range(_MOST_TEMPERATURES):
+        new_power = _next_power(likelihood, power)
+        weights = np.exp((new_power - power) * (likelihood - likelihood.max()))
+        log_evidence += (new_power - power) * float(likelihood.max()) + np.log(weights.mean())
+        weights /= weights.sum()
+        power = new_power
+        positions = (rng.random() + np.arange(count)) / count
+        index = np.minimum(np.searchsorted(np.cumsum(weights), positions), count - 1)
+        z, likelihood, prior = z[index], likelihood[index], prior[index]
+        for sweep in range(_LAST_SWEEPS if power == 1.0 else sweeps):
+            a, b = rng.permutation(count), rng.permutation(count)
+            scale = 1.0 if sweep % 4 == 3 else jump * np.exp(0.3 * rng.standard_normal((count, 1)))
+            spread = z.std(axis=0)
+            noise = 0.02 * spread * rng.standard_normal(z.shape)
+            trial = z + scale * (z[a] - z[b]) + noise
+            trial_prior = density.parameters.log_prior(trial)
+            trial_likelihood = density.log_likelihood(trial)
+            calls += count
+            gain = trial_prior - prior + power * (trial_likelihood - likelihood)
+            accept = np.log(rng.random(count)) < gain
+            z = np.where(accept[:, None], trial, z)
+            prior = np.where(accept, trial_prior, prior)
+            likelihood = np.where(accept, trial_likelihood, likelihood)
+        if power == 1.0:
+            break
+    return Population(z, likelihood, prior, float(log_evidence), calls)
+
+
 def tempered_walkers(
     density: CollapsedDensity, rng: np.random.Generator, walkers: int
 ) -> tuple[Array, int]:
@@ -57,43 +143,9 @@ def tempered_walkers(
         Distinct points of shape (walkers, d) as far as there are so many, by descending density,
         and the number of density evaluations.
     """
-    count = 2 * walkers
-    z = density.parameters.sample(rng, 4 * count)
-    likelihood = density.log_likelihood(z)
-    calls = len(z)
-    finite = np.isfinite(likelihood)
-    z, likelihood = z[finite][:count], likelihood[finite][:count]
-    if len(z) < 4:
-        return z[:0], calls
-    count, d = z.shape
-    prior = density.parameters.log_prior(z)
-    power = 0.0
-    jump = 2.38 / np.sqrt(2 * d)
-    for _ in range(_MOST_TEMPERATURES):
-        new_power = _next_power(likelihood, power)
-        weights = np.exp((new_power - power) * (likelihood - likelihood.max()))
-        weights /= weights.sum()
-        power = new_power
-        positions = (rng.random() + np.arange(count)) / count
-        index = np.minimum(np.searchsorted(np.cumsum(weights), positions), count - 1)
-        z, likelihood, prior = z[index], likelihood[index], prior[index]
-        for sweep in range(_LAST_SWEEPS if power == 1.0 else _SWEEPS):
-            a, b = rng.permutation(count), rng.permutation(count)
-            scale = 1.0 if sweep % 4 == 3 else jump * np.exp(0.3 * rng.standard_normal((count, 1)))
-            spread = z.std(axis=0)
-            noise = 0.02 * spread * rng.standard_normal(z.shape)
-            trial = z + scale * (z[a] - z[b]) + noise
-            trial_prior = density.parameters.log_prior(trial)
-            trial_likelihood = density.log_likelihood(trial)
-            calls += count
-            gain = trial_prior - prior + power * (trial_likelihood - likelihood)
-            accept = np.log(rng.random(count)) < gain
-            z = np.where(accept[:, None], trial, z)
-            prior = np.where(accept, trial_prior, prior)
-            likelihood = np.where(accept, trial_likelihood, likelihood)
-        if power == 1.0:
-            break
+    found = temper(density, rng, 2 * walkers)
+    total = found.log_likelihood + found.log_prior
     # a random half: the better half would lose a mode of little density, however wide
-    _, first = np.unique(z, axis=0, return_index=True)
+    _, first = np.unique(found.z, axis=0, return_index=True)
     kept = rng.permutation(first)[:walkers]
-    return z[kept[np.argsort(-(likelihood + prior)[kept])]], calls
+    return found.z[kept[np.argsort(-total[kept])]], found.calls
