@@ -13,6 +13,7 @@ _RESULTS = (
     "identifiability",
     "fit",
     "left_out",
+    "selection",
     "runtime",
 )
 

@@ -3,8 +3,8 @@
 from typing import Annotated, Any, Literal
 
 import pydantic
-from inference.posterior.settings import SamplerSettings
 
+from inference.posterior.settings import SamplerSettings
 from simulator.frames import FrameColumns
 from simulator.scene import Scene
 from simulator.sensor import Sensor
@@ -156,6 +156,29 @@ class _LeftOutTerm(pydantic.BaseModel):
     reason: str
 
 
+class _Candidate(pydantic.BaseModel):
+    terms: list[str]
+    chosen: bool
+    log_evidence: float | None
+    log_evidence_error: float | None
+    evidence_k_hat: float | None
+    log_predictive: float | None
+    log_predictive_error: float | None
+    predictive_k_hat: float | None
+
+
+class _Decision(pydantic.BaseModel):
+    term: str
+    kept: bool
+    agree: bool
+    reason: str
+
+
+class _Selection(pydantic.BaseModel):
+    candidates: list[_Candidate]
+    decisions: list[_Decision]
+
+
 class _Runtime(pydantic.BaseModel):
     wall_s: float
     cpu_s: float
@@ -180,6 +203,7 @@ class PosteriorResponse(_Posterior):
     identifiability: list[_Identifiability] | None
     fit: _Fit | None
     left_out: list[_LeftOutTerm] | None
+    selection: _Selection | None
     runtime: _Runtime | None
     problem: dict[str, Any] | None = None
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from inference.posterior.ensemble import Ensemble
 from inference.posterior.importance import WeightedDraws
 from inference.posterior.proposal import Mixture
+from inference.posterior.selection import Candidate, Decision, Selection
 from inference.posterior.verdict import Verdict
 from simulator.frames import Frames
 
@@ -50,7 +51,19 @@ def unpack(data: bytes) -> tuple[dict[str, Any], Arrays]:
 
 
 # frozen dataclasses of arrays, numbers and one another; anything else is a mistake
-_PARTS = {part.__name__: part for part in (Ensemble, Frames, Mixture, Verdict, WeightedDraws)}
+_PARTS = {
+    part.__name__: part
+    for part in (
+        Candidate,
+        Decision,
+        Ensemble,
+        Frames,
+        Mixture,
+        Selection,
+        Verdict,
+        WeightedDraws,
+    )
+}
 
 
 def pack_parts(value: Any, path: str, arrays: Arrays) -> Any:

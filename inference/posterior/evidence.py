@@ -17,12 +17,12 @@ from scipy.stats import qmc
 from inference.posterior.bridge import bridge, walk
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.importance import WeightedDraws, draw_weighted
-from inference.posterior.proposal import adapted, mixture_of
+from inference.posterior.proposal import Mixture, adapted, mixture_of
 from inference.posterior.start import Optimum, climb, find_optima, refine
 from inference.posterior.tempering import temper
 from simulator.parameters import Parameters
 
-__all__ = ["Evidence", "Weighed", "log_prior_mass", "weigh"]
+__all__ = ["Evidence", "Weighed", "adapt", "log_prior_mass", "resample", "weigh"]
 
 Array = NDArray[np.float64]
 
@@ -72,6 +72,8 @@ class Weighed:
         Draws.
     log_weights : ndarray, shape (n,)
         Log of their weights, not normalised.
+    laplace : Mixture or None
+        Laplace approximations at the optima; None where there are none.
     calls : int
         Density evaluations.
     """
@@ -79,6 +81,7 @@ class Weighed:
     evidence: Evidence
     z: Array
     log_weights: Array
+    laplace: Mixture | None
     calls: int
 
 
@@ -143,6 +146,52 @@ def _distinct(optima: list[Optimum]) -> list[Optimum]:
     return kept
 
 
+def adapt(laplace: Mixture, pilot: Array, rng: np.random.Generator) -> Mixture:
+    """Adapt a mixture to pilot draws, of which many may be equal.
+
+    Parameters
+    ----------
+    laplace : Mixture
+        Laplace approximations at the optima, which keep a share.
+    pilot : ndarray, shape (n, d)
+        Draws.
+    rng : numpy.random.Generator
+        Source of randomness.
+
+    Returns
+    -------
+    Mixture
+        `laplace` itself where the draws are too few to have a shape.
+    """
+    distinct = np.unique(pilot, axis=0)
+    if len(distinct) < 10 * (pilot.shape[1] + 1):
+        return laplace
+    return adapted(laplace, distinct, rng)
+
+
+def resample(weighted: WeightedDraws, rng: np.random.Generator, n: int) -> NDArray[np.intp]:
+    """Choose draws by weight, the largest weights cut (Ionides 2008), so that no few take all.
+
+    Parameters
+    ----------
+    weighted : WeightedDraws
+        Draws, at least one of positive density.
+    rng : numpy.random.Generator
+        Source of randomness.
+    n : int
+        How many.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Indices, some of them equal.
+    """
+    weights = np.minimum(weighted.weights, math.sqrt(len(weighted.z)) / len(weighted.z))
+    weights = np.where(np.isfinite(weighted.log_density), weights, 0.0)
+    chosen: NDArray[np.intp] = rng.choice(len(weights), size=n, p=weights / weights.sum())
+    return chosen
+
+
 def weigh(density: CollapsedDensity, rng: np.random.Generator) -> Weighed:
     """Estimate the evidence of a model.
 
@@ -161,7 +210,7 @@ def weigh(density: CollapsedDensity, rng: np.random.Generator) -> Weighed:
     d = len(density.parameters)
     if d == 0:
         value = float(density(np.empty((1, 0)))[0])
-        return Weighed(Evidence(value, 0.0, None), np.empty((1, 0)), np.zeros(1), 1)
+        return Weighed(Evidence(value, 0.0, None), np.empty((1, 0)), np.zeros(1), None, 1)
     constant, constant_error = _constant(density.parameters, rng)
     optima = find_optima(density, rng)
     population = temper(density, rng, _POPULATION)
@@ -172,7 +221,8 @@ def weigh(density: CollapsedDensity, rng: np.random.Generator) -> Weighed:
         optima += [optimum for optimum in found if optimum is not None]
     optima = _distinct(optima)
     if not optima:
-        return Weighed(Evidence(-math.inf, 0.0, None), np.empty((0, d)), np.empty(0), calls)
+        nothing = Evidence(-math.inf, 0.0, None)
+        return Weighed(nothing, np.empty((0, d)), np.empty(0), None, calls)
     mixture = laplace = mixture_of(optima)
     pilot = population.z
     for trial in range(_TRIALS):
@@ -182,14 +232,14 @@ def weigh(density: CollapsedDensity, rng: np.random.Generator) -> Weighed:
             error = math.hypot(_relative_error(weighted), constant_error)
             evidence = Evidence(weighted.log_evidence + constant, error, weighted.k_hat)
             with np.errstate(divide="ignore"):
-                return Weighed(evidence, weighted.z, np.log(weighted.weights), calls)
+                return Weighed(evidence, weighted.z, np.log(weighted.weights), laplace, calls)
         if trial:
-            pilot = np.concatenate([population.z, weighted.z[_resample(weighted, rng, _DRAWS)]])
+            pilot = np.concatenate([population.z, weighted.z[resample(weighted, rng, _DRAWS)]])
         if np.linalg.matrix_rank(pilot - pilot[:1]) < d:
-            pilot = weighted.z[_resample(weighted, rng, _DRAWS)]
-        mixture = adapted(laplace, pilot, rng)
+            pilot = mixture.draw(rng, _DRAWS)
+        mixture = adapt(laplace, pilot, rng)
     values = []
-    z = weighted.z[_resample(weighted, rng, _WALKERS)]
+    z = weighted.z[resample(weighted, rng, _WALKERS)]
     steps = int(np.clip(_MOST_EVALUATIONS / _WALKERS / len(density.frames), 40, _STEPS))
     for _ in range(_WALKS):
         walked = walk(density, mixture, z, rng, steps)
@@ -199,16 +249,8 @@ def weigh(density: CollapsedDensity, rng: np.random.Generator) -> Weighed:
         values.append(value)
         z = walked.z[-1]
         pilot = walked.z.reshape(-1, d)
-        mixture = adapted(laplace, pilot, rng)
+        mixture = adapt(laplace, pilot, rng)
     # a population that still drifts shows in the last two estimates
     drift = abs(values[-1] - values[-2])
     evidence = Evidence(values[-1] + constant, math.hypot(max(error, drift), constant_error), None)
-    return Weighed(evidence, pilot, np.zeros(len(pilot)), calls)
-
-
-def _resample(weighted: WeightedDraws, rng: np.random.Generator, n: int) -> NDArray[np.intp]:
-    """Choose draws by weight, the largest cut (Ionides 2008) so that no few take all places."""
-    weights = np.minimum(weighted.weights, math.sqrt(len(weighted.z)) / len(weighted.z))
-    weights = np.where(np.isfinite(weighted.log_density), weights, 0.0)
-    chosen: NDArray[np.intp] = rng.choice(len(weights), size=n, p=weights / weights.sum())
-    return chosen
+    return Weighed(evidence, pilot, np.zeros(len(pilot)), laplace, calls)

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.posterior import summary
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.diagnostics import (
     autocorrelation_time,
@@ -27,9 +28,20 @@ from inference.posterior.diagnostics import (
 from inference.posterior.ensemble import Ensemble, advance, forget, new_ensemble
 from inference.posterior.importance import MAX_K_HAT, WeightedDraws, draw_weighted
 from inference.posterior.job import Checkpoint, Job, chains, prepare
+from inference.posterior.posterior import Posterior
 from inference.posterior.proposal import Mixture, adapted, mixture_of
+from inference.posterior.selecting import (
+    AssessTask,
+    StartTask,
+    assess_tasks,
+    awaits_start,
+    begin,
+    run_assessment,
+    sampled,
+    take_in,
+)
+from inference.posterior.selection import Candidate
 from inference.posterior.start import Optimum, climb, find_optima, refine
-from inference.posterior.summary import summarise
 from inference.posterior.tempering import tempered_walkers
 from inference.posterior.verdict import Chains, Verdict, judge
 from simulator.errors import RefusedError
@@ -105,6 +117,8 @@ class Progress:
 def start(job: Job) -> Checkpoint:
     """Find the optima, and set up ensembles or draw weighted samples.
 
+    With optional terms in the scene this is done once they are decided, by the first chunks.
+
     Parameters
     ----------
     job : Job
@@ -120,6 +134,8 @@ def start(job: Job) -> Checkpoint:
         Where no parameters explain the frames at all, or importance sampling alone was asked for
         and cannot be trusted.
     """
+    if job.scene.optional_terms:
+        return begin(job)
     density = job.density()
     settings = job.settings
     pending = Verdict(False, ("no steps were made",))
@@ -230,11 +246,16 @@ def _ensembles(
     return tuple(ensembles)
 
 
-def tasks(job: Job, checkpoint: Checkpoint) -> tuple[Task, ...]:
+def tasks(
+    job: Job, checkpoint: Checkpoint
+) -> tuple[Task, ...] | tuple[AssessTask | StartTask, ...]:
     """Return the independent parts of the next chunk; none when the job is finished.
 
     The size of a chunk is counted in evaluations, never timed, so that it is the same everywhere.
     """
+    if before := assess_tasks(job, checkpoint):
+        return before
+    job = sampled(job, checkpoint)
     proposal = checkpoint.proposal
     if checkpoint.finished or proposal is None:
         return ()
@@ -245,18 +266,33 @@ def tasks(job: Job, checkpoint: Checkpoint) -> tuple[Task, ...]:
     return tuple(Task(job, proposal, ensemble, steps) for ensemble in checkpoint.ensembles)
 
 
-def run(task: Task) -> Piece:
+def run(task: Task | AssessTask | StartTask) -> Piece | Candidate | Checkpoint:
     """Run one part of a chunk."""
+    if isinstance(task, AssessTask):
+        return run_assessment(task)
+    if isinstance(task, StartTask):
+        return start(task.job)
     ensemble = advance(task.job.density(), task.proposal, task.ensemble, task.steps)
     return Piece(ensemble, task.steps * WALKERS)
 
 
-def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoint:
+def merge(
+    job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece | Candidate | Checkpoint]
+) -> Checkpoint:
     """Take in the parts of a chunk, in the order of `tasks`, and judge the draws so far."""
+    candidates = tuple(piece for piece in pieces if isinstance(piece, Candidate))
+    if candidates:
+        return take_in(job, checkpoint, candidates)
+    for piece in pieces:
+        if isinstance(piece, Checkpoint):
+            calls = checkpoint.calls + piece.calls
+            return dataclasses.replace(piece, calls=calls, selection=checkpoint.selection)
+    job = sampled(job, checkpoint)
+    moved = [piece for piece in pieces if isinstance(piece, Piece)]
     checkpoint = dataclasses.replace(
         checkpoint,
-        ensembles=tuple(piece.ensemble for piece in pieces),
-        calls=checkpoint.calls + sum(piece.calls for piece in pieces),
+        ensembles=tuple(piece.ensemble for piece in moved),
+        calls=checkpoint.calls + sum(piece.calls for piece in moved),
     )
     kept = chains(job, checkpoint)
     if checkpoint.adaptations < _MOST_ADAPTATIONS and _is_slow(kept):
@@ -299,6 +335,8 @@ def _adapt(job: Job, checkpoint: Checkpoint, kept: Chains) -> Checkpoint:
 
 def progress(job: Job, checkpoint: Checkpoint) -> Progress:
     """Tell how far a job is."""
+    if awaits_start(checkpoint):
+        return Progress(0, _MOST_STEPS, None, None, False)
     if checkpoint.method == "importance":
         count = 0 if checkpoint.weighted is None else len(checkpoint.weighted.z)
         return Progress(count, count, checkpoint.ess, None, checkpoint.finished)
@@ -308,3 +346,26 @@ def progress(job: Job, checkpoint: Checkpoint) -> Progress:
         share = (checkpoint.ess or 1.0) / job.settings.target_ess
         target = int(min(max(steps / share, steps + 1), _MOST_STEPS)) if steps else _MOST_STEPS
     return Progress(steps, target, checkpoint.ess, checkpoint.r_hat, checkpoint.finished)
+
+
+def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> Posterior:
+    """Make the answer of a job, finished or not.
+
+    Parameters
+    ----------
+    job, checkpoint : Job, Checkpoint
+        The job and where it stands; where it was stopped before its optional terms were decided,
+        all of them are kept.
+    wall_s, cpu_s : float
+        What it has cost so far [s].
+
+    Returns
+    -------
+    Posterior
+    """
+    if awaits_start(checkpoint):
+        started = start(sampled(job, checkpoint))
+        checkpoint = dataclasses.replace(
+            started, selection=checkpoint.selection, calls=checkpoint.calls + started.calls
+        )
+    return summary.summarise(job, checkpoint, wall_s, cpu_s)

@@ -11,6 +11,7 @@ from inference.posterior.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.ensemble import Ensemble
 from inference.posterior.importance import WeightedDraws
 from inference.posterior.proposal import Mixture
+from inference.posterior.selection import Selection
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.verdict import Chains, Verdict, chains_of
 from simulator.errors import InvalidInputError, RefusedError
@@ -115,6 +116,8 @@ class Checkpoint:
         Least effective sample size and largest R-hat so far.
     finished : bool
         Whether more steps would serve nothing.
+    selection : Selection or None
+        With optional terms in the scene: which of them stay.
     """
 
     method: str
@@ -128,6 +131,7 @@ class Checkpoint:
     ess: float | None
     r_hat: float | None
     finished: bool
+    selection: Selection | None = None
 
     def to_bytes(self) -> bytes:
         """Return the checkpoint for a store."""
@@ -179,12 +183,6 @@ def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSetti
         raise RefusedError(
             "the posterior has no term for a model discrepancy; leave `discrepancy` out, and state "
             "an independent relative error as the noise's `relative`"
-        )
-    if scene.optional_terms:
-        term = scene.optional_terms[0]
-        raise RefusedError(
-            f"the posterior cannot decide whether {term} stays; leave `optional` out to keep the "
-            "term, or leave the term out"
         )
     if settings.seed is None:
         seed = int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 1)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.posterior.selection import SelectionSummary
 from inference.posterior.verdict import Verdict
 
 __all__ = [
@@ -164,6 +165,8 @@ class Posterior:
         "emcee" or "importance".
     seed : int
         The seed; the same seed gives the same draws.
+    selection : SelectionSummary, optional
+        With optional terms in the scene: the models that were compared, and what was decided.
     """
 
     method: str
@@ -176,6 +179,7 @@ class Posterior:
     left_out: tuple[LeftOutTerm, ...]
     runtime: Runtime
     draws: Draws
+    selection: SelectionSummary | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return plain JSON data in the shape of the contract; non-finite values become null."""
@@ -192,6 +196,7 @@ class Posterior:
             "identifiability": [dataclasses.asdict(row) for row in self.identifiability],
             "fit": dataclasses.asdict(self.fit),
             "left_out": [dataclasses.asdict(row) for row in self.left_out],
+            "selection": None if self.selection is None else dataclasses.asdict(self.selection),
             "runtime": dataclasses.asdict(self.runtime),
         }
         document["range_m"]["modes"] = [

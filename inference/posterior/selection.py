@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.collapsed import collapsed_density
+from inference.posterior.cross_validation import cross_validate
 from inference.posterior.evidence import weigh
-from inference.posterior.leave_one_out import MAX_K_HAT, leave_one_out, standard_error
+from inference.posterior.leave_one_out import MAX_K_HAT, standard_error
 from simulator.frames import Frames
 from simulator.scene import Crosstalk, Scene
 from simulator.sensor import Sensor
@@ -24,13 +25,15 @@ __all__ = [
     "EVIDENCE_MARGIN",
     "PREDICTIVE_MARGIN",
     "Candidate",
+    "CandidateSummary",
     "Decision",
     "Selection",
+    "SelectionSummary",
     "assess",
     "candidate_terms",
     "decide",
     "reduced",
-    "undecided",
+    "selection_summary",
 ]
 
 Array = NDArray[np.float64]
@@ -41,7 +44,6 @@ EVIDENCE_MARGIN = math.log(20.0)
 # what k superfluous parameters gain is about chi-square(k) / 2 - k (Stone 1977): more than 4 nats
 # with a probability of 0.3 % for any k up to 6
 PREDICTIVE_MARGIN = 4.0
-_PREDICTIVE_DRAWS = 2000
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -121,6 +123,28 @@ class Selection:
         return tuple(decision.term for decision in self.decisions if decision.kept)
 
 
+@dataclasses.dataclass(frozen=True)
+class CandidateSummary:
+    """A candidate as the answer shows it: log evidence and log predictive density [nat]."""
+
+    terms: tuple[str, ...]
+    chosen: bool
+    log_evidence: float
+    log_evidence_error: float
+    evidence_k_hat: float | None
+    log_predictive: float
+    log_predictive_error: float
+    predictive_k_hat: float
+
+
+@dataclasses.dataclass(frozen=True)
+class SelectionSummary:
+    """The selection as the answer shows it."""
+
+    candidates: tuple[CandidateSummary, ...]
+    decisions: tuple[Decision, ...]
+
+
 def candidate_terms(scene: Scene) -> tuple[tuple[str, ...], ...]:
     """Return the combinations of optional terms, the simplest first.
 
@@ -180,32 +204,15 @@ def assess(
     """
     density = collapsed_density(sensor, reduced(scene, terms), frames)
     weighed = weigh(density, rng)
-    n = len(weighed.z)
-    log_weights = weighed.log_weights
-    z = weighed.z
-    if n > _PREDICTIVE_DRAWS:
-        kept = np.linspace(0, n - 1, _PREDICTIVE_DRAWS).astype(int)
-        z, log_weights = z[kept], log_weights[kept]
-    if math.isfinite(weighed.evidence.log_evidence):
-        inside = np.isfinite(log_weights)
-        likelihoods = density.frame_log_likelihoods(z[inside])
-        if len(density.parameters) == 0:
-            # nothing that other frames could tell: a frame's density is the predictive one
-            predictive, k_hat = likelihoods[0], -math.inf
-        else:
-            found = leave_one_out(likelihoods, log_weights[inside])
-            predictive, k_hat = found.log_predictive, found.worst_k_hat
-    else:
-        predictive, k_hat = np.full(len(frames), -np.inf), -math.inf
-    evidence = weighed.evidence
+    predicted, calls = cross_validate(density, weighed, rng)
     return Candidate(
         terms,
-        evidence.log_evidence,
-        evidence.error,
-        evidence.k_hat,
-        predictive,
-        k_hat,
-        weighed.calls + len(z),
+        weighed.evidence.log_evidence,
+        weighed.evidence.error,
+        weighed.evidence.k_hat,
+        predicted.log_predictive,
+        predicted.worst_k_hat,
+        weighed.calls + calls,
     )
 
 
@@ -250,13 +257,16 @@ def _compare(larger: Candidate, smaller: Candidate) -> _Comparison:
         return _Comparison(gain, 0.0, gain, 0.0, True)
     with np.errstate(invalid="ignore"):
         gains = larger.log_predictive - smaller.log_predictive
-    worst = max(larger.predictive_k_hat, smaller.predictive_k_hat)
+    total = float(gains.sum())
+    # draws that miss where a frame's weights are large make its density look too large: a gain
+    # over such a model is a lower bound, a gain of such a model an upper one
+    doubtful = larger if total > PREDICTIVE_MARGIN else smaller
     return _Comparison(
         larger.log_evidence - smaller.log_evidence,
         math.hypot(larger.log_evidence_error, smaller.log_evidence_error),
-        float(gains.sum()),
+        total,
         standard_error(gains),
-        bool(worst < MAX_K_HAT and np.isfinite(gains).all()),
+        bool(doubtful.predictive_k_hat < MAX_K_HAT and math.isfinite(total)),
     )
 
 
@@ -327,16 +337,49 @@ def _reason(kept: bool, gain: _Comparison) -> str:
         return f"the data demand it: {gain.words}"
     if gain.by_evidence or gain.by_prediction:
         one = "evidence" if gain.by_evidence else "predictive density"
-        return (
-            f"kept because the {one} demands it, though the other criterion does not: the wider "
-            f"answer is the safer one; {gain.words}"
-        )
+        other = "the other criterion does not: the wider answer is the safer one"
+        if not gain.predictive_trusted:
+            other = "the predictive density cannot be known"
+        return f"kept because the {one} demands it, though {other}; {gain.words}"
     return f"kept because the data demand one of the terms and do not tell which: {gain.words}"
 
 
-def undecided(scene: Scene) -> tuple[Decision, ...]:
+def _undecided(scene: Scene) -> tuple[Decision, ...]:
     """Return what holds where there was no time to decide: every optional term stays."""
-    return tuple(
-        Decision(term, True, False, "kept: there was no time to decide whether the data demand it")
-        for term in scene.optional_terms
-    )
+    reason = "kept: there was no time to decide whether the data demand it"
+    return tuple(Decision(term, True, False, reason) for term in scene.optional_terms)
+
+
+def selection_summary(scene: Scene, selection: Selection) -> SelectionSummary:
+    """Summarise a selection.
+
+    Parameters
+    ----------
+    scene : Scene
+        With its optional terms.
+    selection : Selection
+        Decided or not.
+
+    Returns
+    -------
+    SelectionSummary
+    """
+    decisions = selection.decisions or _undecided(scene)
+    chosen = tuple(decision.term for decision in decisions if decision.kept)
+    rows = []
+    for candidate in selection.candidates:
+        with np.errstate(invalid="ignore"):
+            error = standard_error(candidate.log_predictive)
+        rows.append(
+            CandidateSummary(
+                candidate.terms,
+                candidate.terms == chosen,
+                candidate.log_evidence,
+                candidate.log_evidence_error,
+                candidate.evidence_k_hat,
+                float(candidate.log_predictive.sum()),
+                error,
+                candidate.predictive_k_hat,
+            )
+        )
+    return SelectionSummary(tuple(rows), decisions)

@@ -19,6 +19,8 @@ from inference.posterior.predictive_check import predictive_check
 from inference.posterior.range_summary import range_summary
 from inference.posterior.ranges import draw_ranges
 from inference.posterior.sample import Sample, sample_of
+from inference.posterior.selecting import sampled
+from inference.posterior.selection import Selection, selection_summary
 from simulator.scene import Scene
 
 __all__ = ["summarise"]
@@ -28,17 +30,24 @@ Array = NDArray[np.float64]
 _RANGE_DRAWS = 1000
 
 
-def _left_out(scene: Scene) -> tuple[LeftOutTerm, ...]:
+def _left_out(scene: Scene, selection: Selection | None) -> tuple[LeftOutTerm, ...]:
     absent = {
         "crosstalk": scene.crosstalk,
         "background": scene.background,
         "discrepancy": scene.discrepancy,
     }
-    return tuple(
+    rows = [
         LeftOutTerm(term, "the scene states none")
         for term, value in absent.items()
         if value is None
-    )
+    ]
+    if selection is not None:
+        rows += [
+            LeftOutTerm(decision.term, decision.reason)
+            for decision in selection.decisions
+            if not decision.kept
+        ]
+    return tuple(rows)
 
 
 def _parameters(density: CollapsedDensity, sample: Sample) -> dict[str, ParameterSummary]:
@@ -67,6 +76,8 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
     -------
     Posterior
     """
+    stated, selection = job.scene, checkpoint.selection
+    job = sampled(job, checkpoint)
     density = job.density()
     parameters = density.parameters
     rng = job.stream(4)
@@ -91,7 +102,8 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
         range_summary(job, drawn),
         contractions(parameters.names, z, drawn, parameters.range_prior),
         fit,
-        _left_out(job.scene),
+        _left_out(stated, selection),
         Runtime(wall_s, cpu_s, checkpoint.calls, k_hat),
         Draws(parameters.names, draws, sample.log_density, ranges),
+        None if selection is None else selection_summary(stated, selection),
     )
