@@ -1,4 +1,4 @@
-"""Real-time estimates: readings in, all physical ranges out, at once."""
+"""Estimates at once: readings in, all physical ranges out, at once."""
 
 import dataclasses
 import time
@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from inference.estimates import Estimates, LeftOut, TechniqueResult
 from inference.plan import obstacle, plan
 from inference.realtime.known import known_of
-from inference.realtime.registry import ELSEWHERE, TECHNIQUES
+from inference.realtime.registry import TECHNIQUES
 from inference.realtime.technique import Task
-from simulator.errors import InvalidInputError, Problem
+from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
+from simulator.errors import InvalidInputError, Problem, RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene, check_scene
 from simulator.sensor import Sensor
@@ -27,7 +28,8 @@ def estimate(
     sensor : Sensor
         The sensor.
     scene : Scene
-        What is known of the scene; only known numbers and the supports of priors are used.
+        What is known of the scene. Of priors only the supports are used, and as where a fit over
+        many frames begins to look.
     frames : Frames
         The readings.
     techniques : sequence of str, optional
@@ -50,13 +52,16 @@ def estimate(
         raise error.below("/scene") from None
     choice = plan(sensor, scene, frames)
     if techniques is None:
-        names = () if choice.chosen is None else (choice.chosen,)
-        results = tuple(_run(sensor, scene, frames, name) for name in names)
-        return Estimates(choice.chosen, results, choice.left_out)
+        if choice.chosen is None:
+            return Estimates(None, (), choice.left_out)
+        result = _run(sensor, scene, frames, choice.chosen)
+        if isinstance(result, LeftOut):
+            return Estimates(None, (), (result, *choice.left_out))
+        return Estimates(choice.chosen, (result,), choice.left_out)
     problems = [
         Problem(f"/techniques/{i}", f"{name!r} is not a technique")
         for i, name in enumerate(techniques)
-        if name not in TECHNIQUES and name not in ELSEWHERE
+        if name not in ALL_TECHNIQUES and name not in ELSEWHERE
     ]
     if problems:
         raise InvalidInputError(*problems)
@@ -68,17 +73,21 @@ def estimate(
     for name in dict.fromkeys(techniques):
         reason = ELSEWHERE.get(name)
         if reason is None:
-            reason = obstacle(TECHNIQUES[name], sensor, scene, known, frames)
-        if reason is None:
-            served.append(_run(sensor, scene, frames, name))
+            reason = obstacle(ALL_TECHNIQUES[name], sensor, scene, known, frames)
+        found = LeftOut(name, reason) if reason else _run(sensor, scene, frames, name)
+        if isinstance(found, LeftOut):
+            left_out[name] = found
         else:
-            left_out[name] = LeftOut(name, reason)
+            served.append(found)
     return Estimates(choice.chosen, tuple(served), tuple(left_out.values()))
 
 
-def _run(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> TechniqueResult:
+def _run(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> TechniqueResult | LeftOut:
     start = time.perf_counter()
-    result = TECHNIQUES[name].solve(Task(sensor, scene, frames, known_of(scene)))
+    try:
+        result = ALL_TECHNIQUES[name].solve(Task(sensor, scene, frames, known_of(scene)))
+    except RefusedError as error:
+        return LeftOut(name, str(error))
     return dataclasses.replace(result, runtime_s=time.perf_counter() - start)
 
 

@@ -50,7 +50,11 @@ class TechniqueResult:
         Exponent b of Phi ~ r^b and distortion 1 + 1/b, nan where unavailable; only of techniques
         that see motion.
     parameters : mapping, optional
-        What a technique of many frames found besides the ranges.
+        What a technique of many frames found besides the ranges: by scene path ``value``, ``sd``
+        and ``status``.
+    fit : mapping, optional
+        How well a technique of many frames explains them: ``chi_square``,
+        ``degrees_of_freedom``, ``p_value``, ``misfit``, ``rank`` and ``optima``.
     runtime_s : float
         Time that the technique took [s].
     """
@@ -67,6 +71,7 @@ class TechniqueResult:
     power_law: Array | None = None
     zeta: Array | None = None
     parameters: Mapping[str, Any] | None = None
+    fit: Mapping[str, Any] | None = None
     runtime_s: float = 0.0
 
     def __len__(self) -> int:

@@ -1,12 +1,12 @@
-"""Which real-time technique a scene needs, and why the others are left out."""
+"""Which technique a scene needs, and why the others are left out."""
 
 import dataclasses
 import math
 
 from inference.estimates import LeftOut
 from inference.realtime.known import Known, known_of
-from inference.realtime.registry import ELSEWHERE, TECHNIQUES
 from inference.realtime.technique import Technique
+from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor, SineWaveSensor
@@ -85,6 +85,8 @@ def obstacle(
     missing = [path for path in technique.needs if not known.has(path)]
     if missing:
         return f"needs {_plural(missing)} as known numbers"
+    if technique.obstacle is not None:
+        return technique.obstacle(sensor, scene, known, frames)
     return None
 
 
@@ -108,10 +110,10 @@ def plan(sensor: Sensor, scene: Scene, frames: Frames | None = None) -> Plan:
     known = known_of(scene)
     obstacles = {
         name: obstacle(technique, sensor, scene, known, frames)
-        for name, technique in TECHNIQUES.items()
+        for name, technique in ALL_TECHNIQUES.items()
     }
     able = [name for name, reason in obstacles.items() if reason is None]
-    chosen = min(able, key=lambda name: TECHNIQUES[name].cost, default=None)
+    chosen = min(able, key=lambda name: ALL_TECHNIQUES[name].cost, default=None)
     left_out = [
         LeftOut(name, reason if reason is not None else f"{chosen} serves the scene at less cost")
         for name, reason in obstacles.items()

@@ -54,7 +54,10 @@ def _technique(result: TechniqueResult) -> Iterator[str]:
     for start in range(0, len(result), _BLOCK):
         yield (", " if start else "") + ", ".join(_frames(_rows(result, start, start + _BLOCK)))
     parameters = None if result.parameters is None else dict(result.parameters)
-    rest = {"parameters": parameters, "runtime_s": result.runtime_s}
+    rest: dict[str, Any] = {"parameters": parameters}
+    if result.fit is not None:
+        rest["fit"] = dict(result.fit)
+    rest["runtime_s"] = result.runtime_s
     yield "], " + json.dumps(rest, allow_nan=False)[1:]
 
 

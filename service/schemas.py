@@ -76,12 +76,39 @@ class FrameEstimate(pydantic.BaseModel):
     zeta: float | None = None
 
 
+class FittedParameter(pydantic.BaseModel):
+    """An unknown that a technique of many frames found; sd is the Cramer-Rao bound."""
+
+    value: float
+    sd: float | None
+    status: Literal["identified", "weak", "not_identified"]
+
+
+class FittedOptimum(pydantic.BaseModel):
+    """One of the distinct optima of a fit; the deviance is -2 log likelihood."""
+
+    excess_deviance: float
+    parameters: dict[str, float]
+
+
+class TechniqueFit(pydantic.BaseModel):
+    """How well a technique of many frames explains them."""
+
+    chi_square: float
+    degrees_of_freedom: int
+    p_value: float
+    misfit: bool
+    rank: int
+    optima: list[FittedOptimum]
+
+
 class TechniqueEstimates(pydantic.BaseModel):
     """One technique's answer."""
 
     technique: str
     frames: list[FrameEstimate]
-    parameters: dict[str, Any] | None
+    parameters: dict[str, FittedParameter] | None
+    fit: TechniqueFit | None = None
     runtime_s: float
 
 

@@ -8,7 +8,7 @@ writes it anew between the two comments that mark its place.
 import sys
 from pathlib import Path
 
-from inference.realtime.registry import TECHNIQUES
+from inference.techniques import ALL_TECHNIQUES
 
 __all__ = ["END", "START", "main", "technique_table"]
 
@@ -25,7 +25,7 @@ def technique_table() -> str:
         "| technique | uses | must be known | may be present, unknown | physical roots | cost |",
         "|---|---|---|---|---|---|",
     ]
-    for technique in TECHNIQUES.values():
+    for technique in ALL_TECHNIQUES.values():
         uses = technique.observables
         if technique.kinds == ("pulsed",):
             uses += " (pulsed only)"

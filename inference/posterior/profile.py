@@ -24,7 +24,7 @@ from simulator.readings import (
     object_slopes,
 )
 
-__all__ = ["Linearisation", "best_ranges", "linearise"]
+__all__ = ["Linearisation", "best_ranges", "fill_best_ranges", "linearise"]
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ _DIFFERENCE = 1e-5
 
 
 @compiled
-def _best_ranges(
+def fill_best_ranges(
     out: Array,
     shapes: Array,
     crosstalks: Array | None,
@@ -144,7 +144,7 @@ def best_ranges(density: CollapsedDensity, z: Array) -> Array:
     """
     terms = density.parameters.terms(z)
     out = np.empty((z.shape[0], density.frames.shape[0], 3))
-    _best_ranges(out, *density.arguments(terms))
+    fill_best_ranges(out, *density.arguments(terms))
     return out
 
 

@@ -13,7 +13,7 @@ from inference.realtime.differential import DIFFERENTIAL
 from inference.realtime.intensity import INTENSITY, INTENSITY_W1
 from inference.realtime.technique import Technique
 
-__all__ = ["ELSEWHERE", "TECHNIQUES"]
+__all__ = ["TECHNIQUES"]
 
 TECHNIQUES: Mapping[str, Technique] = MappingProxyType(
     {
@@ -27,20 +27,5 @@ TECHNIQUES: Mapping[str, Technique] = MappingProxyType(
             BACKGROUND_INTENSITY,
             BACKGROUND_CANCELLING_DIFFERENTIAL,
         )
-    }
-)
-
-_MANY = "fits many frames at once, which this version does not do in real time; use a posterior"
-
-# techniques of the contract that are not solved frame by frame, and why they are left out
-ELSEWHERE: Mapping[str, str] = MappingProxyType(
-    {
-        "object_fit": _MANY,
-        "crosstalk_fit": _MANY,
-        "shadow_fit": _MANY,
-        "joint_fit": _MANY,
-        "iterative_differential": _MANY,
-        "iterative_background_cancelling": _MANY,
-        "posterior": "is sampled, not solved in real time: ask for a posterior",
     }
 )

@@ -71,7 +71,10 @@ class Technique:
     roots : str
         How many roots it has, and when.
     solve : callable
-        Task -> TechniqueResult.
+        Task -> TechniqueResult; a technique of many frames raises RefusedError where the frames
+        turn out not to determine what is unknown.
+    obstacle : callable, optional
+        (sensor, scene, known, frames or None) -> a further reason why it cannot serve, or None.
     """
 
     name: str
@@ -85,3 +88,4 @@ class Technique:
     equations: str
     roots: str
     solve: Callable[[Task], TechniqueResult]
+    obstacle: Callable[[Sensor, Scene, Known, Frames | None], str | None] | None = None

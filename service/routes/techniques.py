@@ -1,8 +1,8 @@
-"""What the real-time techniques need, what they are immune to, what they cost."""
+"""What the techniques need, what they are immune to, what they cost."""
 
 from fastapi import APIRouter
 
-from inference.realtime.registry import TECHNIQUES
+from inference.techniques import ALL_TECHNIQUES
 from service.schemas import TechniqueDescription, TechniquesResponse
 
 __all__ = ["router"]
@@ -27,6 +27,6 @@ async def techniques() -> TechniquesResponse:
                 equations=technique.equations,
                 roots=technique.roots,
             )
-            for technique in TECHNIQUES.values()
+            for technique in ALL_TECHNIQUES.values()
         ]
     )

@@ -1,0 +1,89 @@
+"""Whether frames are enough for what is unknown, told before anything is fitted.
+
+Every frame holds two readings and one range, so that one number is left for the unknowns; an empty
+scene has no range, but shows nothing but the sum of crosstalk and background.
+"""
+
+import math
+
+import numpy as np
+
+from inference.multiframe.problem import unknowns_of
+from inference.realtime.known import Known
+from inference.realtime.net import SATURATED, rule_out
+from simulator.frames import Frames
+from simulator.parameters import parameters_of
+from simulator.scene import Scene
+from simulator.sensor import Sensor, SineWaveSensor
+
+__all__ = ["frames_needed", "joint_obstacle"]
+
+_MOST_FRAMES = 20_000
+_MOST_HALF_TURNS = 1000.0
+
+
+def frames_needed(unknowns: tuple[str, ...], empty: int) -> int:
+    """Return the least number of frames with an object: one more than determines the unknowns.
+
+    Parameters
+    ----------
+    unknowns : tuple of str
+        Scene paths of what is unknown besides the ranges.
+    empty : int
+        Number of frames without an object.
+
+    Returns
+    -------
+    int
+        Exactly determined systems have several exact solutions, so one more is asked for.
+    """
+    static = sum(
+        path.startswith("crosstalk.") or path in ("background.strength", "background.distance_m")
+        for path in unknowns
+    )
+    told = min(2, static) if empty else 0
+    return len(unknowns) - told + 1
+
+
+def joint_obstacle(sensor: Sensor, scene: Scene, _known: Known, frames: Frames | None) -> str | None:
+    """Return why no joint fit can be made, None if one can be tried.
+
+    Parameters
+    ----------
+    sensor, scene : Sensor, Scene
+        The request.
+    _known : Known
+        The scene's known numbers, not used.
+    frames : Frames, optional
+        Left out: enough are supposed.
+    """
+    if scene.motion != "radial":
+        return (
+            f"needs an object whose range changes, and the scene's motion is {scene.motion}; "
+            "ranges, crosstalk and background cannot be told apart otherwise"
+        )
+    if scene.discrepancy is not None:
+        return "has no term for the scene's discrepancy; use a posterior"
+    unknowns = unknowns_of(sensor, scene)
+    if not unknowns:
+        return (
+            "fits unknowns, and nothing but the ranges is unknown: take a single frame's technique"
+        )
+    far = min(parameters_of(sensor, scene).range_prior.high, sensor.max_range_m)
+    if isinstance(sensor, SineWaveSensor) and sensor.wave_number * far > _MOST_HALF_TURNS * math.pi:
+        return "the scene's ranges hold more than a thousand half turns of phase; narrow range_m"
+    if frames is None:
+        return None
+    if len(frames) > _MOST_FRAMES:
+        return f"serves up to {_MOST_FRAMES} frames, not {len(frames)}; send a part of them"
+    usable = rule_out(sensor, frames) != SATURATED
+    empty = int(np.count_nonzero(usable & ~frames.present))
+    objects = int(np.count_nonzero(usable & frames.present))
+    needed = frames_needed(unknowns, empty)
+    if objects < needed:
+        return (
+            f"needs at least {needed} unsaturated frames with the object at different ranges for "
+            f"{', '.join(unknowns)}, and has {objects}; send more, state more numbers as known, "
+            "or use a posterior with priors"
+        )
+    return None
