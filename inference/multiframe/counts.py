@@ -45,7 +45,9 @@ def frames_needed(unknowns: tuple[str, ...], empty: int) -> int:
     return len(unknowns) - told + 1
 
 
-def joint_obstacle(sensor: Sensor, scene: Scene, _known: Known, frames: Frames | None) -> str | None:
+def joint_obstacle(
+    sensor: Sensor, scene: Scene, _known: Known, frames: Frames | None
+) -> str | None:
     """Return why no joint fit can be made, None if one can be tried.
 
     Parameters
@@ -64,11 +66,14 @@ def joint_obstacle(sensor: Sensor, scene: Scene, _known: Known, frames: Frames |
         )
     if scene.discrepancy is not None:
         return "has no term for the scene's discrepancy; use a posterior"
+    if scene.optional_terms:
+        return (
+            f"keeps every term, and the scene leaves {' and '.join(scene.optional_terms)} to the "
+            "data; use a posterior"
+        )
     unknowns = unknowns_of(sensor, scene)
     if not unknowns:
-        return (
-            "fits unknowns, and nothing but the ranges is unknown: take a single frame's technique"
-        )
+        return "nothing but the ranges is unknown: a technique of single frames serves"
     far = min(parameters_of(sensor, scene).range_prior.high, sensor.max_range_m)
     if isinstance(sensor, SineWaveSensor) and sensor.wave_number * far > _MOST_HALF_TURNS * math.pi:
         return "the scene's ranges hold more than a thousand half turns of phase; narrow range_m"

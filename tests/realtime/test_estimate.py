@@ -13,7 +13,8 @@ from inference.estimate import all_roots, estimate
 from inference.estimates import Status, TechniqueResult
 from inference.plan import plan
 from inference.realtime.conventional import conventional_range
-from inference.realtime.registry import ELSEWHERE, TECHNIQUES
+from inference.realtime.registry import TECHNIQUES
+from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.errors import InvalidInputError
 from simulator.frames import Frames
 from simulator.scene import parse_scene
@@ -59,7 +60,7 @@ def reason_of(result: TechniqueResult, i: int = 0) -> str:
             {"object": OBJECT, "background": FAR, "crosstalk": UNKNOWN},
             "background_cancelling_differential",
         ),
-        ({"background": FAR | {"distance_m": PRIOR}, "object": OBJECT}, None),
+        ({"background": FAR | {"distance_m": PRIOR}, "object": OBJECT}, "joint_fit"),
         ({"background": FAR | {"shadow": "object"}, "object": OBJECT}, "background_"),
     ],
 )
@@ -72,7 +73,7 @@ def test_plan(scene: dict[str, Any], chosen: str | None) -> None:
             assert found.chosen is not None
             assert found.chosen.startswith(chosen)
         named = {item.name for item in found.left_out} | {found.chosen} - {None}
-        assert named == {*TECHNIQUES, *ELSEWHERE}
+        assert named == {*ALL_TECHNIQUES, *ELSEWHERE}
         assert all(item.reason for item in found.left_out)
 
 
@@ -95,7 +96,7 @@ def test_results_stand_in_the_order_asked_for() -> None:
     assert [result.technique for result in estimates.results] == ["intensity", "conventional"]
     reasons = {item.name: item.reason for item in estimates.left_out}
     assert "the scene states none" in reasons["background_cancelling"]
-    assert reasons["joint_fit"] == ELSEWHERE["joint_fit"]
+    assert "nothing but the ranges is unknown" in reasons["joint_fit"]
 
 
 def test_unknown_techniques_are_named() -> None:
