@@ -38,6 +38,8 @@ class Experiment:
         log r of every frame [log m]; nan for a frame without object.
     gain : ndarray, shape (n,), optional
         Factor of each frame on the sensor's gain.
+    known : tuple of str
+        Unknowns that are supposed to be known after all.
     """
 
     sensor: Sensor
@@ -45,6 +47,7 @@ class Experiment:
     z: Array
     log_r: Array
     gain: Array | None = None
+    known: tuple[str, ...] = ()
 
     @functools.cached_property
     def terms(self) -> Terms:
@@ -59,7 +62,11 @@ class Experiment:
     @property
     def names(self) -> tuple[str, ...]:
         """Unknowns on which the readings depend: all but those of the ranges' prior."""
-        return tuple(name for name in self.parameters.names if not name.startswith("range_m."))
+        return tuple(
+            name
+            for name in self.parameters.names
+            if not name.startswith("range_m.") and name not in self.known
+        )
 
     @functools.cached_property
     def units(self) -> Array:
@@ -98,7 +105,9 @@ class Experiment:
             # the shadow has the object's parameters and moves with them
             for name in ("c0", "c1"):
                 columns[f"object.{name}"][7:9] = columns[f"object.{name}"][:2]
-        return np.stack([columns[name] for name in self.names] or [np.empty(9)][:0], axis=1)
+        if not self.names:
+            return np.empty((len(COORDINATES), 0))
+        return np.stack([columns[name] for name in self.names], axis=1)
 
     @property
     def _paths(self) -> tuple[str, ...]:
@@ -132,6 +141,17 @@ class Experiment:
         if self.terms.background is None:
             raise ValueError("a scene without background has no shadow")
         return self.terms.background[0, 2:]
+
+    @functools.cached_property
+    def finite(self) -> bool:
+        """Whether readings, noise and derivatives are numbers that can be computed with."""
+        by_term, along = self.whitened()
+        along = along[np.isfinite(self.log_r)]
+        units = self.in_si_units
+        with np.errstate(over="ignore"):
+            # sums of squares of all of them must not overflow either
+            sizes = [float(np.square(part).sum()) for part in (by_term, along, units)]
+        return bool(np.isfinite(sizes).all() and np.isfinite(self.z).all())
 
     def whitened(self, whitener: Array | None = None) -> tuple[Array, Array]:
         """Return whitened derivatives along ``names`` (n, 2, d) and along log r (n, 2).

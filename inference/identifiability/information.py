@@ -56,7 +56,7 @@ class Information:
         d = len(self.names)
         rows = np.linalg.norm(self.before, axis=1)
         used = rows > 0
-        if d == 0 or not used.any():
+        if not used.any():  # of nothing unknown, or of nothing that is read
             return np.ones(d), np.zeros(d), np.eye(d)
         scaled = self.before[used] / rows[used, None]
         columns = np.linalg.norm(scaled, axis=0)
@@ -112,6 +112,24 @@ class Information:
         columns, _, vectors = self._equilibrated
         null = vectors[:, self.rank :] / columns[:, None]
         return np.asarray(null / np.linalg.norm(null, axis=0))
+
+    def companions(self, index: int) -> Array:
+        """Return how x moves with one unknown while all readings stay as they are.
+
+        Parameters
+        ----------
+        index : int
+            Of an unknown that the readings do not tell.
+
+        Returns
+        -------
+        ndarray, shape (d,)
+            The direction of the null space nearest to the unknown, whose own part in it is 1.
+        """
+        columns, _, vectors = self._equilibrated
+        null = vectors[:, self.rank :]
+        direction = null @ null[index] / columns
+        return np.asarray(direction / direction[index])
 
     @functools.cached_property
     def factor(self) -> Array:

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.identifiability.status import Identifiability
 from inference.posterior.selection import SelectionSummary
 from inference.posterior.verdict import Verdict
 
 __all__ = [
     "Draws",
     "Fit",
-    "Identifiability",
     "LeftOutTerm",
     "Mode",
     "ParameterSummary",
@@ -95,16 +95,6 @@ class RangeSummary:
     mean: Array
     sd: Array
     modes: tuple[tuple[Mode, ...], ...]
-
-
-@dataclasses.dataclass(frozen=True)
-class Identifiability:
-    """Whether the data tell a parameter: "identified", "weak" or "not_identified"."""
-
-    parameter: str
-    status: str
-    contraction: float
-    reason: str
 
 
 @dataclasses.dataclass(frozen=True)

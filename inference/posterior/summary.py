@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.identifiability.after_data import judge_draws
 from inference.posterior.collapsed import CollapsedDensity
-from inference.posterior.contraction import contractions
 from inference.posterior.cross_check import cross_check
 from inference.posterior.job import Checkpoint, Job
 from inference.posterior.parameter_summary import summaries_of_chains, summaries_of_weights
@@ -100,7 +100,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
         verdict,
         _parameters(density, sample),
         range_summary(job, drawn),
-        contractions(parameters.names, z, drawn, parameters.range_prior),
+        judge_draws(job.sensor, parameters, z, chosen, drawn, density.frames[:, 2]),
         fit,
         _left_out(stated, selection),
         Runtime(wall_s, cpu_s, checkpoint.calls, k_hat),

@@ -1,0 +1,79 @@
+"""Identifiability after data: from draws of a posterior."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.identifiability.experiment import Experiment
+from inference.identifiability.judge import Spread, judge
+from inference.identifiability.prediction import predict
+from inference.identifiability.status import Identifiability
+from simulator.parameters import Parameters
+from simulator.sensor import Sensor
+
+__all__ = ["judge_draws"]
+
+Array = NDArray[np.float64]
+
+# variance between the frames' mean ranges, in units of that within them; equal ranges read with
+# noise give one, and four hundred frames of them never four
+_STILL = 4.0
+
+
+def judge_draws(
+    sensor: Sensor,
+    parameters: Parameters,
+    z: Array,
+    chosen: Array,
+    log_r: Array,
+    gain: Array | None = None,
+) -> tuple[Identifiability, ...]:
+    """Judge every unknown by its spread in the posterior, and say why.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The sensor.
+    parameters : Parameters
+        The unknowns.
+    z : ndarray, shape (n, d)
+        Draws in the coordinates whose prior is standard normal.
+    chosen : ndarray, shape (m, d)
+        Draws to which ``log_r`` belongs.
+    log_r : ndarray, shape (m, frames)
+        Draws of log r [log m]; nan for a frame without object.
+    gain : ndarray, shape (frames,), optional
+        Factor of each frame on the sensor's gain.
+
+    Returns
+    -------
+    tuple of Identifiability
+        In the order of the unknowns, "range_m" last.
+
+    Notes
+    -----
+    Reasons are computed at the draw nearest to the mean, with its own ranges: the mean itself may
+    lie where no draw is.
+    """
+    sd = z.std(axis=0)
+    unit = np.where(sd > 0, sd, 1.0)
+    centre = int(np.argmin(np.square((chosen - z.mean(axis=0)) / unit).sum(axis=1)))
+    present = np.isfinite(log_r[centre])
+    here = log_r[centre]
+    still, scale = False, np.nan
+    if present.any():
+        drawn = log_r[:, present]
+        scale = float(drawn.mean(axis=1).std())
+        still = _is_still(drawn)
+        if still:
+            here = np.where(present, here[present].mean(), np.nan)
+    experiment = Experiment(sensor, parameters, chosen[centre], here, gain)
+    return judge(experiment, Spread(sd, scale), predict(experiment), still)
+
+
+def _is_still(drawn: Array) -> bool:
+    """Return whether the frames' ranges differ by no more than their own uncertainty."""
+    if drawn.shape[1] < 2:
+        return True
+    own = drawn - drawn.mean(axis=1, keepdims=True)  # what all frames share is no motion
+    between = float(own.mean(axis=0).var())
+    return between <= _STILL * float(own.var(axis=0).mean())

@@ -1,0 +1,201 @@
+"""Identifiability before any data: what frames at given ranges would tell of a scene."""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.identifiability.experiment import Experiment
+from inference.identifiability.information import Information
+from inference.identifiability.judge import Spread, judge
+from inference.identifiability.prediction import Prediction, predict
+from inference.identifiability.reasons import Diagnosis
+from inference.identifiability.status import Identifiability
+from simulator.errors import InvalidInputError, Problem, RefusedError
+from simulator.parameters import Parameters, parameters_of
+from simulator.scene import Scene
+from simulator.sensor import Sensor
+
+__all__ = ["Foresight", "identifiability"]
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Foresight:
+    """What frames at given ranges would tell.
+
+    Attributes
+    ----------
+    experiment : Experiment
+        Sensor, unknowns, their reference values and the ranges.
+    information : Information
+        Of the readings alone: rank, singular values, Cramer-Rao bounds.
+    prediction : Prediction
+        Posterior spread, priors included.
+    needed : int
+        Number of distinct ranges that the unknowns need at least.
+    distinct : int
+        Number of distinct ranges.
+    identifiability : tuple of Identifiability
+        A row for every unknown and one for "range_m".
+    """
+
+    experiment: Experiment
+    information: Information
+    prediction: Prediction
+    needed: int
+    distinct: int
+    identifiability: tuple[Identifiability, ...]
+
+    @property
+    def reference(self) -> dict[str, float]:
+        """Values of the unknowns at which everything holds, in SI units."""
+        e = self.experiment
+        values = e.parameters.natural(e.z[None])[0].tolist()
+        return dict(zip(e.parameters.names, values, strict=True))
+
+    @property
+    def sd(self) -> dict[str, float]:
+        """Cramer-Rao bounds of the unknowns in SI units; inf where one is not identifiable.
+
+        The parameters of the ranges' prior are not among them: without it they do not exist.
+        """
+        bounds = self.information.sd_of(self.experiment.in_si_units).tolist()
+        return dict(zip(self.experiment.names, bounds, strict=True))
+
+    @property
+    def range_sd(self) -> Array:
+        """Cramer-Rao bounds of the ranges [m], shape (n,); nan for a frame without object."""
+        return np.asarray(np.exp(self.experiment.log_r) * self.information.range_sd)
+
+
+def _log_ranges(ranges_m: Sequence[float], object_present: Sequence[bool] | None) -> Array:
+    ranges = np.asarray(ranges_m, dtype=float)
+    if ranges.ndim != 1 or ranges.size == 0:
+        raise InvalidInputError.at("/ranges_m", "must be a list of at least one range")
+    bad = np.flatnonzero(~((ranges > 0) & np.isfinite(ranges)))[:1]
+    problems = [Problem(f"/ranges_m/{index}", "must be positive and finite") for index in bad]
+    if object_present is not None and len(object_present) != ranges.size:
+        message = f"has {len(object_present)} entries where ranges_m has {ranges.size}"
+        problems.append(Problem("/object_present", message))
+    if problems:
+        raise InvalidInputError(*problems)
+    log_r = np.log(ranges)
+    return log_r if object_present is None else np.where(object_present, log_r, np.nan)
+
+
+def _reference(parameters: Parameters, at: Mapping[str, float] | None) -> Array:
+    """Return z of the values given, the medians of the priors elsewhere."""
+    given = {} if at is None else dict(at)
+    problems = [
+        Problem(f"/at/{name}", "is not an unknown of the scene")
+        for name in given
+        if name not in parameters.names
+    ]
+    z = np.zeros(len(parameters))
+    if problems:
+        raise InvalidInputError(*problems)
+    for j, name in enumerate(parameters.names):
+        if name not in given:
+            continue
+        # the prior of an unknown depends on those before it: their values stand already
+        values = parameters.natural(z[None])
+        values[0, j] = given[name]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            z[j] = parameters.standard(values)[0, j]
+        if not math.isfinite(z[j]):
+            problems.append(Problem(f"/at/{name}", "lies outside its prior"))
+            z[j] = 0.0
+    if problems:
+        raise InvalidInputError(*problems)
+    return z
+
+
+def _check_ranges(experiment: Experiment, scene: Scene) -> None:
+    present = np.isfinite(experiment.log_r)
+    ranges = np.exp(experiment.log_r)
+    low, high = experiment.terms.ranges[0, 6:8]
+    outside = np.flatnonzero(
+        present & ~((ranges >= low * (1 - 1e-12)) & (ranges <= high * (1 + 1e-12)))
+    )
+    if outside.size:
+        message = (
+            f"{ranges[outside[0]]:g} m lies outside the support of range_m, {low:g} to {high:g} m"
+        )
+        if experiment.terms.background is not None and low == -experiment.terms.background[0, 3]:
+            message += " (nearer, a shadow with a negative c1 would be negative)"
+        raise InvalidInputError.at(f"/ranges_m/{outside[0]}", message)
+    still = present.any() and np.ptp(experiment.log_r[present]) > 1e-9
+    if scene.motion == "static" and still:
+        message = "differ, and the scene states an object that does not move"
+        raise InvalidInputError.at("/ranges_m", message)
+
+
+def identifiability(
+    sensor: Sensor,
+    scene: Scene,
+    ranges_m: Sequence[float],
+    object_present: Sequence[bool] | None = None,
+    at: Mapping[str, float] | None = None,
+) -> Foresight:
+    """Foresee what frames at given ranges tell of a scene, before any data.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The sensor, with its noise.
+    scene : Scene
+        What is known and what is not.
+    ranges_m : sequence of float
+        Range of the object in every frame [m].
+    object_present : sequence of bool, optional
+        False for a frame without the object, whose range plays no part.
+    at : mapping of str to float, optional
+        Values of unknowns, by scene path [SI units], at which the readings are linearised; the
+        others are at the medians of their priors.
+
+    Returns
+    -------
+    Foresight
+
+    Raises
+    ------
+    InvalidInputError
+        With pointers relative to the request: "/scene/...", "/ranges_m/i", "/object_present",
+        "/at/...".
+    RefusedError
+        For tangential motion, and where a number overflows.
+    """
+    try:
+        parameters = parameters_of(sensor, scene)
+    except InvalidInputError as error:
+        raise error.below("/scene") from None
+    if scene.motion == "tangential":
+        raise RefusedError(
+            "in tangential motion every frame has an amplitude of its own, and the information is "
+            "computed for one amplitude and a range that changes; state radial motion"
+        )
+    log_r = _log_ranges(ranges_m, object_present)
+    experiment = Experiment(sensor, parameters, _reference(parameters, at), log_r)
+    _check_ranges(experiment, scene)
+    if not experiment.finite:
+        raise RefusedError(
+            "a reading, its noise or one of their derivatives is beyond what a number can hold; "
+            "state the quantities in other units of reading"
+        )
+    prediction = predict(experiment)
+    present = np.isfinite(log_r)
+    still = bool(present.any()) and float(np.ptp(log_r[present])) < 1e-9
+    spread = Spread(prediction.sd, prediction.scale_sd)
+    diagnosis = Diagnosis(experiment, still)
+    return Foresight(
+        experiment,
+        diagnosis.information,
+        prediction,
+        diagnosis.needed,
+        diagnosis.distinct,
+        judge(experiment, spread, prediction, still),
+    )

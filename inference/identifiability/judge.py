@@ -1,0 +1,98 @@
+"""A status and a reason for every unknown, from how far it spreads."""
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.identifiability.experiment import Experiment
+from inference.identifiability.prediction import Prediction, log_range_spread
+from inference.identifiability.reasons import Diagnosis
+from inference.identifiability.status import Identifiability, status_of
+
+__all__ = ["Spread", "judge"]
+
+Array = NDArray[np.float64]
+
+_WIDER = 3.0  # than the curvature predicts: more than one solution, or a curved valley
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Spread:
+    """How far a posterior spreads.
+
+    Attributes
+    ----------
+    parameters : ndarray, shape (d,)
+        Standard deviations in z, where those of the prior are one.
+    scale : float
+        Of the mean of log r over the frames; nan where none has an object.
+    """
+
+    parameters: Array
+    scale: float
+
+
+def _headline(parameter: str, status: str, spread: float) -> str:
+    if parameter == "range_m":
+        return {
+            "identified": f"the common scale of the ranges is known to {spread:.2g} of itself",
+            "weak": f"the common scale of the ranges is known only to {spread:.0%} of itself",
+            "not_identified": "the common scale of the ranges stays open",
+        }[status]
+    return {
+        "identified": f"the data narrow the prior to {spread:.2g} of its width",
+        "weak": f"the data narrow the prior only to {spread:.0%} of its width",
+        "not_identified": "the answer is little more than the prior",
+    }[status]
+
+
+def judge(
+    experiment: Experiment, spread: Spread, prediction: Prediction, still: bool
+) -> tuple[Identifiability, ...]:
+    """Judge every unknown and the common scale of the ranges.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Where the reasons are computed.
+    spread : Spread
+        Of the posterior, or as it is predicted.
+    prediction : Prediction
+        At the experiment, to tell a curved or divided posterior by.
+    still : bool
+        Whether the ranges of all frames are one and the same, as far as can be told.
+
+    Returns
+    -------
+    tuple of Identifiability
+        In the order of the unknowns, "range_m" last.
+    """
+    diagnosis = Diagnosis(experiment, still)
+    names = experiment.parameters.names
+    wide = log_range_spread(experiment.parameters)
+    rows = []
+    for name, value, foreseen, unit in [
+        *zip(names, spread.parameters, prediction.sd, np.ones(len(names)), strict=True),
+        ("range_m", spread.scale, prediction.scale_sd, wide),
+    ]:
+        status = status_of(name, float(value))
+        text = _headline(name, status, float(value))
+        if status != "identified":
+            text += ": " + _cause(diagnosis, name, float(value), float(foreseen))
+        contraction = 1 - float(value / unit) ** 2 if math.isfinite(value) else 0.0
+        rows.append(Identifiability(name, status, contraction, text))
+    return tuple(rows)
+
+
+def _cause(diagnosis: Diagnosis, name: str, spread: float, foreseen: float) -> str:
+    if name.startswith("range_m."):
+        return f"{diagnosis.distinct} ranges say no more of the law that they were drawn from"
+    text = diagnosis.explain(name)
+    if spread > _WIDER * foreseen:
+        text += (
+            f"; it spreads {spread / foreseen:.2g} times wider than the curvature at one draw "
+            "says: there are several solutions, or one valley that bends"
+        )
+    return text

@@ -1,0 +1,156 @@
+"""What would help: the bounds of the same scene under changed experiments, computed."""
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.identifiability.experiment import Experiment, information
+from inference.identifiability.information import Information
+
+__all__ = ["EMPTY_FRAMES", "Remedy", "remedies", "span"]
+
+Array = NDArray[np.float64]
+
+EMPTY_FRAMES = 3
+_LEAST_SPAN = math.log(4.0)
+_FRAMES = 40  # of a stroke that is tried, at least
+# what a calibration would tell at once
+_GROUPS = {
+    "crosstalk": "the crosstalk",
+    "background.strength": "the background's strength",
+    "background.distance_m": "the background's distance",
+    "background.shadow": "the shadow's c0 and c1",
+    "object.c": "the object",
+    "object.c2": "the object's c2",
+}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Remedy:
+    """A changed experiment.
+
+    Attributes
+    ----------
+    words : str
+        The change, as the subject of a sentence: "three frames without the object".
+    kind : str
+        "empty", "motion", or the start of the paths of the unknowns that it makes known.
+    information : Information
+        What its readings would tell.
+    """
+
+    words: str
+    kind: str
+    information: Information
+
+    def bound(self, parameter: str) -> float:
+        """Return the bound of an unknown or of "range_m"; inf where the change makes it known."""
+        if parameter == "range_m":
+            return self.information.scale_sd
+        names = self.information.names
+        return (
+            float(self.information.sd[names.index(parameter)]) if parameter in names else math.inf
+        )
+
+
+def span(log_r: Array) -> float:
+    """Return the span of log r over the frames with an object, 0 without any."""
+    present = log_r[np.isfinite(log_r)]
+    return float(np.ptp(present)) if present.size else 0.0
+
+
+def _with_stroke(experiment: Experiment, low: float, high: float) -> tuple[str, Experiment]:
+    """Return the experiment with ranges evenly spaced in log r, and what to call them."""
+    log_r = experiment.log_r
+    empty, present = log_r[np.isnan(log_r)], int(np.isfinite(log_r).sum())
+    n = max(present, _FRAMES)
+    words = f"from {math.exp(low):.2g} to {math.exp(high):.2g} m"
+    if n > present:
+        words += f", seen in {n} frames,"
+    return words, _with_frames(experiment, np.append(np.linspace(low, high, n), empty))
+
+
+def _with_frames(experiment: Experiment, log_r: Array) -> Experiment:
+    """Return the experiment with other frames, all of the median gain."""
+    gain = experiment.gain
+    if gain is not None:
+        gain = np.full(log_r.size, float(np.median(gain)))
+    return dataclasses.replace(experiment, log_r=log_r, gain=gain)
+
+
+def _emptied(experiment: Experiment) -> Experiment:
+    gain = experiment.gain
+    if gain is not None:
+        gain = np.append(gain, np.full(EMPTY_FRAMES, float(np.median(gain))))
+    log_r = np.append(experiment.log_r, np.full(EMPTY_FRAMES, np.nan))
+    return dataclasses.replace(experiment, log_r=log_r, gain=gain)
+
+
+def _room(experiment: Experiment) -> tuple[float, float]:
+    """Return the bounds of log r: those of its prior, and before the background."""
+    low, high = (float(bound) for bound in experiment.terms.ranges[0, 6:8])
+    if experiment.terms.background is not None:
+        high = min(high, float(experiment.terms.background[0, 1]))
+    present = experiment.log_r[np.isfinite(experiment.log_r)]
+    low, high = math.log(max(low, 1e-300)), math.log(max(high, 1e-300))
+    return min(low, float(present.min())), max(high, float(present.max()))
+
+
+def _moved(experiment: Experiment) -> tuple[str, Experiment] | None:
+    """Widen the stroke: to twice its span and at least a factor of four."""
+    present = experiment.log_r[np.isfinite(experiment.log_r)]
+    if present.size == 0:
+        return None
+    low, high = _room(experiment)
+    wide = min(max(2 * float(np.ptp(present)), _LEAST_SPAN), high - low)
+    if not math.isfinite(wide) or wide < 1.2 * np.ptp(present) or wide < 1e-3:
+        return None
+    middle = 0.5 * float(present.min() + present.max())
+    middle = min(max(middle, low + wide / 2), high - wide / 2)
+    words, changed = _with_stroke(experiment, middle - wide / 2, middle + wide / 2)
+    return f"an object that moves {words}", changed
+
+
+def _at_the_bend(experiment: Experiment) -> tuple[str, Experiment] | None:
+    """Move about sqrt(c0), where the flux turns from one power law to another."""
+    present = experiment.log_r[np.isfinite(experiment.log_r)]
+    if present.size == 0 or not any(name.startswith("object.c") for name in experiment.names):
+        return None
+    low, high = _room(experiment)
+    bend = 0.5 * math.log(float(experiment.terms.object[0, 0]))
+    near, far = max(low, bend - math.log(2.0)), min(high, bend + math.log(4.0))
+    if far - near < math.log(2.0):
+        return None
+    words, changed = _with_stroke(experiment, near, far)
+    return f"an object that moves about sqrt(c0), {words}", changed
+
+
+def remedies(experiment: Experiment) -> list[Remedy]:
+    """Compute what changes of the experiment would tell.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        As it is.
+
+    Returns
+    -------
+    list of Remedy
+        Three frames without the object, longer and nearer strokes, each group of unknowns known.
+    """
+    found = []
+    names = experiment.names
+    if any(not name.startswith("object.") for name in names):
+        words = "three frames without the object"
+        found.append(Remedy(words, "empty", information(_emptied(experiment))))
+    strokes = (_moved(experiment), _at_the_bend(experiment))
+    found += [Remedy(s[0], "motion", information(s[1])) for s in strokes if s is not None]
+    for prefix, words in _GROUPS.items():
+        group = tuple(name for name in names if name.startswith(prefix))
+        if not group or len(group) == len(names) or (prefix == "object.c" and len(group) == 1):
+            continue
+        known = dataclasses.replace(experiment, known=(*experiment.known, *group))
+        found.append(Remedy(f"knowing {words}", prefix, information(known)))
+    return found
