@@ -12,7 +12,14 @@ from service import openapi, problems
 from service.job_store import MemoryJobStore
 from service.jobs import Fold, Jobs
 from service.process_pool import ProcessPool
-from service.routes import estimates, health, posteriors, simulations, techniques
+from service.routes import (
+    estimates,
+    health,
+    identifiability,
+    posteriors,
+    simulations,
+    techniques,
+)
 from service.settings import Settings
 from service.state import State
 
@@ -57,6 +64,6 @@ def create_app(settings: Settings | None = None, fold: Fold = posterior_fold) ->
     app.state.shared = state
     problems.install(app)
     openapi.install(app)
-    for module in (estimates, posteriors, simulations, techniques, health):
+    for module in (estimates, identifiability, posteriors, simulations, techniques, health):
         app.include_router(module.router)
     return app

@@ -8,11 +8,21 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 from service.problems import ProblemDetails
-from service.schemas import EstimateRequest, PosteriorRequest, SimulationRequest
+from service.schemas import (
+    EstimateRequest,
+    IdentifiabilityRequest,
+    PosteriorRequest,
+    SimulationRequest,
+)
 
 __all__ = ["install"]
 
-_MODELS: tuple[type[BaseModel], ...] = (EstimateRequest, PosteriorRequest, SimulationRequest)
+_MODELS: tuple[type[BaseModel], ...] = (
+    EstimateRequest,
+    IdentifiabilityRequest,
+    PosteriorRequest,
+    SimulationRequest,
+)
 
 
 def install(app: FastAPI) -> None:

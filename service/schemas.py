@@ -15,6 +15,8 @@ __all__ = [
     "EstimateRequest",
     "EstimatesResponse",
     "FrameEstimate",
+    "IdentifiabilityRequest",
+    "IdentifiabilityResponse",
     "LeftOutTechnique",
     "PosteriorPage",
     "PosteriorRequest",
@@ -31,6 +33,8 @@ AnySensor = Annotated[Sensor, pydantic.Field(discriminator="kind")]
 # the largest integer that every JSON reader keeps exactly
 Seed = Annotated[int, pydantic.Field(ge=0, le=2**53 - 1)]
 Name = Annotated[str, pydantic.Field(max_length=64)]
+Positive = Annotated[float, pydantic.Field(gt=0)]
+_PLANNED = pydantic.Field(min_length=1, max_length=10_000, fail_fast=True)
 
 
 class SystemDescription(Validated):
@@ -59,6 +63,25 @@ class SimulationRequest(SystemDescription):
 
     trajectory: Trajectory
     seed: Seed | None = None
+
+
+class IdentifiabilityRequest(SystemDescription):
+    """Body of ``POST /v1/identifiability``: frames before they are taken.
+
+    Attributes
+    ----------
+    ranges_m : list of float
+        Range of the object in every frame [m].
+    object_present : list of bool, optional
+        False for a frame without the object.
+    at : dict of str to float, optional
+        Values of unknowns by scene path at which the bounds are computed; the others are at the
+        medians of their priors.
+    """
+
+    ranges_m: Annotated[list[Positive], _PLANNED]
+    object_present: Annotated[list[bool], _PLANNED] | None = None
+    at: Annotated[dict[Name, float], pydantic.Field(max_length=64)] | None = None
 
 
 class FrameEstimate(pydantic.BaseModel):
@@ -240,6 +263,59 @@ class PosteriorPage(pydantic.BaseModel):
 
     items: list[_Posterior]
     next_cursor: str | None
+
+
+class _Bound(pydantic.BaseModel):
+    value: float | None
+    cramer_rao_sd: float | None
+    posterior_sd: float | None
+
+
+class _RangeBounds(pydantic.BaseModel):
+    value: list[float | None]
+    cramer_rao_sd: list[float | None]
+    posterior_sd: list[float | None]
+    scale_cramer_rao_sd: float | None
+    scale_posterior_sd: float | None
+
+
+class IdentifiabilityResponse(pydantic.BaseModel):
+    """Answer of ``POST /v1/identifiability``.
+
+    Attributes
+    ----------
+    rank : int
+        Directions of the unknowns that noise-free readings tell, the ranges being unknown too.
+    unknowns : int
+        Number of unknowns that the readings depend on; identifiable are all where rank equals it.
+    singular_values : list of float
+        Of the whitened Jacobian, ranges eliminated, along log c0, c1 / sqrt(c0), log c2, crosstalk
+        in units of the scene's light, log B, log R, log c0' and c1' / sqrt(c0').
+    resolution : float
+        Singular value, relative to a Jacobian scaled to unit rows and columns, below which rounding
+        does not tell it from zero.
+    distinct_ranges, needed_ranges : int
+        Distinct ranges that there are, and that the unknowns need at least.
+    parameters : dict
+        Every unknown in SI units: value at which the bounds hold, Cramer-Rao bound of the readings
+        alone (null: not identifiable, or a parameter of the ranges' prior), predicted posterior
+        standard deviation, prior included.
+    range_m : object
+        The same for every range [m], null for a frame without object, and for the common scale of
+        the ranges (the mean of log r).
+    identifiability : list
+        A status and a reason for every unknown and for ``range_m``.
+    """
+
+    rank: int
+    unknowns: int
+    singular_values: list[float]
+    resolution: float
+    distinct_ranges: int
+    needed_ranges: int
+    parameters: dict[str, _Bound]
+    range_m: _RangeBounds
+    identifiability: list[_Identifiability]
 
 
 class SimulationResponse(pydantic.BaseModel):

@@ -22,6 +22,8 @@ __all__ = ["Foresight", "identifiability"]
 
 Array = NDArray[np.float64]
 
+_DIFFERENCE = 1e-5  # of z, in which every prior has unit scale
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Foresight:
@@ -65,6 +67,17 @@ class Foresight:
         """
         bounds = self.information.sd_of(self.experiment.in_si_units).tolist()
         return dict(zip(self.experiment.names, bounds, strict=True))
+
+    @property
+    def posterior_sd(self) -> dict[str, float]:
+        """Predicted posterior standard deviations of all unknowns, in SI units."""
+        e = self.experiment
+        steps = _DIFFERENCE * np.eye(e.z.size)
+        with np.errstate(over="ignore", invalid="ignore"):
+            change = e.parameters.natural(e.z + steps) - e.parameters.natural(e.z - steps)
+            slopes = change.T / (2 * _DIFFERENCE)  # the unknowns along z
+            sd = np.linalg.norm(slopes @ self.prediction.factor, axis=1).tolist()
+        return dict(zip(e.parameters.names, sd, strict=True))
 
     @property
     def range_sd(self) -> Array:

@@ -7,7 +7,7 @@ import argparse
 from collections.abc import Callable
 
 from service import reproduce
-from service.commands import estimate, infer, serve, simulate
+from service.commands import estimate, identifiability, infer, serve, simulate
 from service.demo import command as demo
 from service.report import command as report
 
@@ -20,6 +20,7 @@ COMMANDS: tuple[AddParser, ...] = (
     simulate.add_parser,
     estimate.add_parser,
     infer.add_parser,
+    identifiability.add_parser,
     reproduce.add_parser,
     demo.add_parser,
     report.add_parser,

@@ -22,7 +22,7 @@ from simulator.sensor import Sensor
 from tests.service import fake_fold
 from tests.service.conftest import FRAMES, SCENE, SENSOR
 
-ROUTES = ("/v1/estimates", "/v1/posteriors", "/v1/simulations")
+ROUTES = ("/v1/estimates", "/v1/identifiability", "/v1/posteriors", "/v1/simulations")
 SINE_WAVE = {
     "kind": "sine_wave",
     "frequency_hz": 5e6,
@@ -66,6 +66,20 @@ BODIES: tuple[dict[str, Any], ...] = (
             "object_present": [True, False],
         },
         "seed": 2,
+    },
+    {
+        "sensor": SENSOR,
+        "scene": {
+            "crosstalk": [0.0, {"prior": "normal", "mean": 0.0, "sd": 0.1}],
+            "background": {
+                "strength": {"prior": "lognormal", "median": 0.02, "sigma": 1.0},
+                "distance_m": {"prior": "uniform", "low": 2.0, "high": 8.0},
+            },
+            "range_m": {"prior": "stroke", "low": 0.1, "high": 3.0},
+        },
+        "ranges_m": [0.3, 0.6, 1.2, 1.0],
+        "object_present": [True, True, True, False],
+        "at": {"object.c0": 0.08, "background.distance_m": 3.0},
     },
 )
 EXTREMES = [0.0, -0.0, 1.0, -1.0, 1e-320, 1e-300, 1e-30, 1e-12, 1e12, 1e30, 1e300, 1.8e308, -1e308]

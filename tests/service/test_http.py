@@ -183,13 +183,13 @@ async def test_multitude_of_aliases(client: httpx.AsyncClient) -> None:
 
 @pytest.mark.parametrize("content", [b"", b"{", b"nope", b"\xff\xfe", b"[" * 100_000])
 async def test_malformed_body(client: httpx.AsyncClient, content: bytes) -> None:
-    for route in ("estimates", "posteriors", "simulations"):
+    for route in ("estimates", "identifiability", "posteriors", "simulations"):
         assert_problem(await client.post(f"/v1/{route}", content=content), 400)
 
 
 @pytest.mark.parametrize("content", [b"null", b"[]", b"1", b'"x"', b"NaN", b"true"])
 async def test_body_that_is_no_object(client: httpx.AsyncClient, content: bytes) -> None:
-    for route in ("estimates", "posteriors", "simulations"):
+    for route in ("estimates", "identifiability", "posteriors", "simulations"):
         assert_problem(await client.post(f"/v1/{route}", content=content), 422, "")
 
 
@@ -420,7 +420,7 @@ async def test_openapi(client: httpx.AsyncClient) -> None:
             for status, response in operation["responses"].items():
                 if status.startswith(("4", "5")):
                     assert list(response["content"]) == ["application/problem+json"], path
-    for route in ("estimates", "posteriors", "simulations"):
+    for route in ("estimates", "identifiability", "posteriors", "simulations"):
         operation = document["paths"][f"/v1/{route}"]["post"]
         assert "requestBody" in operation
         assert {"400", "413", "415", "422"} <= operation["responses"].keys()
