@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report readme picture notebook-data calibrate test check lint format types fast lock clean
+.PHONY: help setup demo report readme picture notebook-data calibrate coverage test check lint format types fast lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -36,6 +36,9 @@ notebook-data: $(READY) ## Make the notebook's frames anew
 
 calibrate: $(READY) ## Simulation-based calibration: goes on where it stopped, then docs/calibration.png
 	$(BIN)/python -m benchmarks.calibration --workers 2
+
+coverage: $(READY) ## Intervals against exact optics and recorded photons: goes on where it stopped
+	$(BIN)/python -m benchmarks.coverage --workers 2
 
 test: $(READY) ## Run every test
 	$(BIN)/python -m pytest -n 2 --dist loadgroup

@@ -1,6 +1,5 @@
 """Ranks of one data set's truths among the draws of its posterior."""
 
-import dataclasses
 import zlib
 
 import numpy as np
@@ -9,8 +8,7 @@ from numpy.typing import NDArray
 from benchmarks.calibration.cells import Cell
 from benchmarks.calibration.truth import Truth, draw_truth
 from benchmarks.resumable import Row
-from inference.posterior import fold
-from inference.posterior.posterior import Draws
+from benchmarks.sampling import Sampled, sample
 from inference.posterior.settings import SamplerSettings
 from simulator.errors import RefusedError
 from simulator.parameters import parameters_of
@@ -20,10 +18,6 @@ __all__ = ["DRAWS", "columns_of", "quantities_of", "rank_row", "ranks_among"]
 Array = NDArray[np.float64]
 
 DRAWS = 99  # ranks 0 to 99: a hundred values, which ten bins share evenly
-# counted, not timed: the same ranks on every machine. Chunks are shorter than those of a service
-# because a few hundred effective draws are enough here, and a whole chunk gives ten times as many
-_MOST_CHUNKS = 100
-_MOST_STEPS = 130
 
 
 def quantities_of(cell: Cell) -> tuple[str, ...]:
@@ -72,35 +66,28 @@ def rank_row(cell: Cell, number: int, version: str = "") -> Row:
         method="emcee", ensembles=cell.ensembles, seed=seed, target_ess=cell.target_ess
     )
     try:
-        job = fold.prepare(cell.sensor, cell.scene, truth.frames, settings)
-        checkpoint = fold.start(job)
+        found = sample(cell.sensor, cell.scene, truth.frames, settings)
     except RefusedError as error:
         return {**row, "converged": 0, "reason": f"refused: {error}"}
-    for _ in range(_MOST_CHUNKS):
-        tasks = fold.tasks(job, checkpoint)
-        if not tasks:
-            break
-        short = [dataclasses.replace(t, steps=min(t.steps, _MOST_STEPS)) for t in tasks]
-        checkpoint = fold.merge(job, checkpoint, [fold.run(task) for task in short])
-    reached = fold.progress(job, checkpoint)
-    posterior = fold.summarise(job, checkpoint, 0.0, 0.0)
+    posterior = found.posterior
     return {
         **row,
         "converged": int(posterior.verdict.converged),
-        "ess": "" if reached.ess is None else round(reached.ess),
-        "rhat": "" if reached.rhat is None else float(reached.rhat),
+        "ess": "" if found.ess is None else round(found.ess),
+        "rhat": "" if found.rhat is None else float(found.rhat),
         "calls": posterior.runtime.likelihood_calls,
         "fit_p": posterior.fit.p_value,
         "reason": " / ".join(posterior.verdict.reasons),
-        **_ranks(cell, truth, job, posterior.draws),
+        **_ranks(cell, truth, found),
     }
 
 
-def _ranks(cell: Cell, truth: Truth, job: fold.Job, found: Draws) -> dict[str, int]:
+def _ranks(cell: Cell, truth: Truth, sampled: Sampled) -> dict[str, int]:
+    found = sampled.posterior.draws
     frames = list(cell.ranked_frames)
     draws = _evenly(found.parameters.reshape(-1, len(found.names)))
     ranges = _evenly(found.range_m.reshape(-1, cell.frames)[:, frames])
-    density = job.density()
+    density = sampled.job.density()
     # the density judges all unknowns together, which no rank of one of them does
     height = density(density.parameters.standard(draws))
     ranked = ranks_among(

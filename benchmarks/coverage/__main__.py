@@ -1,0 +1,73 @@
+"""Coverage: finish the tables, then write the figure and print the shares.
+
+    python -m benchmarks.coverage [--workers 2] [--term with] [--only crosstalk] [--sets 50]
+
+Interrupt it at will: it goes on where it stopped. With `--sets 0` it only reads the tables.
+"""
+
+import argparse
+import functools
+import multiprocessing
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+
+from benchmarks.coverage.classes import CLASSES, TERMS, class_row
+from benchmarks.coverage.figure import draw
+from benchmarks.coverage.intervals import COLUMNS
+from benchmarks.coverage.recorded import CELLS, recorded_row
+from benchmarks.coverage.recorded import TERMS as RECORDED_TERMS
+from benchmarks.coverage.report import coverage, recorded_report, report
+from benchmarks.resumable import code_version, resume, rows_of
+from tests.recorded.experiment import PATH
+
+TABLES = Path(__file__).with_name("results")
+FIGURE = Path(__file__).parents[2] / "docs" / "coverage.png"
+SETS = 50
+
+
+def _table(name: str, term: str) -> Path:
+    return TABLES / f"{name}-{term}.csv"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--term", action="append", choices=[*TERMS], help="default: all")
+    parser.add_argument("--only", action="append", choices=[*CLASSES, "recorded"])
+    parser.add_argument("--sets", type=int, default=SETS, help="data sets a class")
+    given = parser.parse_args()
+    version = code_version()
+    with ExitStack() as stack:
+        executor: Executor | None = None
+        if given.workers > 1:
+            context = multiprocessing.get_context("spawn")
+            executor = stack.enter_context(ProcessPoolExecutor(given.workers, context))
+        for term in given.term or TERMS:
+            for slug, group in CLASSES.items():
+                if given.only and slug not in given.only:
+                    continue
+                work = functools.partial(class_row, group, term, version=version)
+                done = resume(_table(slug, term), COLUMNS, range(given.sets), work, executor)
+                if done:
+                    print(f"{group.name}, {term}: {done} data sets done", flush=True)
+            wanted = term in RECORDED_TERMS and (not given.only or "recorded" in given.only)
+            if wanted and given.sets and PATH.exists():
+                work = functools.partial(recorded_row, term, version=version)
+                numbers = range(len(CELLS))
+                resume(_table("recorded", term), COLUMNS, numbers, work, executor)
+    found = [
+        coverage(group.name, term, rows)
+        for slug, group in CLASSES.items()
+        for term in TERMS
+        if (rows := rows_of(_table(slug, term)))
+    ]
+    if found:
+        draw(found, FIGURE)
+    print(report(found))
+    recorded = [(term, row) for term in RECORDED_TERMS for row in rows_of(_table("recorded", term))]
+    print("", recorded_report(recorded), sep="\n")
+
+
+if __name__ == "__main__":
+    main()
