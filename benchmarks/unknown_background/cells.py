@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from benchmarks.resumable import Row
 from inference.identifiability.experiment import Experiment, information
@@ -19,7 +20,7 @@ from simulator.sensor import Sensor, parse_sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
 
-__all__ = ["CELLS", "COLUMNS", "R_NAME", "SNRS", "SPANS", "Cell", "Foreseen", "row_of"]
+__all__ = ["CELLS", "COLUMNS", "R_NAME", "SNRS", "SPANS", "Cell", "Foreseen", "prior_sd", "row_of"]
 
 Array = NDArray[np.float64]
 
@@ -112,8 +113,21 @@ class Cell:
         experiment = self.experiment(self.sensor, np.log(self.ranges))
         bounds, prediction = information(experiment), predict(experiment)
         j = bounds.names.index(R_NAME)
-        predicted = float(prediction.sd[j]) * DISTANCE["sigma"]  # type: ignore[operator]
+        step = 1e-5 * np.eye(experiment.z.size)[j]
+        ends = experiment.parameters.natural(experiment.z + np.outer([1, -1], step))[:, j]
+        slope = float(np.log(ends[0] / ends[1])) / 2e-5  # of log R along its z: the prior is cut
+        predicted = float(prediction.sd[j]) * slope
         return Foreseen(float(bounds.sd[j]), predicted, bounds.scale_sd, prediction.scale_sd)
+
+
+def prior_sd() -> float:
+    """Standard deviation of log R under its prior, which the sensor's r0 cuts."""
+    cell = Cell("A", 3.0, SPANS[0], 1.0, 0)
+    parameters = parameters_of(cell.sensor, cell.scene)
+    j = parameters.names.index(R_NAME)
+    z = np.zeros((4001, len(parameters)))
+    z[:, j] = special.ndtri((np.arange(4001) + 0.5) / 4001)
+    return float(np.log(parameters.natural(z)[:, j]).std())
 
 
 def _cells() -> list[Cell]:

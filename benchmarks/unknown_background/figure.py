@@ -10,19 +10,19 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from benchmarks.unknown_background.cells import DISTANCE, SNRS, SPANS, Cell
+from benchmarks.unknown_background.cells import SNRS, SPANS, Cell, prior_sd
 
 __all__ = ["draw"]
 
 _COLOURS = ("tab:blue", "tab:orange", "tab:red")
-_PRIOR = float(DISTANCE["sigma"])  # type: ignore[arg-type]
 _LIMITS = (1e-5, 1e3)
 
 
 def _panel(axis: Axes, case: str, distance: float, rows: Sequence[Mapping[str, str]]) -> None:
     snrs = np.geomspace(SNRS[0], SNRS[-1], 33)
-    axis.axhspan(0.7 * _PRIOR, _LIMITS[1], color="0.90", lw=0)
-    axis.axhline(_PRIOR, color="0.55", lw=0.8)
+    prior = prior_sd()
+    axis.axhspan(0.7 * prior, _LIMITS[1], color="0.90", lw=0)
+    axis.axhline(prior, color="0.55", lw=0.8)
     axis.axhline(0.1, color="0.55", lw=0.8, ls=":")
     for span, colour in zip(SPANS, _COLOURS, strict=True):
         foreseen = [Cell(case, distance, span, float(snr), 0).foreseen() for snr in snrs]
@@ -84,7 +84,10 @@ def draw(rows: Sequence[Mapping[str, str]], path: Path) -> None:
             Line2D([], [], color="0.55", lw=0.8, ls=":", label="10 %"),
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
-        figure.supxlabel("signal-to-noise ratio of the whole reading at the middle of the stroke")
+        for axis in axes[1]:
+            axis.set_xlabel(
+                "signal-to-noise ratio of the whole reading at the middle of the stroke"
+            )
         figure.supylabel("standard deviation of log R (all of object and background unknown)")
         figure.suptitle("Unknown background distance R, 40 frames", fontsize=10)
         figure.savefig(path, dpi=110)
