@@ -230,7 +230,8 @@ def eliminate(names: tuple[str, ...], jacobian: Array, along_range: Array) -> In
     normal = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
     across = np.einsum("ni,nid->nd", normal[moves], jacobian[moves])
     sizes = np.linalg.norm(jacobian, axis=1)
-    rows = np.concatenate([across, jacobian[~moves].reshape(-1, d)])
+    whole = jacobian[~moves]
+    rows = np.concatenate([across, whole.reshape(2 * len(whole), d)])
     before = np.concatenate([sizes[moves], np.repeat(sizes[~moves], 2, axis=0)])
     response = np.zeros((n, d))
     variance = np.full(n, np.inf)

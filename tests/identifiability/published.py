@@ -111,3 +111,9 @@ def range_bounds(of: Information) -> tuple[float, float, float]:
     """Best, median (the upper of two) and worst bound of log r."""
     sd = np.sort(of.range_sd[np.isfinite(of.range_sd)])
     return float(sd[0]), float(sd[sd.size // 2]), float(sd[-1])
+
+
+def is_printed(value: float, printed: float) -> bool:
+    """Whether a value rounds to two printed digits (or to the one that is left of a zero)."""
+    unit = 10.0 ** (math.floor(math.log10(printed)) - 1)
+    return abs(value - printed) <= 0.5001 * unit

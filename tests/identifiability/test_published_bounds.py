@@ -1,7 +1,5 @@
 """Rank, least singular value and Cramer-Rao bounds against published tables, digit by digit."""
 
-import math
-
 import pytest
 
 from tests.identifiability.published import (
@@ -10,6 +8,7 @@ from tests.identifiability.published import (
     OBJECT,
     SHADOW,
     System,
+    is_printed,
     range_bounds,
 )
 
@@ -41,12 +40,6 @@ B 10 7 0 7 4.7e-8 17000 500000 520000 | B 10 10 0 7 7.2e-7 3600 31000 32000
 B 10 40 0 7 2.5e-5 540 720 790 | B 10 7 1 7 2.7e-7 17 94000 94000
 B 10 10 3 7 8.1e-7 9.2 31000 31000 | B 10 40 3 7 6.3e-5 6.5 350 350
 """
-
-
-def is_printed(value: float, printed: float) -> bool:
-    """Whether a value rounds to two printed digits (or to the one that is left of a zero)."""
-    unit = 10.0 ** (math.floor(math.log10(printed)) - 1)
-    return abs(value - printed) <= 0.5001 * unit
 
 
 def rows(table: str) -> list[list[str]]:
