@@ -31,6 +31,9 @@ SNRS = (1e2, 1e3, 1e4, 1e5, 1e6)
 C0, C1, C2 = 0.0769, -0.123, 0.0957
 # what is known beforehand: the order of magnitude
 DISTANCE = {"prior": "lognormal", "median": 5.0, "sigma": 0.7}
+# the ranges: a stroke of unknown centre and spread, before the background. Independent ranges under
+# a wide prior would be pushed as far as the readings allow, N nats an e-fold of their scale
+RANGES = {"prior": "stroke", "low": 0.05, "high": 3.0}
 STRENGTH = {"prior": "lognormal", "median": 0.01, "sigma": 1.5}
 
 
@@ -81,7 +84,7 @@ class Cell:
         background: dict[str, Any] = {"strength": STRENGTH, "distance_m": DISTANCE}
         if self.case == "A":
             background["shadow"] = "object"
-        return parse_scene({"background": background})
+        return parse_scene({"background": background, "range_m": RANGES})
 
     @property
     def made_of(self) -> Scene:
