@@ -1,0 +1,74 @@
+"""Statuses and reasons from draws."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from inference.identifiability.after_data import judge_draws
+from inference.identifiability.status import Identifiability
+from simulator.parameters import Parameters, parameters_of
+from simulator.scene import parse_scene
+from tests.posterior.scenes import UNKNOWN_CROSSTALK, sensor_of
+
+Array = NDArray[np.float64]
+SENSOR = sensor_of("pulsed")
+
+
+def parameters() -> Parameters:
+    return parameters_of(SENSOR, parse_scene({"crosstalk": UNKNOWN_CROSSTALK}))
+
+
+def judged(z: Array, log_r: Array) -> dict[str, Identifiability]:
+    rows = judge_draws(SENSOR, parameters(), z, z, log_r)
+    assert [row.parameter for row in rows] == [*parameters().names, "range_m"]
+    return {row.parameter: row for row in rows}
+
+
+def test_contraction_is_that_of_the_draws() -> None:
+    rng = np.random.default_rng(1)
+    spread = np.array([0.01, 0.1, 0.5, 0.9, 1.2])
+    z = spread * rng.standard_normal((4000, 5))
+    log_r = np.log(np.linspace(0.2, 2.0, 20)) + 0.1 * rng.standard_normal((4000, 1))
+    rows = judged(z, log_r)
+    expected = ["identified", "identified", "weak", "not_identified", "not_identified"]
+    for name, sd, status in zip(parameters().names, spread, expected, strict=True):
+        assert rows[name].status == status
+        # the sd of 4000 draws is known to 1.1 %: six of them
+        assert 1 - rows[name].contraction == pytest.approx(sd**2, rel=0.14)
+    assert rows["range_m"].status == "weak"
+    assert "known only to 10% of itself" in rows["range_m"].reason
+
+
+def test_more_spread_than_the_curvature_says() -> None:
+    """Two narrow groups of draws far apart: each tells c2, both together do not."""
+    rng = np.random.default_rng(2)
+    z = 1e-3 * rng.standard_normal((2000, 5))
+    z[::2, 2] += 2.0
+    log_r = np.log(np.linspace(0.2, 2.0, 20)) + 1e-3 * rng.standard_normal((2000, 20))
+    row = judged(z, log_r)["object.c2"]
+    assert row.status == "not_identified"
+    assert "there are several solutions, or one valley that bends" in row.reason
+
+
+@pytest.mark.parametrize("shared", [0.0, 0.3])
+def test_ranges_that_scatter_by_their_noise_alone_do_not_move(shared: float) -> None:
+    """Also where all of them are uncertain together."""
+    rng = np.random.default_rng(3)
+    truth = 0.01 * rng.standard_normal(30)  # what the noise of the readings makes of one range
+    log_r = truth + 0.01 * rng.standard_normal((1000, 30)) + shared * rng.standard_normal((1000, 1))
+    rows = judged(rng.standard_normal((1000, 5)), log_r)
+    assert "the object must move" in rows["object.c0"].reason
+    moving = log_r + np.linspace(0.0, 0.2, 30)
+    rows = judged(rng.standard_normal((1000, 5)), moving)
+    assert "the object must move" not in rows["object.c0"].reason
+
+
+def test_frames_without_object_and_nothing_unknown() -> None:
+    rng = np.random.default_rng(4)
+    log_r = np.full((100, 4), np.nan)
+    rows = judged(rng.standard_normal((100, 5)), log_r)
+    assert "no frame holds an object" in rows["range_m"].reason
+    known = parameters_of(SENSOR, parse_scene({"object": {"c0": 0.08, "c1": 0.0, "c2": 0.1}}))
+    z = np.empty((100, 0))
+    (row,) = judge_draws(SENSOR, known, z, z, 1e-3 * rng.standard_normal((100, 4)))
+    assert (row.parameter, row.status) == ("range_m", "identified")

@@ -1,0 +1,158 @@
+"""What is said of each unknown, and that the figures in it are computed."""
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from inference.identifiability.before_data import Foresight, identifiability
+from inference.identifiability.status import Identifiability, status_of
+from simulator.scene import parse_scene
+from tests.posterior.scenes import OBJECT, UNKNOWN_CROSSTALK, sensor_of
+
+BACKGROUND: dict[str, Any] = {
+    "strength": {"prior": "lognormal", "median": 0.0177, "sigma": 1.0},
+    "distance_m": {"prior": "lognormal", "median": 3.0, "sigma": 0.7},
+}
+STROKE = np.geomspace(0.2, 2.0, 40).tolist()
+
+
+def foresee(scene: dict[str, Any], ranges: list[float], gone: int = 0) -> Foresight:
+    present = [True] * len(ranges) + [False] * gone
+    sensor = sensor_of("pulsed", 1000.0)
+    return identifiability(sensor, parse_scene(scene), ranges + [1.0] * gone, present)
+
+
+def rows(found: Foresight) -> dict[str, Identifiability]:
+    return {row.parameter: row for row in found.identifiability}
+
+
+def test_limits_of_a_status() -> None:
+    assert [status_of("object.c0", s) for s in (0.1, 0.5, 0.9)] == [
+        "identified",
+        "weak",
+        "not_identified",
+    ]
+    assert [status_of("range_m", s) for s in (0.01, 0.1, 0.5)] == [
+        "identified",
+        "weak",
+        "not_identified",
+    ]
+    assert status_of("range_m", float("nan")) == "not_identified"
+
+
+def test_everything_identified() -> None:
+    found = foresee({"crosstalk": UNKNOWN_CROSSTALK}, np.geomspace(0.1, 2.0, 40).tolist())
+    assert {row.status for row in found.identifiability} == {"identified"}
+    assert (found.information.rank, found.needed, found.distinct) == (5, 5, 40)
+    for row in found.identifiability:
+        assert 0.96 < row.contraction <= 1
+
+
+def test_an_object_that_does_not_move_must_move() -> None:
+    found = foresee({}, [1.0] * 40)
+    assert (found.information.rank, found.distinct, found.needed) == (1, 1, 3)
+    for name in ("object.c1", "object.c2"):
+        reason = rows(found)[name].reason
+        assert "the object must move" in reason
+        assert "3 unknowns need at least 3 distinct ranges" in reason
+        assert re.search(r"an object that moves from 0.5 to 2 m would bring the bound", reason)
+    # the range itself needs no object
+    assert rows(found)["range_m"].status == "identified"
+
+
+def test_too_few_distinct_ranges() -> None:
+    found = foresee({}, [1.0, 2.0] * 20)
+    assert (
+        "seen at 2 distinct ranges, and 3 unknowns need at least 3"
+        in rows(found)["object.c1"].reason
+    )
+
+
+def test_frames_without_the_object_fix_the_background() -> None:
+    """The figure in the reason is that of the experiment with the frames added."""
+    scene = {"background": BACKGROUND}
+    still = foresee(scene, [1.0] * 40)
+    for name in ("background.strength", "background.distance_m"):
+        reason = rows(still)[name].reason
+        said = re.search(r"three frames without the object would [^;]* to ([\d.e-]+) %", reason)
+        assert said is not None, reason
+        with_them = foresee(scene, [1.0] * 40, gone=3)
+        assert rows(with_them)[name].status == "identified"
+        bound = 100 * with_them.information.sd[with_them.information.names.index(name)]
+        assert float(said.group(1)) == pytest.approx(bound, rel=0.06)
+
+
+def test_crosstalk_and_a_far_background_look_alike() -> None:
+    known = {"shadow": {"c0": 0.056, "c1": 0.01}}
+    scene = {
+        "object": OBJECT,
+        "crosstalk": UNKNOWN_CROSSTALK,
+        "background": BACKGROUND | known,
+    }
+    found = rows(foresee(scene, STROKE))
+    for name in ("crosstalk.w2", "background.distance_m"):
+        assert found[name].status != "identified"
+        assert "crosstalk and a far background look alike" in found[name].reason
+    assert "knowing the crosstalk would lower the bound" in found["background.distance_m"].reason
+    # without crosstalk they do not, and all is identified
+    alone = foresee({"object": OBJECT, "background": BACKGROUND | known}, STROKE)
+    assert {row.status for row in alone.identifiability} == {"identified"}
+
+
+def test_square_law() -> None:
+    """Far away the flux falls as r^-4 and tells c0 c2 alone; near by as r^-2, without c0 and c1."""
+    far = rows(foresee({}, np.geomspace(3.0, 10.0, 40).tolist()))
+    assert "falls as r^-4 and tells c0 c2 alone" in far["object.c1"].reason
+    assert "about sqrt(c0), from 0.16 to 1.3 m" in far["object.c1"].reason
+    large = {"object": {"c0": {"prior": "lognormal", "median": 1e4, "sigma": 1.0}}}
+    near = rows(foresee(large, np.geomspace(0.1, 1.0, 40).tolist()))
+    assert "falls as r^-2, whatever c0 and c1" in near["object.c0"].reason
+    assert near["object.c2"].status == "identified"
+
+
+def test_a_longer_stroke() -> None:
+    scene = {"crosstalk": UNKNOWN_CROSSTALK}
+    found = rows(foresee(scene, np.geomspace(0.3, 0.4, 40).tolist()))
+    reason = found["object.c1"].reason
+    said = re.search(r"moves from ([\d.]+) to ([\d.]+) m would lower [^;]* to ([\d.]+) %", reason)
+    assert said is not None, reason
+    low, high = float(said.group(1)), float(said.group(2))
+    longer = foresee(scene, np.geomspace(low, high, 40).tolist())
+    bound = 100 * longer.information.sd[longer.information.names.index("object.c1")]
+    # the ends of the stroke are said with two digits, the bound too
+    assert float(said.group(3)) == pytest.approx(bound, rel=0.3)
+
+
+def test_no_frame_holds_an_object() -> None:
+    scene = {"crosstalk": UNKNOWN_CROSSTALK, "background": BACKGROUND}
+    found = foresee(scene, [], gone=4)
+    assert (found.information.rank, found.distinct) == (2, 0)
+    by_name = rows(found)
+    for name in ("object.c0", "background.shadow.c1", "range_m"):
+        assert by_name[name].status == "not_identified"
+        assert by_name[name].contraction == pytest.approx(0.0, abs=1e-9)
+        assert "no frame holds an object" in by_name[name].reason
+    together = by_name["background.strength"].reason
+    assert "the readings stay the same when it and crosstalk.w1, crosstalk.w2" in together
+
+
+def test_noise_is_the_reason_where_nothing_else_is() -> None:
+    sensor = sensor_of("pulsed", 3.0)
+    found = identifiability(sensor, parse_scene({"object": OBJECT}), [1.5] * 3)
+    (row,) = found.identifiability
+    assert row.parameter == "range_m"
+    assert row.status != "identified"
+    said = re.search(r"noise ([\d.]+) times lower would tell it to 10 %", row.reason)
+    assert said is not None
+    assert float(said.group(1)) == pytest.approx(10 * found.information.scale_sd, rel=0.06)
+
+
+def test_reference_values_are_those_given() -> None:
+    scene = {"background": BACKGROUND}
+    at = {"object.c0": 0.07, "background.shadow.c0": 0.05, "background.distance_m": 4.0}
+    sensor = sensor_of("pulsed")
+    found = identifiability(sensor, parse_scene(scene), STROKE, at=at)
+    assert {name: found.reference[name] for name in at} == pytest.approx(at)
+    assert found.reference["background.strength"] == pytest.approx(0.0177)  # the prior's median
