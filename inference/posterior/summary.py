@@ -16,11 +16,13 @@ from inference.posterior.posterior import (
     Runtime,
 )
 from inference.posterior.predictive_check import predictive_check
+from inference.posterior.prior_conflict import prior_conflicts
 from inference.posterior.range_summary import range_summary
 from inference.posterior.ranges import draw_ranges
 from inference.posterior.sample import Sample, sample_of
 from inference.posterior.selecting import sampled
 from inference.posterior.selection import Selection, selection_summary
+from inference.posterior.verdict import Verdict
 from simulator.scene import Scene
 
 __all__ = ["summarise"]
@@ -87,9 +89,11 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
     if sample.weighted is not None:
         k_hat = sample.weighted.k_hat
     elif sample.chains is not None:
-        verdict, k_hat = cross_check(verdict, job, checkpoint, z, checkpoint.ess or 1.0)
+        verdict, k_hat = cross_check(verdict, job, checkpoint, sample.chains)
     chosen = z[np.linspace(0, len(z) - 1, min(_RANGE_DRAWS, len(z))).astype(int)]
     drawn = draw_ranges(density, chosen, rng)
+    conflicts = prior_conflicts(density, z, drawn)
+    verdict = Verdict(verdict.converged and not conflicts, (*verdict.reasons, *conflicts))
     fit = predictive_check(density, chosen, drawn, rng)
     ranges = np.full((len(chosen), len(job.frames)), np.nan)
     ranges[:, job.usable] = np.exp(drawn)

@@ -1,6 +1,12 @@
-"""The verdict on a run: a list of gates, the first failure named first."""
+"""The verdict on a run: a list of gates, the first failure named first.
+
+These gates look at the draws alone. Those that ask the density itself (another branch, another way
+to the same means, a prior that ends too early) are in `cross_check` and `prior_conflict`; how often
+each alarms falsely, and what it catches, is measured by `benchmarks/verdict_gates.py`.
+"""
 
 import dataclasses
+import hashlib
 import math
 from collections.abc import Callable, Iterator
 
@@ -23,6 +29,7 @@ MAX_R_HAT = 1.01
 _TAUS = 50.0  # steps of each ensemble, in autocorrelation times
 _LEAST_ACCEPTANCE = 0.05
 _BURN_IN = 0.2  # share of the steps left out
+_STANDSTILL = 0.25  # of the kept steps that a walker may spend in one place
 _TRANSITIONS = 20  # between modes, over all walkers
 _DISAGREEMENT = 1e-5  # false-alarm rate of the comparison of the ensembles' means
 
@@ -59,6 +66,8 @@ class Chains:
         Share of accepted proposals.
     names : tuple of str
         Names of the parameters.
+    streams : tuple of bytes
+        Digest of where each ensemble's random stream stands; empty where that is not known.
     """
 
     z: Array
@@ -66,6 +75,7 @@ class Chains:
     mode: NDArray[np.intp]
     acceptance: Array
     names: tuple[str, ...]
+    streams: tuple[bytes, ...] = ()
 
     def quantities(self) -> Iterator[tuple[str, Array]]:
         """Yield every parameter, the log density and, with several modes, their indicators."""
@@ -88,30 +98,59 @@ def chains_of(
     log_density = np.array([e.chain_log_prob[skip:].T for e in ensembles])
     mode = nearest(z.reshape(-1, z.shape[-1])).reshape(z.shape[:-1])
     acceptance = np.array([e.accepted / max(e.steps, 1) for e in ensembles])
-    return Chains(z, log_density, mode, acceptance, names)
+    return Chains(z, log_density, mode, acceptance, names, tuple(map(_digest, ensembles)))
+
+
+def _digest(ensemble: Ensemble) -> bytes:
+    key, *rest = ensemble.random
+    return hashlib.sha256(key.tobytes() + repr(rest).encode()).digest()
+
+
+def _moved(chains: Chains) -> NDArray[np.bool_]:
+    """Return whether each walker moved at each step but the first."""
+    moved: NDArray[np.bool_] = np.any(np.diff(chains.z, axis=2) != 0, axis=-1)
+    return moved
 
 
 def _shared_streams(chains: Chains) -> str | None:
+    """Find ensembles that draw the same random numbers, or that landed in the same place.
+
+    Two independent ensembles never move a walker to the very same point. Common starting points
+    are no finding: only a step that at least one of the two walkers made counts.
+    """
+    moved = _moved(chains)
     for a in range(chains.z.shape[0]):
         for b in range(a):
-            if np.any(np.all(chains.z[a] == chains.z[b], axis=(0, 2))):
-                return f"ensembles {b + 1} and {a + 1} made the same step: they share a stream"
+            same = chains.z[a, :, 1:, 0] == chains.z[b, :, 1:, 0]
+            same &= moved[a] | moved[b]
+            met = same.any() and bool(
+                np.all(chains.z[a, :, 1:][same] == chains.z[b, :, 1:][same], axis=-1).any()
+            )
+            if met or (chains.streams and chains.streams[a] == chains.streams[b]):
+                return f"ensembles {b + 1} and {a + 1} share a stream of random numbers"
     return None
 
 
 def _start(chains: Chains) -> str | None:
-    if not np.isfinite(chains.log_density).all():
+    if not (np.isfinite(chains.log_density).all() and np.isfinite(chains.z).all()):
         return "walkers stand where the density is zero"
     return None
 
 
 def _acceptance(chains: Chains) -> str | None:
-    stuck = np.ptp(chains.z, axis=2).max(axis=-1) == 0
+    moved = _moved(chains)
+    steps = moved.shape[2]
+    stuck = ~moved.any(axis=2)
     if stuck.any():
         return f"{int(stuck.sum())} walkers never moved after the burn-in"
     worst = float(chains.acceptance.mean(axis=1).min())
     if worst < _LEAST_ACCEPTANCE:
         return f"an ensemble accepted only {worst:.1%} of its proposals"
+    index = np.arange(steps)
+    last = np.maximum.accumulate(np.where(moved, index, -1), axis=2)
+    longest = int((index - last).max())
+    if longest > _STANDSTILL * steps:
+        return f"a walker stood still for {longest} of {steps} steps"
     return None
 
 
@@ -165,6 +204,24 @@ def _means(chains: Chains) -> str | None:
     return None
 
 
+def _precision(chains: Chains, target_ess: int) -> str | None:
+    """Hold the Monte Carlo errors of the means to what was asked for."""
+    least, name = math.inf, ""
+    for quantity, draws in zip(chains.names, np.moveaxis(chains.z, -1, 0), strict=True):
+        ess = effective_sample_size(draws)
+        if not ess >= least:  # a constant has none
+            least, name = ess, quantity
+    if math.isnan(least):
+        return f"{name} does not move, so that its mean has no Monte Carlo error"
+    if least < target_ess:
+        return (
+            f"the mean of {name} has a Monte Carlo error of {1 / math.sqrt(least):.2g} standard "
+            f"deviations, {1 / math.sqrt(target_ess):.2g} was asked for: its effective sample size "
+            f"is {least:.0f}, below {target_ess}"
+        )
+    return None
+
+
 def _transitions(chains: Chains) -> str | None:
     if chains.mode.max() == 0:
         return None
@@ -177,9 +234,6 @@ def _transitions(chains: Chains) -> str | None:
                 f"walkers entered mode {k + 1} only {entries} times: its weight is not determined"
             )
     return None
-
-
-_GATES = (_shared_streams, _acceptance, _length, _agreement, _means, _transitions)
 
 
 def judge(chains: Chains, target_ess: int) -> Verdict:
@@ -199,13 +253,16 @@ def judge(chains: Chains, target_ess: int) -> Verdict:
     """
     if chains.z.shape[2] < 4:
         return Verdict(False, ("too few steps were made to judge them",))
-    outside = _start(chains)
-    if outside is not None:
-        return Verdict(False, (outside,))  # nothing can be computed from infinities
-    reasons = [reason for gate in _GATES if (reason := gate(chains)) is not None]
-    for name, draws in zip(chains.names, np.moveaxis(chains.z, -1, 0), strict=True):
-        ess = effective_sample_size(draws)
-        if not ess >= target_ess:
-            reasons.append(f"the effective sample size of {name} is {ess:.0f}, below {target_ess}")
-            break
-    return Verdict(not reasons, tuple(reasons))
+    first = [reason for gate in (_shared_streams, _start) if (reason := gate(chains)) is not None]
+    if _start(chains) is not None:
+        return Verdict(False, tuple(first))  # nothing can be computed from infinities
+    findings = (
+        _acceptance(chains),
+        _length(chains),
+        _agreement(chains),
+        _means(chains),
+        _precision(chains, target_ess),
+        _transitions(chains),
+    )
+    reasons = (*first, *(reason for reason in findings if reason is not None))
+    return Verdict(not reasons, reasons)
