@@ -27,7 +27,8 @@ _CHECK_DRAWS = 2000
 _LEAST_ESS = 100  # of the importance draws that are compared
 _FALSE_BRANCH = 10.0  # nats from an optimum down to the best draw
 _STANDARD_ERRORS = 6.0
-_EVALUATIONS = 160_000  # of one frame, for the lattice
+_INNER = (0.001, 0.999)  # quantiles of the draws that the lattice starts from; it grows
+_EVALUATIONS = 600_000  # of one frame, for the lattice
 _FRAME_DRAWS = 20_000
 _THINNEST = 1e-10  # extent of the draws along their last axis, by that along their first
 _NEGLIGIBLE = 15.0  # nats below the best draw
@@ -136,10 +137,8 @@ def moments_disagree(
     estimates: list[tuple[str, Moments]] = []
     if white.shape[-1] <= MOST_DIMENSIONS:
         around = frame.white(_surroundings(density, chains, optima))
-        low, high = (
-            np.minimum(white.min(axis=(0, 1, 2)), around.min(axis=0)),
-            np.maximum(white.max(axis=(0, 1, 2)), around.max(axis=0)),
-        )
+        low, high = np.quantile(white.reshape(-1, white.shape[-1]), _INNER, axis=0)
+        low, high = np.minimum(low, around.min(axis=0)), np.maximum(high, around.max(axis=0))
         exact = lattice_moments(lambda y: density(frame.natural(y)), low, high, points)
         if exact is not None:
             estimates.append(("quadrature", exact))

@@ -14,6 +14,7 @@ Three findings, none of which depends on how the walkers moved.
 
 import dataclasses
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from inference.posterior.profile import best_ranges, linearise
 from simulator.priors import LogUniform
 from simulator.scene import Stroke
 
-__all__ = ["prior_conflicts", "scores"]
+__all__ = ["parameter_conflicts", "prior_conflicts", "range_conflicts", "scores"]
 
 Array = NDArray[np.float64]
 
@@ -54,8 +55,13 @@ def prior_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
         The reasons; empty as a rule. The truth being one of the prior, each unknown is named in at
         most 2.2e-5 + 6e-7 of runs, and each frame in 3e-7.
     """
-    chosen = z[np.linspace(0, len(z) - 1, min(_DRAWS, len(z))).astype(int)]
-    return (*_parameters(density, z, chosen), *_ranges(density, log_r, chosen))
+    names = density.parameters.names
+
+    def linearised(x: Array) -> tuple[Array, Array]:
+        line = linearise(density, x, best_ranges(density, x[None])[0, :, 0])
+        return line.residual.ravel(), line.jacobian.reshape(-1, len(names))
+
+    return (*parameter_conflicts(names, z, linearised), *range_conflicts(density, z, log_r))
 
 
 def scores(jacobian: Array, residual: Array, z: Array) -> Array:
@@ -95,23 +101,36 @@ def scores(jacobian: Array, residual: Array, z: Array) -> Array:
     return result
 
 
-def _parameters(density: CollapsedDensity, z: Array, chosen: Array) -> list[str]:
-    names = density.parameters.names
+def parameter_conflicts(
+    names: tuple[str, ...], z: Array, linearised: Callable[[Array], tuple[Array, Array]]
+) -> tuple[str, ...]:
+    """Find unknowns whose posterior piles up where their prior fades or ends.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Names of the unknowns.
+    z : ndarray, shape (n, d)
+        Draws of equal weight.
+    linearised : callable
+        (d,) -> whitened residuals (k,) and their Jacobian (k, d).
+
+    Returns
+    -------
+    tuple of str
+        The reasons.
+    """
     reasons = []
     middle = np.median(z, axis=0)  # beyond a point where more than half of the draws are
-    outer = -float(special.ndtri(_OUTER))
-    near = np.abs(middle) > outer
+    near = np.abs(middle) > -float(special.ndtri(_OUTER))
     pulls = np.zeros(len(names))
     if near.any():
-        positions = best_ranges(density, chosen)[:, :, 0]
-        lines = [linearise(density, x, r) for x, r in zip(chosen, positions, strict=True)]
-        pulls = np.median(
-            [
-                scores(line.jacobian.reshape(-1, len(names)), line.residual.ravel(), x)
-                for line, x in zip(lines, chosen, strict=True)
-            ],
-            axis=0,
-        )
+        chosen = _few(z)
+        found = []
+        for x in chosen:
+            residual, jacobian = linearised(x)
+            found.append(scores(jacobian, residual, x))
+        pulls = np.median(found, axis=0)
     for j, name in enumerate(names):
         side = "upper" if middle[j] > 0 else "lower"
         if abs(middle[j]) > _TAIL:
@@ -124,11 +143,30 @@ def _parameters(density: CollapsedDensity, z: Array, chosen: Array) -> list[str]
                 f"{name} piles up at the {side} end of its prior, and the data pull it beyond by "
                 f"{pulls[j]:.0f} standard errors: widen its prior"
             )
-    return reasons
+    return tuple(reasons)
 
 
-def _ranges(density: CollapsedDensity, log_r: Array, chosen: Array) -> list[str]:
-    """Name the ends of the ranges' prior at which frames pile up."""
+def _few(z: Array) -> Array:
+    return np.asarray(z[np.linspace(0, len(z) - 1, min(_DRAWS, len(z))).astype(int)])
+
+
+def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[str, ...]:
+    """Name the ends of the ranges' prior at which frames pile up.
+
+    Parameters
+    ----------
+    density : CollapsedDensity
+        The density.
+    z : ndarray, shape (n, d)
+        Draws of equal weight.
+    log_r : ndarray, shape (m, frames)
+        Draws of the ranges; nan for a frame without object.
+
+    Returns
+    -------
+    tuple of str
+        The reasons.
+    """
     law = density.parameters.range_prior
     distribution = (
         LogUniform(low=law.low, high=law.high).distribution() if isinstance(law, Stroke) else law
@@ -138,7 +176,7 @@ def _ranges(density: CollapsedDensity, log_r: Array, chosen: Array) -> list[str]
     ends = distribution.from_normal(special.ndtri([_OUTER, 1 - _OUTER]))
     near = [middle < ends[0], middle > ends[1]]
     if not (near[0].any() or near[1].any()):
-        return []
+        return ()
     farthest = density.r0 if density.wave is None else 2 * math.pi / density.wave[0]
     high = max(min(_BEYOND * float(ends[1]), farthest), distribution.high)
     wide = dataclasses.replace(
@@ -148,6 +186,7 @@ def _ranges(density: CollapsedDensity, log_r: Array, chosen: Array) -> list[str]
             range_prior=LogUniform(low=float(ends[0]) / _BEYOND, high=high).distribution(),
         ),
     )
+    chosen = _few(z)
     gain = np.median(_best_fit(wide, chosen) - _best_fit(density, chosen), axis=0)
     reasons = []
     for here, side in zip(near, ("lower", "upper"), strict=True):
@@ -157,7 +196,7 @@ def _ranges(density: CollapsedDensity, log_r: Array, chosen: Array) -> list[str]
                 f"the ranges of {count} frames pile up at the {side} end of range_m, beyond which "
                 "they would fit far better: widen range_m"
             )
-    return reasons
+    return tuple(reasons)
 
 
 def _best_fit(density: CollapsedDensity, z: Array) -> Array:

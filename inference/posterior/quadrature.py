@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 MOST_DIMENSIONS = 3
 _SPACINGS = (1.0, 0.5, 0.25, 0.125)  # in standard deviations
 _MARGIN = 1.5  # standard deviations around what the box must hold
-_MOST_AT_EDGE = 1e-5  # share of the mass on the faces of the box
-_EXTENSIONS = 3
+_MOST_AT_EDGE = 1e-4  # share of the mass on a face of the box
+_EXTENSIONS = 4
 _MOST_ERROR = 0.02  # of first and second moments, in standard deviations
 
 
@@ -73,16 +73,14 @@ def lattice_moments(
             return None
         axes = [low[j] + spacing * np.arange(counts[j]) for j in range(low.size)]
         lattice = np.array(list(itertools.product(*axes)))
-        edge = np.zeros(len(lattice), dtype=bool)
-        for j, axis in enumerate(axes):
-            edge |= (lattice[:, j] == axis[0]) | (lattice[:, j] == axis[-1])
         values = log_density(np.concatenate([lattice, lattice + 0.5 * spacing])).reshape(2, -1)
         if not np.isfinite(values.max()):
             return None
         mass = np.exp(values - values.max())
-        if (mass[:, edge].sum() > _MOST_AT_EDGE * mass.sum()) and extensions < _EXTENSIONS:
-            reach = 0.25 * (high - low)
-            low, high, extensions = low - reach, high + reach, extensions + 1
+        edges = _edge_mass(mass.sum(axis=0).reshape(counts)) / mass.sum()
+        if edges.max() > _MOST_AT_EDGE and extensions < _EXTENSIONS:
+            reach = np.where(edges > _MOST_AT_EDGE, 0.25 * (high - low), 0.0)
+            low, high, extensions = low - reach[0], high + reach[1], extensions + 1
             continue
         weights = mass / np.maximum(mass.sum(axis=1), 1e-300)[:, None]
         points = np.array([lattice, lattice + 0.5 * spacing])
@@ -91,10 +89,16 @@ def lattice_moments(
         errors = 0.5 * np.abs(np.diff(first, axis=0)[0]), 0.5 * np.abs(np.diff(second, axis=0)[0])
         share = mass[0].sum() / mass.sum() - 0.5  # the two lattices' integrals must agree as well
         if max(errors[0].max(), errors[1].max(), abs(share)) < _MOST_ERROR:
-            if mass[:, edge].sum() > 100 * _MOST_AT_EDGE * mass.sum():
+            if edges.max() > 10 * _MOST_AT_EDGE:
                 return None
             return Moments(first.mean(axis=0), second.mean(axis=0), *errors)
         finer = next(spacings, None)
         if finer is None:
             return None
         spacing = finer
+
+
+def _edge_mass(mass: Array) -> Array:
+    """Mass on the lower and upper face of every axis, shape (2, d)."""
+    sides = [[np.take(mass, i, axis=j).sum() for j in range(mass.ndim)] for i in (0, -1)]
+    return np.array(sides)

@@ -28,7 +28,7 @@ def with_z(chains: Chains, z: np.ndarray) -> Chains:
     return dataclasses.replace(chains, z=z)
 
 
-@pytest.mark.parametrize("runs", [40, pytest.param(600, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [40, pytest.param(200, marks=pytest.mark.slow)])
 def test_false_alarms_are_rare(runs: int) -> None:
     """Healthy runs of 100 autocorrelation times, allowed to fail at a rate of 1e-3.
 
