@@ -14,9 +14,6 @@ ALL_TECHNIQUES: Mapping[str, Technique] = MappingProxyType({**TECHNIQUES, **MULT
 # names of the contract that are not answered at once, and why they are left out
 ELSEWHERE: Mapping[str, str] = MappingProxyType(
     {
-        "object_fit": "is not built yet: joint_fit fits the object too",
-        "crosstalk_fit": "is not built yet: joint_fit fits crosstalk too",
-        "shadow_fit": "is not built yet: joint_fit fits the shadow too",
         "posterior": "is sampled, not solved in real time: ask for a posterior",
     }
 )

@@ -102,9 +102,10 @@ class FrameEstimate(pydantic.BaseModel):
 class FittedParameter(pydantic.BaseModel):
     """An unknown that a technique of many frames found; sd is the Cramer-Rao bound."""
 
-    value: float
+    value: float | None
     sd: float | None
     status: Literal["identified", "weak", "not_identified"]
+    reason: str | None = None
 
 
 class FittedOptimum(pydantic.BaseModel):

@@ -84,20 +84,27 @@ def describe(problem: FitProblem, x: Array, facts: Information) -> dict[str, Any
     return found
 
 
+def _still(problem: FitProblem) -> bool:
+    """Tell whether all frames with an object read the same but for noise."""
+    shown = problem.frames[problem.present]
+    if np.ptp(shown[:, 2]) > 0:
+        return False
+    read, shot, relative = np.asarray(problem.instrument[2]), *problem.instrument[3:]
+    middle = shown[:, :2].mean(axis=0)
+    variance = read**2 + (shot or 0.0) * np.abs(middle) + ((relative or 0.0) * middle) ** 2
+    spread = float((((shown[:, :2] - middle) ** 2) / variance).sum())
+    return bool(spread < special.chdtri(2 * max(len(shown) - 1, 1), _FALSE_ALARM))
+
+
 def _refuse_if_open(problem: FitProblem, top: Optimum, facts: Information) -> None:
     """Refuse what the frames do not determine."""
     present = problem.present & np.isfinite(top.positions)
-    u, own = top.positions[present], facts.own_variance[present]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        weight = 1.0 / own
-        still = u.size > 0 and float(
-            np.nansum(weight * (u - np.nansum(weight * u) / np.nansum(weight)) ** 2)
-        ) < special.chdtri(max(u.size - 1, 1), _FALSE_ALARM)
+    still = _still(problem)
     if facts.rank < len(problem):
         weights = np.abs(facts.null_space).max(axis=1)
         names = [name for name, w in zip(problem.names, weights, strict=True) if w > 0.05]
         cause = (
-            "the object does not move by more than the noise of its range"
+            "the object does not move: all frames read the same but for noise"
             if still
             else "the frames do not tell them apart"
         )
@@ -115,7 +122,7 @@ def _refuse_if_open(problem: FitProblem, top: Optimum, facts: Information) -> No
             if item["status"] != "identified"
         ]
         cause = (
-            "the object does not move by more than the noise of its range"
+            "the object does not move: all frames read the same but for noise"
             if still
             else (f"{_words(open_ones or list(problem.names))} are too uncertain")
         )

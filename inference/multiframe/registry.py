@@ -3,11 +3,14 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from inference.multiframe.crosstalk_fit import CROSSTALK_FIT
 from inference.multiframe.joint_fit import (
     ITERATIVE_BACKGROUND_CANCELLING,
     ITERATIVE_DIFFERENTIAL,
     JOINT_FIT,
 )
+from inference.multiframe.object_fit import OBJECT_FIT
+from inference.multiframe.shadow_fit import SHADOW_FIT
 from inference.realtime.technique import Technique
 
 __all__ = ["MULTIFRAME"]
@@ -15,6 +18,13 @@ __all__ = ["MULTIFRAME"]
 MULTIFRAME: Mapping[str, Technique] = MappingProxyType(
     {
         technique.name: technique
-        for technique in (JOINT_FIT, ITERATIVE_DIFFERENTIAL, ITERATIVE_BACKGROUND_CANCELLING)
+        for technique in (
+            OBJECT_FIT,
+            CROSSTALK_FIT,
+            SHADOW_FIT,
+            JOINT_FIT,
+            ITERATIVE_DIFFERENTIAL,
+            ITERATIVE_BACKGROUND_CANCELLING,
+        )
     }
 )

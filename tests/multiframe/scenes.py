@@ -22,8 +22,8 @@ KINDS: dict[str, dict[str, Any]] = {
     "pulsed": {"kind": "pulsed", "pulse_width_s": 1e-7},
     "sine_wave": {"kind": "sine_wave", "frequency_hz": 5e6},
 }
-VAGUE = {"prior": "normal", "mean": 0.0, "sd": 0.05}
-WALL = {"strength": 0.0177, "distance_m": 3.0, "shadow": {"c0": 0.056, "c1": 0.013}}
+VAGUE: dict[str, Any] = {"prior": "normal", "mean": 0.0, "sd": 0.05}
+WALL: dict[str, Any] = {"strength": 0.0177, "distance_m": 3.0, "shadow": {"c0": 0.056, "c1": 0.013}}
 THESIS = {"c0": 0.1, "c1": 10.0, "c2": 0.1}
 
 

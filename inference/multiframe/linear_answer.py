@@ -1,0 +1,112 @@
+"""From a linear fit to a result: parameters, fit report, ranges that all frames agree upon."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from inference.estimates import TechniqueResult
+from inference.multiframe.problem import fit_problem
+from inference.multiframe.ranges import Answer, frame_ranges
+from inference.multiframe.weighted import LinearFit
+from inference.realtime.net import SATURATED, rule_out
+from inference.realtime.technique import Task
+
+__all__ = ["linear_answer", "not_identified"]
+
+Array = NDArray[np.float64]
+
+_IDENTIFIED, _WEAK = 0.1, 1.0
+_FALSE_ALARM = 1e-3
+
+
+def not_identified(reason: str) -> dict[str, Any]:
+    """Return the entry of a parameter of which the frames say nothing."""
+    return {"value": None, "sd": None, "status": "not_identified", "reason": reason}
+
+
+def _entry(value: float, sd: float, size: float) -> dict[str, Any]:
+    relative = sd / size if size > 0 else math.inf
+    status = "identified" if relative < _IDENTIFIED else "weak"
+    return {
+        "value": float(value),
+        "sd": sd if math.isfinite(sd) else None,
+        "status": status if relative < _WEAK else "not_identified",
+    }
+
+
+def linear_answer(
+    name: str,
+    task: Task,
+    fit: LinearFit,
+    natural: dict[str, tuple[float, Array, float]],
+    single: TechniqueResult,
+    missing: dict[str, str],
+) -> TechniqueResult:
+    """Build the result of a linear technique.
+
+    Parameters
+    ----------
+    name : str
+        The technique.
+    task : Task
+        The request.
+    fit : LinearFit
+        The fit.
+    natural : dict
+        By scene path: value, gradient along the fit's coordinates, and the size against which
+        its standard deviation is judged.
+    single : TechniqueResult
+        Ranges of single frames; they stand where a parameter is not identified.
+    missing : dict
+        Scene paths that are not identified, with the reason.
+
+    Returns
+    -------
+    TechniqueResult
+        Ranges by all readings and parameters together where every parameter is identified.
+    """
+    parameters: dict[str, Any] = {
+        path: _entry(value, float(np.linalg.norm(gradient @ fit.factor)), size)
+        for path, (value, gradient, size) in natural.items()
+    }
+    parameters |= {path: not_identified(reason) for path, reason in missing.items()}
+    freedom = fit.residuals.size - fit.x.size
+    p_value = float(special.chdtrc(freedom, fit.chi_square))
+    report = {
+        "chi_square": fit.chi_square,
+        "degrees_of_freedom": freedom,
+        "p_value": p_value,
+        "misfit": p_value < _FALSE_ALARM,
+        "rank": fit.rank,
+        "optima": [],
+    }
+    if missing:
+        return TechniqueResult(
+            technique=name,
+            status=single.status,
+            roots_m=single.roots_m,
+            roots_sd_m=single.roots_sd_m,
+            root_count=single.root_count,
+            near_fold=single.near_fold,
+            reason=single.reason,
+            reasons=single.reasons,
+            parameters=parameters,
+            fit=report,
+        )
+    report["optima"] = [
+        {
+            "excess_deviance": 0.0,
+            "parameters": {path: float(value) for path, (value, _, _) in natural.items()},
+        }
+    ]
+    state = rule_out(task.sensor, task.frames)
+    problem = fit_problem(task.sensor, task.scene, task.frames.select(state != SATURATED))
+    values = np.array([natural[path][0] for path in problem.names])
+    gradients = np.array([natural[path][1] for path in problem.names])
+    x = problem.coordinates(values[None])[0]
+    along = problem.chain(x)[problem.slots] * problem.units[:, None]
+    factor = np.asarray(np.linalg.solve(along, gradients @ fit.factor), dtype=np.float64)
+    return frame_ranges(name, problem, [Answer(x, 0.0, factor)], state, parameters, report)

@@ -1,0 +1,190 @@
+"""`object_fit`, `crosstalk_fit`, `shadow_fit`: against the joint fit, scatter and square laws."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import special
+
+from inference.estimate import estimate
+from inference.estimates import Status, TechniqueResult
+from simulator.frames import Frames
+from simulator.parameters import parameters_of
+from simulator.scene import parse_scene
+from simulator.sensor import Sensor, parse_sensor
+from simulator.simulate import mean_readings
+from tests.multiframe.scenes import KINDS, OBJECT, VAGUE, WALL, data, path, sensor_of, values_of
+
+Array = NDArray[np.float64]
+PRIOR = {"prior": "lognormal", "median": 0.02, "sigma": 1.0}
+
+
+def served(
+    sensor: Sensor, scene: dict[str, Any], frames: Frames, names: list[str]
+) -> list[TechniqueResult]:
+    found = estimate(sensor, parse_scene(scene), frames, names)
+    assert [r.technique for r in found.results] == names, found.left_out
+    return list(found.results)
+
+
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+@pytest.mark.parametrize(
+    ("name", "scene"),
+    [
+        ("object_fit", {}),
+        ("object_fit", {"object": {"c2": OBJECT["c2"]}}),
+        ("object_fit", {"object": {"c0": OBJECT["c0"]}}),
+        ("object_fit", {"object": {"c1": OBJECT["c1"]}}),
+        ("object_fit", {"object": {"c0": OBJECT["c0"], "c1": OBJECT["c1"]}}),
+        ("object_fit", {"object": {"c0": OBJECT["c0"], "c2": OBJECT["c2"]}}),
+        ("object_fit", {"object": {"c1": OBJECT["c1"], "c2": OBJECT["c2"]}}),
+        ("object_fit", {"background": WALL}),
+        ("shadow_fit", {"object": OBJECT, "background": {**WALL, "shadow": {}}}),
+        ("shadow_fit", {"object": OBJECT, "background": {**WALL, "shadow": {"c0": 0.056}}}),
+        ("shadow_fit", {"object": OBJECT, "background": {**WALL, "shadow": {"c1": 0.013}}}),
+        ("shadow_fit", {"object": OBJECT, "background": {**WALL, "strength": PRIOR}}),
+    ],
+)
+def test_a_linear_fit_is_the_joint_fit_to_first_order(
+    kind: str, name: str, scene: dict[str, Any]
+) -> None:
+    """Both are efficient: at this noise they differ by far less than a standard deviation."""
+    sensor = sensor_of(kind, 1e5)
+    truth: dict[str, Any] = {"object": OBJECT}
+    if "background" in scene:
+        truth["background"] = WALL
+    frames = data(sensor, truth, path(16))
+    linear, joint = served(sensor, scene, frames, [name, "joint_fit"])
+    assert linear.parameters is not None
+    assert joint.parameters is not None
+    assert linear.parameters.keys() == joint.parameters.keys()
+    known = values_of(sensor, truth)
+    for key, item in linear.parameters.items():
+        other = joint.parameters[key]
+        assert item["value"] == pytest.approx(other["value"], abs=0.1 * other["sd"])
+        assert item["sd"] == pytest.approx(other["sd"], rel=0.02)
+        assert item["status"] == "identified"
+        # 40 comparisons at 6 standard deviations: false alarm 1e-7
+        assert abs(item["value"] - known[key]) < 6 * item["sd"]
+    np.testing.assert_allclose(linear.roots_sd_m, joint.roots_sd_m, rtol=0.05)
+    assert linear.fit is not None
+    freedom = 16 - len(linear.parameters)
+    assert linear.fit["degrees_of_freedom"] == freedom
+    low, high = special.chdtri(freedom, 1 - 1e-6), special.chdtri(freedom, 1e-6)
+    assert low < linear.fit["chi_square"] < high
+
+
+@pytest.mark.parametrize("noise", [{}, {"shot": 1e-9, "relative": 1e-3}])
+def test_object_fit_attains_its_stated_scatter(noise: dict[str, float]) -> None:
+    """(x - truth)^T C^-1 (x - truth) over 200 sets, of each parameter alone; false alarm 1e-5."""
+    sensor = sensor_of("pulsed", 3e3, **noise)
+    truth = {"object": OBJECT}
+    sets = 200
+    total = dict.fromkeys(("object.c0", "object.c1", "object.c2"), 0.0)
+    chi_square = 0.0
+    for seed in range(sets):
+        frames = data(sensor, truth, path(10), seed)
+        (result,) = served(sensor, {}, frames, ["object_fit"])
+        assert result.parameters is not None
+        assert result.fit is not None
+        for key, value in values_of(sensor, truth).items():
+            item = result.parameters[key]
+            total[key] += ((item["value"] - value) / item["sd"]) ** 2
+        chi_square += result.fit["chi_square"]
+    low, high = special.chdtri(sets, 1 - 1e-5), special.chdtri(sets, 1e-5)
+    for value in total.values():
+        assert 0.98 * low < value < 1.02 * high
+    low, high = special.chdtri(7 * sets, 1 - 1e-5), special.chdtri(7 * sets, 1e-5)
+    assert 0.98 * low < chi_square < 1.02 * high
+
+
+def test_a_square_law_has_no_size() -> None:
+    """App. B holds plates with c0 = 1e12: c0 and c1 are said to be unidentifiable, c2 is told."""
+    sensor = sensor_of("pulsed", 1e4)
+    frames = data(sensor, {"object": {"c0": 1e8, "c1": 0.0, "c2": 0.1}}, path(20))
+    (result,) = served(sensor, {}, frames, ["object_fit"])
+    assert result.parameters is not None
+    for key in ("object.c0", "object.c1"):
+        assert result.parameters[key]["status"] == "not_identified"
+        assert result.parameters[key]["value"] is None
+        assert "square law" in result.parameters[key]["reason"]
+    item = result.parameters["object.c2"]
+    assert abs(item["value"] - 0.1) < 6 * item["sd"]  # false alarm 2e-9
+    assert item["sd"] < 1e-4
+    assert (result.status == Status.UNIQUE).all()
+
+
+def with_derivatives(
+    sensor: Sensor, truth: dict[str, Any], frames: Frames, ranges: Array, rng: np.random.Generator
+) -> Frames:
+    """Add derivative columns of an object that moves by 1 m/s."""
+    terms = parameters_of(sensor, parse_scene(truth)).terms(np.empty((1, 0)))
+    h = 1e-6
+    ends = [mean_readings(sensor, terms, ranges * (1 + sign * h)) for sign in (1, -1)]
+    slopes = (ends[0] - ends[1]) / (2 * h * ranges[:, None])
+    assert sensor.noise.derivative is not None
+    noise = np.asarray(sensor.noise.derivative) * rng.standard_normal(slopes.shape)
+    return dataclasses.replace(frames, derivatives=slopes + noise)
+
+
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+@pytest.mark.parametrize("known", [("c0", "c1"), ("c0", "c1", "c2")])
+def test_crosstalk_fit_attains_its_stated_scatter(kind: str, known: tuple[str, ...]) -> None:
+    """100 sets, each parameter alone and the fits' own chi-square; false alarm 1e-5 each."""
+    plain = sensor_of(kind, 1e4)
+    sensor = parse_sensor(
+        {
+            **KINDS[kind],
+            "noise": {"read": list(plain.noise.read), "derivative": [1e-6, 1e-6]},
+        }
+    )
+    truth = {"object": OBJECT, "crosstalk": [0.002, 0.01]}
+    trajectory = path(12, span=(0.2, 1.2))
+    ranges = np.array(trajectory.range_m)
+    scene = {"object": {key: OBJECT[key] for key in known}, "crosstalk": [VAGUE, VAGUE]}
+    rng = np.random.default_rng(11)
+    total: dict[str, float] = {}
+    chi_square, freedom = 0.0, 0
+    sets = 100
+    for seed in range(sets):
+        frames = with_derivatives(sensor, truth, data(sensor, truth, trajectory, seed), ranges, rng)
+        (result,) = served(sensor, scene, frames, ["crosstalk_fit"])
+        assert result.parameters is not None
+        assert result.fit is not None
+        for key, item in result.parameters.items():
+            miss = (item["value"] - values_of(sensor, truth)[key]) / item["sd"]
+            total[key] = total.get(key, 0.0) + miss**2
+        chi_square += result.fit["chi_square"]
+        freedom += result.fit["degrees_of_freedom"]
+    assert len(total) == 5 - len(known)
+    for value in total.values():
+        assert 0.95 * special.chdtri(sets, 1 - 1e-5) < value < 1.05 * special.chdtri(sets, 1e-5)
+    assert 0.95 * special.chdtri(freedom, 1 - 1e-5) < chi_square
+    assert chi_square < 1.05 * special.chdtri(freedom, 1e-5)
+
+
+def test_obstacles_name_what_is_missing() -> None:
+    sensor = sensor_of("pulsed", 1e4)
+    frames = data(sensor, {"object": OBJECT}, path(6))
+    names = ["object_fit", "crosstalk_fit", "shadow_fit"]
+
+    def reasons(scene: dict[str, Any], shown: Frames = frames) -> dict[str, str]:
+        found = estimate(sensor, parse_scene(scene), shown, names)
+        return {item.name: item.reason for item in found.left_out}
+
+    assert "is known" in reasons({"object": OBJECT})["object_fit"]
+    assert "crosstalk" in reasons({"crosstalk": [VAGUE, VAGUE]})["object_fit"]
+    wall = {**WALL, "strength": PRIOR}
+    assert "background.strength" in reasons({"background": wall})["object_fit"]
+    assert (
+        "time_s"
+        in reasons({"crosstalk": [VAGUE, VAGUE]}, dataclasses.replace(frames, time_s=None))[
+            "crosstalk_fit"
+        ]
+    )
+    wall = {"distance_m": 3.0, "strength": PRIOR}
+    assert "not linear" in reasons({"object": OBJECT, "background": wall})["shadow_fit"]
+    few = frames.select(np.arange(3))
+    assert "at least 4" in reasons({}, few)["object_fit"]
