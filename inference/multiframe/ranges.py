@@ -154,10 +154,11 @@ def frame_ranges(
     width = max(int(count.max(initial=0)), 1)
     roots, roots_sd = np.full((n, width), np.nan), np.full((n, width), np.nan)
     for row, frame in enumerate(used):
-        modes = sorted(kept[frame], key=lambda k, row=row: float(u[row, k]))  # type: ignore[misc]
-        roots[frame, : len(modes)] = np.exp(u[row, modes])
+        modes = np.array(kept[frame], dtype=np.intp)
+        modes = modes[np.argsort(u[row, modes])]
+        roots[frame, : modes.size] = np.exp(u[row, modes])
         with np.errstate(invalid="ignore", over="ignore"):
-            roots_sd[frame, : len(modes)] = np.exp(u[row, modes]) * sd[row, modes]
+            roots_sd[frame, : modes.size] = np.exp(u[row, modes]) * sd[row, modes]
     roots_sd[~np.isfinite(roots_sd)] = np.nan
     status = np.where(
         count == 1, Status.UNIQUE, np.where(count > 1, Status.AMBIGUOUS, Status.NONE)

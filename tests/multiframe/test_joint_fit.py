@@ -32,10 +32,10 @@ from tests.multiframe.scenes import (
     values_of,
 )
 
-UNKNOWN_WALL = {
+UNKNOWN_WALL: dict[str, Any] = {
     "strength": {"prior": "lognormal", "median": 0.02, "sigma": 1.0},
     "distance_m": {"prior": "uniform", "low": 2.2, "high": 8.0},
-    "shadow": WALL["shadow"],
+    "shadow": {"c0": 0.056, "c1": 0.013},
 }
 CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "crosstalk": ({"crosstalk": [VAGUE, VAGUE]}, {"object": OBJECT, "crosstalk": [0.002, 0.01]}),
@@ -63,7 +63,7 @@ def test_a_fit_is_that_of_scipy_over_all_unknowns(kind: str, case: str) -> None:
     """The fit stops where 1e-3 of deviance is left: 0.03 standard deviations of a parameter."""
     scene, truth = CASES[case]
     if case == "shadow":
-        truth = {**truth, "object": {**OBJECT, "c1": 0.05}}  # no shadow is negative
+        truth = {**truth, "object": {**OBJECT, "c1": 0.05}}  # so that no shadow is negative
     sensor = sensor_of(kind, 1e4)
     trajectory = path(14, 2)
     frames = data(sensor, truth, trajectory)
@@ -152,7 +152,7 @@ def test_bounds_are_those_of_the_identifiability_study(kind: str, noise: dict[st
     scene = parse_scene(
         {
             "crosstalk": [VAGUE, VAGUE],
-            "background": {**UNKNOWN_WALL, "shadow": {"c0": 0.056, "c1": 0.013}},
+            "background": UNKNOWN_WALL,
         }
     )
     trajectory = path(20, 2)
