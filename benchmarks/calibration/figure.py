@@ -40,6 +40,7 @@ def draw(found: Sequence[CellRanks], path: Path) -> None:
             for name, ranks in cell.ranks.items():
                 kind = _style(name)
                 axis.plot(grid, ecdf_difference(ranks), lw=0.9, color=_STYLES[kind], alpha=0.8)
+            axis.tick_params(labelbottom=True)
             axis.set_title(f"{cell.cell.name}\n{cell.sets} sets", fontsize=8)
             top = 1.35 * float(np.abs(band).max())
             axis.set_ylim(-top, top)
