@@ -9,6 +9,7 @@ __all__ = ["brief", "full"]
 _RESULTS = (
     "verdict",
     "parameters",
+    "modes",
     "range_m",
     "identifiability",
     "fit",

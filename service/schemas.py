@@ -164,9 +164,34 @@ class _Verdict(pydantic.BaseModel):
     reasons: list[str]
 
 
-class _Parameter(pydantic.BaseModel):
-    mean: float
+class _ModeShape(pydantic.BaseModel):
+    weight: float
+    weight_error: float | None
     sd: float
+    q05: float
+    q95: float
+
+
+class _ParameterMode(_ModeShape):
+    value: float
+
+
+class _RangeMode(_ModeShape):
+    range_m: float
+
+
+class _JointMode(pydantic.BaseModel):
+    parameters: dict[str, float]
+    log_density: float
+    weight: float | None
+    weight_error: float | None
+
+
+class _Parameter(pydantic.BaseModel):
+    """Mean, sd and mcse_mean are null where there are several modes: ``modes`` has their own."""
+
+    mean: float | None
+    sd: float | None
     q05: float
     q50: float
     q95: float
@@ -174,20 +199,19 @@ class _Parameter(pydantic.BaseModel):
     ess_tail: float | None
     rhat: float | None
     mcse_mean: float | None
-
-
-class _Mode(pydantic.BaseModel):
-    range_m: float
-    weight: float
+    modes: list[_ParameterMode]
 
 
 class _Ranges(pydantic.BaseModel):
-    q05: list[float]
-    q50: list[float]
-    q95: list[float]
-    mean: list[float]
-    sd: list[float]
-    modes: list[list[_Mode]]
+    """A frame of several modes has neither mean nor sd; one without range has nulls throughout."""
+
+    q05: list[float | None]
+    q50: list[float | None]
+    q95: list[float | None]
+    mean: list[float | None]
+    sd: list[float | None]
+    near_fold: list[bool]
+    modes: list[list[_RangeMode]]
 
 
 class _Identifiability(pydantic.BaseModel):
@@ -250,6 +274,7 @@ class PosteriorResponse(_Posterior):
 
     verdict: _Verdict | None
     parameters: dict[str, _Parameter] | None
+    modes: list[_JointMode] | None
     range_m: _Ranges | None
     identifiability: list[_Identifiability] | None
     fit: _Fit | None

@@ -51,18 +51,24 @@ def test_estimates_and_posteriors_as_answers() -> None:
     assert none.roots == ()
     posterior = {
         "range_m": {
-            "q05": [0.9],
-            "q50": [1.0],
-            "q95": [2.1],
-            "modes": [[{"range_m": 1.0, "weight": 0.7}, {"range_m": 2.0, "weight": 0.3}]],
+            "q05": [0.9, 0.9, None],
+            "q50": [1.0, 1.0, None],
+            "q95": [2.1, 1.1, None],
+            "near_fold": [False, True, False],
+            "modes": [
+                [{"range_m": 1.0, "weight": 0.7}, {"range_m": 2.0, "weight": 0.3}],
+                [{"range_m": 1.0, "weight": 1.0}],
+                [],
+            ],
         },
         "verdict": {"converged": False, "reasons": ["too few steps"]},
         "fit": {"misfit": True},
         "identifiability": [{"parameter": "range_m", "status": "not_identified"}],
         "runtime": {"wall_s": 1.0},
     }
-    answer = of_posterior("posterior", [1.0], posterior)
-    assert answer.points[0].status == "ambiguous"
+    answer = of_posterior("posterior", [1.0, 1.0, 1.0], posterior)
+    assert [point.status for point in answer.points] == ["ambiguous", "near fold", "none"]
+    assert math.isnan(answer.points[2].low_m)
     assert answer.misfit
     for word in ("too few steps", "MISFIT", "range_m is not identified"):
         assert word in answer.remark

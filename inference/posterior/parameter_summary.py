@@ -1,4 +1,4 @@
-"""Draws of the parameters in a few numbers each."""
+"""Draws of the parameters in a few numbers each, of which none is an average over two modes."""
 
 import math
 
@@ -10,17 +10,16 @@ from inference.posterior.diagnostics import (
     split_r_hat,
     tail_effective_sample_size,
 )
-from inference.posterior.posterior import ParameterSummary
+from inference.posterior.modes import boundaries, labels
+from inference.posterior.posterior import ParameterMode, ParameterSummary
+from inference.posterior.quantiles import quantiles, weighted_quantiles
+from inference.posterior.shares import share_error, weighted_share_error
 
 __all__ = ["summaries_of_chains", "summaries_of_weights"]
 
 Array = NDArray[np.float64]
 
-
-def _weighted_quantiles(x: Array, weights: Array) -> list[float]:
-    order = np.argsort(x)
-    cumulative = np.cumsum(weights[order]) - 0.5 * weights[order]
-    return [float(np.interp(q, cumulative, x[order])) for q in (0.05, 0.5, 0.95)]
+_THINNED = 1000  # draws among which modes are looked for: of one walker they are far apart
 
 
 def summaries_of_chains(names: tuple[str, ...], draws: Array) -> dict[str, ParameterSummary]:
@@ -37,22 +36,33 @@ def summaries_of_chains(names: tuple[str, ...], draws: Array) -> dict[str, Param
     -------
     dict of str to ParameterSummary
     """
+    ensembles, walkers, steps, _ = draws.shape
+    each = min(max(math.ceil(_THINNED / (ensembles * walkers)), 1), steps)
+    thin = np.linspace(0, steps - 1, each).astype(np.intp)
     result = {}
     for j, name in enumerate(names):
         x = draws[..., j]
-        q05, q50, q95 = (float(q) for q in np.quantile(x, [0.05, 0.5, 0.95]))
+        cuts = boundaries(x[:, :, thin].ravel())
+        label = labels(x, cuts)
+        modes = tuple(
+            _mode(x[label == k], None, float((label == k).mean()), share_error(label == k))
+            for k in range(cuts.size + 1)
+        )
+        several = cuts.size > 0
+        q05, q50, q95 = quantiles(x, several)
         ess = effective_sample_size(x)
         sd = float(x.std(ddof=1))
         result[name] = ParameterSummary(
-            float(x.mean()),
-            sd,
+            math.nan if several else float(x.mean()),
+            math.nan if several else sd,
             q05,
             q50,
             q95,
             ess,
             tail_effective_sample_size(x),
             split_r_hat(x),
-            sd / math.sqrt(ess),
+            math.nan if several else sd / math.sqrt(ess),
+            modes,
         )
     return result
 
@@ -77,13 +87,42 @@ def summaries_of_weights(
         R-hat is None; effective sample sizes are importance sample sizes.
     """
     ess = float(1 / np.sum(weights**2))
+    # draws that carry next to nothing are no modes
+    heavy = weights > 1e-3 * weights.max(initial=0.0)
     result = {}
     for j, name in enumerate(names):
-        mean = float(weights @ x[:, j])
-        variance = float(weights @ (x[:, j] - mean) ** 2)
-        error = float(np.sqrt(weights**2 @ (x[:, j] - mean) ** 2))
-        q05, q50, q95 = _weighted_quantiles(x[:, j], weights)
+        column = x[:, j]
+        cuts = boundaries(column[heavy])
+        label = labels(column, cuts)
+        modes = []
+        for k in range(cuts.size + 1):
+            inside = label == k
+            share = min(float(weights[inside].sum()), 1.0)
+            error = weighted_share_error(inside, weights)
+            modes.append(_mode(column[inside], weights[inside] / share, share, error))
+        several = cuts.size > 0
+        mean = float(weights @ column)
+        variance = float(weights @ (column - mean) ** 2)
+        error = float(np.sqrt(weights**2 @ (column - mean) ** 2))
+        q05, q50, q95 = weighted_quantiles(column, weights, several)
         result[name] = ParameterSummary(
-            mean, math.sqrt(variance), q05, q50, q95, ess, ess, None, error
+            math.nan if several else mean,
+            math.nan if several else math.sqrt(variance),
+            q05,
+            q50,
+            q95,
+            ess,
+            ess,
+            None,
+            math.nan if several else error,
+            tuple(modes),
         )
     return result
+
+
+def _mode(x: Array, weights: Array | None, share: float, error: float | None) -> ParameterMode:
+    """Describe the draws of one mode."""
+    w = np.full(x.size, 1.0 / x.size) if weights is None else weights
+    q05, q50, q95 = weighted_quantiles(x, w, several_modes=False)
+    sd = float(np.sqrt(w @ (x - w @ x) ** 2))
+    return ParameterMode(q50, share, error, sd, q05, q95)

@@ -8,14 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.identifiability.status import Identifiability
+from inference.posterior.draws import Draws
 from inference.posterior.selection import SelectionSummary
 from inference.posterior.verdict import Verdict
 
 __all__ = [
-    "Draws",
     "Fit",
+    "JointMode",
     "LeftOutTerm",
     "Mode",
+    "ParameterMode",
     "ParameterSummary",
     "Posterior",
     "RangeSummary",
@@ -48,14 +50,18 @@ class ParameterSummary:
 
     Attributes
     ----------
-    mean, sd, q05, q50, q95 : float
-        Of its draws.
+    mean, sd : float
+        Of its draws; nan where they have several separate modes.
+    q05, q50, q95 : float
+        Quantiles of its draws, whatever their modes.
     ess_bulk, ess_tail : float
         Effective sample sizes; importance sample sizes with importance sampling.
     rhat : float or None
         None with importance sampling.
     mcse_mean : float
-        Monte Carlo standard error of the mean.
+        Monte Carlo standard error of the mean; nan with the mean.
+    modes : tuple of ParameterMode
+        By ascending value.
     """
 
     mean: float
@@ -67,14 +73,75 @@ class ParameterSummary:
     ess_tail: float
     rhat: float | None
     mcse_mean: float
+    modes: tuple["ParameterMode", ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class ParameterMode:
+    """One of the separate modes of a parameter.
+
+    Attributes
+    ----------
+    value, sd, q05, q95 : float
+        Median, standard deviation and quantiles of the draws in this mode.
+    weight : float
+        Its share of the posterior.
+    weight_error : float or None
+        Standard error of the weight; None where no walker went from mode to mode.
+    """
+
+    value: float
+    weight: float
+    weight_error: float | None
+    sd: float
+    q05: float
+    q95: float
 
 
 @dataclasses.dataclass(frozen=True)
 class Mode:
-    """One mode of a range."""
+    """One of the separate modes of a range.
+
+    Attributes
+    ----------
+    range_m, sd, q05, q95 : float
+        Median, standard deviation and quantiles of the draws in this mode [m].
+    weight : float
+        Its share of the posterior.
+    weight_error : float or None
+        Standard error of the weight; None where no walker went from mode to mode.
+    """
 
     range_m: float
     weight: float
+    weight_error: float | None
+    sd: float
+    q05: float
+    q95: float
+
+
+@dataclasses.dataclass(frozen=True)
+class JointMode:
+    """One optimum of all parameters together.
+
+    Attributes
+    ----------
+    parameters : dict of str to float
+        In SI units.
+    log_density : float
+        Log posterior density there, in the prior's normal coordinates, ranges integrated out, up to
+        a constant that the modes share.
+    weight : float or None
+        Share of the posterior nearer to this optimum than to any other; None where nothing was
+        drawn yet.
+    weight_error : float or None
+        Standard error of the weight; None where no walker went from mode to mode.
+    """
+
+    parameters: dict[str, float]
+    log_density: float
+    weight: float | None
+    weight_error: float | None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -83,8 +150,12 @@ class RangeSummary:
 
     Attributes
     ----------
-    q05, q50, q95, mean, sd : ndarray, shape (frames,)
-        Of the draws.
+    q05, q50, q95 : ndarray, shape (frames,)
+        Quantiles of the draws, whatever their modes.
+    mean, sd : ndarray, shape (frames,)
+        Of the draws; nan where they have several separate modes.
+    near_fold : ndarray of bool, shape (frames,)
+        Whether noise like that of the frame makes two modes out of one, or one out of two.
     modes : tuple of tuple of Mode
         By ascending range, for every frame.
     """
@@ -94,6 +165,7 @@ class RangeSummary:
     q95: Array
     mean: Array
     sd: Array
+    near_fold: NDArray[np.bool_]
     modes: tuple[tuple[Mode, ...], ...]
 
 
@@ -124,28 +196,6 @@ class Runtime:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Draws:
-    """Draws behind the summary.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Parameters.
-    parameters : ndarray, shape (ensembles, walkers, steps, d)
-        In SI units; with importance sampling one ensemble of one walker, resampled by weight.
-    log_density : ndarray, shape (ensembles, walkers, steps)
-        Collapsed log density.
-    range_m : ndarray, shape (m, frames)
-        Draws of the ranges [m] for an even subset of the parameter draws.
-    """
-
-    names: tuple[str, ...]
-    parameters: Array
-    log_density: Array
-    range_m: Array
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
 class Posterior:
     """A posterior: summaries, verdict, ambiguity, identifiability, fit.
 
@@ -155,6 +205,8 @@ class Posterior:
         "emcee" or "importance".
     seed : int
         The seed; the same seed gives the same draws.
+    modes : tuple of JointMode
+        All optima that were found, numbered as in the verdict.
     selection : SelectionSummary, optional
         With optional terms in the scene: the models that were compared, and what was decided.
     """
@@ -163,6 +215,7 @@ class Posterior:
     seed: int
     verdict: Verdict
     parameters: dict[str, ParameterSummary]
+    modes: tuple[JointMode, ...]
     range_m: RangeSummary
     identifiability: tuple[Identifiability, ...]
     fit: Fit
@@ -178,6 +231,7 @@ class Posterior:
             "seed": self.seed,
             "verdict": dataclasses.asdict(self.verdict),
             "parameters": {k: dataclasses.asdict(v) for k, v in self.parameters.items()},
+            "modes": [dataclasses.asdict(mode) for mode in self.modes],
             "range_m": {
                 field.name: getattr(self.range_m, field.name)
                 for field in dataclasses.fields(RangeSummary)

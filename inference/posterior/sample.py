@@ -28,6 +28,12 @@ class Sample:
         resampled by weight; before the first chunk one walker that visits the starting points.
     log_density : ndarray, shape (ensembles, walkers, steps)
         Collapsed log density.
+    step : ndarray of int, shape (steps,)
+        Number of each step, the burn-in counted.
+    accepted : ndarray of bool, shape (ensembles, walkers, steps)
+        Whether the walker moved in that step.
+    mode : ndarray of int, shape (ensembles, walkers, steps)
+        Index of the optimum that each draw belongs to.
     chains : Chains or None
         With emcee, after its first chunk: the same draws.
     weighted : WeightedDraws or None
@@ -36,6 +42,9 @@ class Sample:
 
     z: Array
     log_density: Array
+    step: NDArray[np.intp]
+    accepted: NDArray[np.bool_]
+    mode: NDArray[np.intp]
     chains: Chains | None
     weighted: WeightedDraws | None
 
@@ -63,15 +72,33 @@ def sample_of(
     -------
     Sample
     """
+    if checkpoint.ensembles and checkpoint.ensembles[0].steps >= 4:
+        kept = chains(job, checkpoint)
+        done = checkpoint.ensembles[0].steps
+        step = np.arange(done - kept.z.shape[2], done)
+        every = np.array([e.chain[step[0] - 1 :].transpose(1, 0, 2) for e in checkpoint.ensembles])
+        moved = np.any(np.diff(every, axis=2) != 0, axis=-1)
+        return Sample(kept.z, kept.log_density, step, moved, kept.mode, kept, None)
     if checkpoint.weighted is not None:
         weighted = checkpoint.weighted
         keep = rng.choice(len(weighted.z), size=len(weighted.z), p=weighted.weights)
         z, log_density = weighted.z[keep], weighted.log_density[keep]
-        return Sample(z[None, None], log_density[None, None], None, weighted)
-    if checkpoint.ensembles and checkpoint.ensembles[0].steps >= 4:
-        kept = chains(job, checkpoint)
-        return Sample(kept.z, kept.log_density, kept, None)
-    # nothing unknown, or stopped before the first chunk: the starting points are all there is
-    starts = [e.coords for e in checkpoint.ensembles]
-    z = np.concatenate(starts or [np.empty((_WHERE_NOTHING_IS_UNKNOWN, 0))])
-    return Sample(z[None, None], density(z)[None, None], None, None)
+    else:
+        # nothing unknown, or stopped before the first chunk: the starts are all there is
+        starts = [e.coords for e in checkpoint.ensembles]
+        weighted = None
+        z = np.concatenate(starts or [np.empty((_WHERE_NOTHING_IS_UNKNOWN, 0))])
+        log_density = density(z)
+    n = len(z)
+    mode = np.zeros(n, dtype=np.intp)
+    if checkpoint.optima is not None:
+        mode = checkpoint.optima.nearest(z)
+    return Sample(
+        z[None, None],
+        log_density[None, None],
+        np.arange(n),
+        np.ones((1, 1, n), dtype=bool),
+        mode[None, None],
+        None,
+        weighted,
+    )

@@ -1,15 +1,19 @@
 """From a checkpoint to the answer."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from inference.identifiability.after_data import judge_draws
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.cross_check import cross_check
+from inference.posterior.draws import draws_of
+from inference.posterior.folds import near_fold
 from inference.posterior.job import Checkpoint, Job
+from inference.posterior.joint_modes import joint_modes
 from inference.posterior.parameter_summary import summaries_of_chains, summaries_of_weights
 from inference.posterior.posterior import (
-    Draws,
     LeftOutTerm,
     ParameterSummary,
     Posterior,
@@ -18,7 +22,6 @@ from inference.posterior.posterior import (
 from inference.posterior.predictive_check import predictive_check
 from inference.posterior.prior_conflict import prior_conflicts
 from inference.posterior.range_summary import range_summary
-from inference.posterior.ranges import draw_ranges
 from inference.posterior.sample import Sample, sample_of
 from inference.posterior.selecting import sampled
 from inference.posterior.selection import Selection, selection_summary
@@ -28,8 +31,6 @@ from simulator.scene import Scene
 __all__ = ["summarise"]
 
 Array = NDArray[np.float64]
-
-_RANGE_DRAWS = 1000
 
 
 def _left_out(scene: Scene, selection: Selection | None) -> tuple[LeftOutTerm, ...]:
@@ -90,24 +91,26 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
         k_hat = sample.weighted.k_hat
     elif sample.chains is not None:
         verdict, k_hat = cross_check(verdict, job, checkpoint, sample.chains)
-    chosen = z[np.linspace(0, len(z) - 1, min(_RANGE_DRAWS, len(z))).astype(int)]
-    drawn = draw_ranges(density, chosen, rng)
-    conflicts = prior_conflicts(density, z, drawn)
+    draws = draws_of(density, job, sample, rng)
+    thinned = sample.z[:, :, draws.thinned]
+    chosen = thinned.reshape(math.prod(thinned.shape[:3]), len(parameters))
+    log_r = np.log(draws.range_m[..., job.usable]).reshape(len(chosen), int(job.usable.sum()))
+    conflicts = prior_conflicts(density, z, log_r)
     verdict = Verdict(verdict.converged and not conflicts, (*verdict.reasons, *conflicts))
-    fit = predictive_check(density, chosen, drawn, rng)
-    ranges = np.full((len(chosen), len(job.frames)), np.nan)
-    ranges[:, job.usable] = np.exp(drawn)
-    draws = parameters.natural(z).reshape(sample.z.shape)
+    fit = predictive_check(density, chosen, log_r, rng)
+    folds = near_fold(job, density, chosen, log_r)
+    importance_ess = None if sample.weighted is None else sample.weighted.ess
     return Posterior(
         checkpoint.method,
         job.seed,
         verdict,
         _parameters(density, sample),
-        range_summary(job, drawn),
-        judge_draws(job.sensor, parameters, z, chosen, drawn, density.frames[:, 2]),
+        joint_modes(density, checkpoint.optima, sample),
+        range_summary(draws, folds, importance_ess),
+        judge_draws(job.sensor, parameters, z, chosen, log_r, density.frames[:, 2]),
         fit,
         _left_out(stated, selection),
         Runtime(wall_s, cpu_s, checkpoint.calls, k_hat),
-        Draws(parameters.names, draws, sample.log_density, ranges),
+        draws,
         None if selection is None else selection_summary(stated, selection),
     )

@@ -86,7 +86,9 @@ def of_posterior(name: str, truth_m: Sequence[float], posterior: dict[str, Any])
     points = []
     for index, truth in enumerate(truth_m):
         modes = tuple((mode["range_m"], mode["weight"]) for mode in ranges["modes"][index])
-        status = "unique" if len(modes) == 1 else "ambiguous"
+        status = ("none", "unique", "ambiguous")[min(len(modes), 2)]
+        if status == "unique" and ranges["near_fold"][index]:
+            status = "near fold"
         middle, low, high = (_number(ranges[key][index]) for key in ("q50", "q05", "q95"))
         points.append(Point(truth, middle, low, high, status, modes))
     verdict, fit = posterior["verdict"], posterior["fit"]

@@ -63,6 +63,7 @@ def test_the_shape_is_the_contract_s() -> None:
         "seed",
         "verdict",
         "parameters",
+        "modes",
         "range_m",
         "identifiability",
         "fit",
@@ -86,8 +87,24 @@ def test_the_shape_is_the_contract_s() -> None:
         "ess_tail",
         "rhat",
         "mcse_mean",
+        "modes",
     }
-    assert set(document["range_m"]) == {"q05", "q50", "q95", "mean", "sd", "modes"}
+    assert set(document["range_m"]) == {
+        "q05",
+        "q50",
+        "q95",
+        "mean",
+        "sd",
+        "near_fold",
+        "modes",
+    }
+    mode = {"weight", "weight_error", "sd", "q05", "q95"}
+    assert set(document["range_m"]["modes"][0][0]) == mode | {"range_m"}
+    assert set(document["parameters"]["object.c0"]["modes"][0]) == mode | {"value"}
+    (joint,) = document["modes"]
+    assert set(joint) == {"parameters", "log_density", "weight", "weight_error"}
+    assert joint["parameters"].keys() == document["parameters"].keys()
+    assert joint["weight"] == 1.0
     assert set(document["runtime"]) == {"wall_s", "cpu_s", "likelihood_calls", "k_hat"}
     assert [row["term"] for row in document["left_out"]] == ["background", "discrepancy"]
 
@@ -148,3 +165,25 @@ def test_two_modes_of_a_range_are_reported_apart() -> None:
     assert modes[0].range_m == pytest.approx(0.2627, rel=0.01)
     assert modes[1].range_m == pytest.approx(0.3825, rel=0.01)
     assert sum(mode.weight for mode in modes) == pytest.approx(1.0)
+    # an average over both would be a range that explains nothing
+    assert np.isnan(posterior.range_m.mean[0])
+    assert np.isnan(posterior.range_m.sd[0])
+    ranges = posterior.to_json()["range_m"]
+    assert ranges["mean"] == ranges["sd"] == [None]
+    for mode in modes:
+        assert mode.q05 < mode.range_m < mode.q95
+        assert mode.sd < 0.01
+        assert mode.weight_error is not None
+    quantiles = np.array([posterior.range_m.q05, posterior.range_m.q50, posterior.range_m.q95])
+    assert np.abs(quantiles[:, 0, None] - [0.2627, 0.3825]).min(axis=1).max() < 0.01
+    # each range goes with a reflectance of its own: so do the modes of c2
+    c2 = posterior.parameters["object.c2"]
+    assert len(c2.modes) == 2
+    assert math.isnan(c2.mean)
+    assert math.isnan(c2.sd)
+    # shares of the same posterior, of all draws and of a few: a false alarm once in 1e6 runs
+    error = math.hypot(*(m.weight_error or 0.0 for m in (modes[0], c2.modes[0])))
+    assert min(abs(modes[0].weight - mode.weight) for mode in c2.modes) < 5 * error
+    assert len(posterior.modes) >= 2
+    total = math.fsum(mode.weight or 0.0 for mode in posterior.modes)
+    assert total == pytest.approx(1.0, abs=1e-12)

@@ -137,8 +137,14 @@ def progress(_: Job, checkpoint: Checkpoint) -> Progress:
 
 def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> Posterior:
     finished = checkpoint.chunk == CHUNKS
-    summary = {"mean": checkpoint.sums[0], "sd": 1.0, "q05": 0.0, "q50": 0.0, "q95": 0.0}
-    summary |= {"ess_bulk": 1.0, "ess_tail": 1.0, "rhat": 1.0, "mcse_mean": 1.0}
+    summary: dict[str, Any] = {
+        "mean": checkpoint.sums[0],
+        "sd": 1.0,
+        "q05": 0.0,
+        "q50": 0.0,
+        "q95": 0.0,
+    }
+    summary |= {"ess_bulk": 1.0, "ess_tail": 1.0, "rhat": 1.0, "mcse_mean": 1.0, "modes": []}
     return Posterior(
         {
             "method": job.settings.method,
@@ -148,7 +154,10 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
                 "reasons": [] if finished else ["too few steps"],
             },
             "parameters": {"object.c0": summary},
-            "range_m": {"q05": [], "q50": [], "q95": [], "mean": [], "sd": [], "modes": []},
+            "modes": [],
+            "range_m": {
+                key: [] for key in ("q05", "q50", "q95", "mean", "sd", "near_fold", "modes")
+            },
             "identifiability": [],
             "fit": {"p_value": 0.5, "misfit": False},
             "left_out": [],
