@@ -68,6 +68,7 @@ def test_the_shape_is_the_contract_s() -> None:
         "identifiability",
         "fit",
         "left_out",
+        "selection",
         "runtime",
     }
     assert set(document["parameters"]) == {
