@@ -150,6 +150,12 @@ class CollapsedDensity:
             _log_likelihoods(out[i : i + 1], *everything)
         return np.asarray(out.sum(axis=1))
 
+    def _of_terms(self, terms: Terms) -> Array:
+        """Return log p(y_j | terms_i) for physical terms."""
+        out = np.empty((terms.object.shape[0], self.frames.shape[0]))
+        _log_likelihoods(out, *self.arguments(terms))
+        return out
+
     def frame_log_likelihoods(self, z: Array) -> Array:
         """Return log p(y_j | z_i), shape (len(z), frames); -inf where physics forbids z."""
         z = np.atleast_2d(z)
@@ -161,7 +167,7 @@ class CollapsedDensity:
             if part is not None:
                 good &= np.isfinite(part).all(axis=1)
         if good.all():
-            _log_likelihoods(out, *self.arguments(terms))
+            out = self._of_terms(terms)
         elif good.any():
             out[good] = self.frame_log_likelihoods(z[good])
         return out

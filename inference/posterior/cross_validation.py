@@ -21,6 +21,9 @@ __all__ = ["cross_validate"]
 Array = NDArray[np.float64]
 
 _DRAWS = 2000
+_MOST_EVALUATIONS = 200_000  # of a frame, in one round: fewer draws where frames are many
+_LEAST_DRAWS = 400
+_CONDITIONAL_DRAWS = 300
 _MOST_INFLUENTIAL = 6  # frames; the others keep a k-hat that says what they are worth
 _ROUNDS = 3
 
@@ -44,11 +47,12 @@ def _predict(
 ) -> tuple[float, float, int]:
     """Predict one frame from the others; its log density, k-hat, and the number of evaluations."""
     others = _without(density, frame)
+    n = int(np.clip(_MOST_EVALUATIONS / len(density.frames), _LEAST_DRAWS, _DRAWS))
     best, k_hat, calls = -np.inf, np.inf, 0
     for _ in range(_ROUNDS):
         mixture = adapt(laplace, pilot, rng)
-        weighted = draw_weighted(others, mixture, rng, _DRAWS)
-        calls += _DRAWS
+        weighted = draw_weighted(others, mixture, rng, n)
+        calls += n
         if weighted.k_hat < k_hat:
             inside = weighted.weights > 0
             logs = np.log(weighted.weights[inside])

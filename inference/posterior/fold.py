@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior import summary
+from inference.posterior.checks import check_best_fit
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.diagnostics import (
     autocorrelation_time,
@@ -154,6 +155,7 @@ def start(job: Job) -> Checkpoint:
             "no parameters within their priors explain the frames; widen the priors, or check the "
             "noise's `read` against the readings"
         )
+    check_best_fit(density, optima[0].z)
     mixture = mixture_of(optima)
     if settings.method in ("importance", "auto"):
         weighted, used = _importance(density, mixture, job)

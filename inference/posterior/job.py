@@ -7,14 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
+from inference.posterior.checks import check_frames, check_scene_for_posterior
 from inference.posterior.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.ensemble import Ensemble
 from inference.posterior.importance import WeightedDraws
 from inference.posterior.proposal import Mixture
 from inference.posterior.selection import Selection
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.static import with_common_range
 from inference.posterior.verdict import Chains, Verdict, chains_of
-from simulator.errors import InvalidInputError, RefusedError
+from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
 from simulator.scene import Scene, parse_scene
@@ -83,7 +85,8 @@ class Job:
 
     def density(self) -> CollapsedDensity:
         """Return the collapsed density of the usable frames."""
-        return collapsed_density(self.sensor, self.scene, self.frames.select(self.usable))
+        density = collapsed_density(self.sensor, self.scene, self.frames.select(self.usable))
+        return with_common_range(density) if self.scene.motion == "static" else density
 
     def stream(self, purpose: int) -> np.random.Generator:
         """Return the random stream of one purpose; streams of different purposes are distinct."""
@@ -170,10 +173,7 @@ def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSetti
     RefusedError
         Where no honest answer exists; with the remedy.
     """
-    try:
-        parameters_of(sensor, scene)
-    except InvalidInputError as error:
-        raise error.below("/scene") from None
+    check_frames(sensor, frames)
     if scene.motion == "tangential":
         raise RefusedError(
             "the object's amplitude changes from frame to frame in tangential motion, and the "
@@ -190,6 +190,7 @@ def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSetti
     job = Job(sensor, scene, frames, settings)
     if not job.usable.any():
         raise RefusedError("every frame is saturated: lower the gain or the exposure")
+    check_scene_for_posterior(sensor, scene, frames.select(job.usable))
     return job
 
 

@@ -15,6 +15,7 @@ from inference.posterior.frame_integral import (
 )
 from inference.posterior.integrand import Pair, log_top
 from inference.posterior.rows import background_of, crosstalk_of, law_of
+from inference.posterior.static import StaticDensity
 from simulator.compiled import compiled
 from simulator.readings import (
     background_readings,
@@ -142,6 +143,8 @@ def best_ranges(density: CollapsedDensity, z: Array) -> Array:
         log r, log p(y, log r | z) and its standard deviation in log r; nan, log likelihood and
         nan for a frame without object.
     """
+    if isinstance(density, StaticDensity):
+        return density.best(z)
     terms = density.parameters.terms(z)
     out = np.empty((z.shape[0], density.frames.shape[0], 3))
     fill_best_ranges(out, *density.arguments(terms))
@@ -218,6 +221,13 @@ def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearis
         )
     usable = inside & (length > 0)
     unit = np.where(usable[:, None], direction / np.where(usable, length, 1.0)[:, None], 0.0)
+    if isinstance(density, StaticDensity):
+        # one range gives way for all frames together
+        together = np.where(usable[:, None], direction, 0.0)
+        together = together / max(float(np.linalg.norm(together)), 1e-300)
+        residual = residual - together * np.sum(together * residual)
+        jacobian = jacobian - together[:, :, None] * np.einsum("ni,nid->d", together, jacobian)
+        return Linearisation(residual, jacobian)
     residual = residual - unit * np.einsum("ni,ni->n", unit, residual)[:, None]
     jacobian = jacobian - unit[:, :, None] * np.einsum("ni,nid->nd", unit, jacobian)[:, None, :]
     return Linearisation(residual, jacobian)

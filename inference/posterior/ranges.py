@@ -16,6 +16,7 @@ from inference.posterior.frame_integral import (
 )
 from inference.posterior.integrand import Pair, SceneArguments, Triple, log_integrand
 from inference.posterior.rows import background_of, crosstalk_of, law_of
+from inference.posterior.static import StaticDensity
 from simulator.compiled import compiled
 from simulator.readings import background_readings, noise_parts, object_readings
 
@@ -170,6 +171,8 @@ def draw_ranges(density: CollapsedDensity, z: Array, rng: np.random.Generator) -
     ndarray, shape (n, frames)
         log r; nan for a frame without object.
     """
+    if isinstance(density, StaticDensity):
+        return density.draw_log_ranges(z, rng)
     n, frames = z.shape[0], density.frames.shape[0]
     out = np.empty((n, frames))
     arguments = density.arguments(density.parameters.terms(z))

@@ -64,7 +64,7 @@ def begin(job: Job) -> Checkpoint:
 
 def awaits_start(checkpoint: Checkpoint) -> bool:
     """Tell whether nothing was sampled yet, since optional terms come first."""
-    begun = checkpoint.finished or bool(checkpoint.ensembles)
+    begun = checkpoint.finished or checkpoint.optima is not None
     return checkpoint.selection is not None and not begun
 
 
@@ -81,9 +81,8 @@ def run_assessment(task: AssessTask) -> Candidate:
     """Assess one candidate."""
     job = task.job
     terms = candidate_terms(job.scene)[task.index]
-    frames = job.frames.select(job.usable)
-    rng = job.stream(_STREAM + task.index)
-    return assess(job.sensor, job.scene, frames, terms, rng)
+    density = dataclasses.replace(job, scene=reduced(job.scene, terms)).density()
+    return assess(terms, density, job.stream(_STREAM + task.index))
 
 
 def take_in(job: Job, checkpoint: Checkpoint, candidates: tuple[Candidate, ...]) -> Checkpoint:

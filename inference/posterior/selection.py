@@ -13,13 +13,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.posterior.collapsed import collapsed_density
+from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.cross_validation import cross_validate
 from inference.posterior.evidence import weigh
 from inference.posterior.leave_one_out import MAX_K_HAT, standard_error
-from simulator.frames import Frames
 from simulator.scene import Crosstalk, Scene
-from simulator.sensor import Sensor
 
 __all__ = [
     "EVIDENCE_MARGIN",
@@ -183,18 +181,16 @@ def reduced(scene: Scene, terms: Sequence[str]) -> Scene:
 
 
 def assess(
-    sensor: Sensor, scene: Scene, frames: Frames, terms: tuple[str, ...], rng: np.random.Generator
+    terms: tuple[str, ...], density: CollapsedDensity, rng: np.random.Generator
 ) -> Candidate:
     """Assess one candidate.
 
     Parameters
     ----------
-    sensor, scene : Sensor, Scene
-        The scene with its optional terms.
-    frames : Frames
-        Usable ones.
     terms : tuple of str
-        Which optional terms the candidate keeps.
+        Which optional terms it keeps.
+    density : CollapsedDensity
+        Of the scene that `reduced` makes with them.
     rng : numpy.random.Generator
         Source of randomness.
 
@@ -202,7 +198,6 @@ def assess(
     -------
     Candidate
     """
-    density = collapsed_density(sensor, reduced(scene, terms), frames)
     weighed = weigh(density, rng)
     predicted, calls = cross_validate(density, weighed, rng)
     return Candidate(

@@ -134,12 +134,14 @@ def _derivatives(density: CollapsedDensity, z: Array, frame: Array) -> tuple[flo
     values = density(z + np.array(steps) @ frame.T)
     centre = values[0]
     plus, minus = values[1 : 2 * d + 1 : 2], values[2 : 2 * d + 1 : 2]
-    gradient = (plus - minus) / (2 * h)
-    hessian = np.diag((plus - 2 * centre + minus) / h**2)
-    for k, (i, j) in enumerate(pairs):
-        a, b = values[2 * d + 1 + 2 * k], values[2 * d + 2 + 2 * k]
-        mixed = (a + b - 2 * centre) / h**2
-        hessian[i, j] = hessian[j, i] = 0.5 * (mixed - hessian[i, i] - hessian[j, j])
+    # where the density ends within a step, the result is not finite: steps then shrink
+    with np.errstate(invalid="ignore"):
+        gradient = (plus - minus) / (2 * h)
+        hessian = np.diag((plus - 2 * centre + minus) / h**2)
+        for k, (i, j) in enumerate(pairs):
+            a, b = values[2 * d + 1 + 2 * k], values[2 * d + 2 + 2 * k]
+            mixed = (a + b - 2 * centre) / h**2
+            hessian[i, j] = hessian[j, i] = 0.5 * (mixed - hessian[i, i] - hessian[j, j])
     return float(centre), gradient, hessian
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from inference.posterior import fold
+from inference.posterior.collapsed import collapsed_density
 from inference.posterior.infer import infer
 from inference.posterior.selection import (
     Candidate,
@@ -142,7 +143,10 @@ def rate(strength: float, sets: int) -> float:
         truth = {"crosstalk": [strength * read, strength * read]}
         frames = data(sensor, truth, frames=10, seed=seed).frames
         rng = np.random.default_rng(seed)
-        found = [assess(sensor, scene, frames, terms, rng) for terms in candidate_terms(scene)]
+        found = [
+            assess(terms, collapsed_density(sensor, reduced(scene, terms), frames), rng)
+            for terms in candidate_terms(scene)
+        ]
         count += bool(kept(scene, *found))
     return count / sets
 

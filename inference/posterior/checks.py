@@ -1,0 +1,156 @@
+"""What is refused before any time is spent on a posterior, each with its reason and its remedy."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.posterior.collapsed import CollapsedDensity
+from inference.posterior.integrand import log_top
+from simulator.errors import InvalidInputError, RefusedError
+from simulator.frames import Frames, frames_from_columns
+from simulator.parameters import Parameters, parameters_of
+from simulator.scene import Scene
+from simulator.sensor import Sensor
+
+__all__ = [
+    "MOST_FRAMES",
+    "MOST_UNKNOWNS",
+    "check_best_fit",
+    "check_frames",
+    "check_scene_for_posterior",
+]
+
+Array = NDArray[np.float64]
+
+# object 3, crosstalk 2, background 2, its shadow 2, centre and spread of a stroke 2
+MOST_UNKNOWNS = 11
+# beyond, finding the starting points alone takes longer than most callers wait
+MOST_FRAMES = 2000
+_PRIOR_DRAWS = 256
+# standard deviations by which readings may miss the best fit, root mean square. A model that is
+# wrong misses by less than the signal, which no sensor reads a million times above its noise; and
+# a log density of 1e12 a reading has rounding errors that a sampler takes for structure
+_MOST_MISFIT = 1e6
+
+
+def check_frames(sensor: Sensor, frames: Frames) -> None:
+    """Check frames that did not come through `simulator.frames.frames_from_columns`.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The sensor.
+    frames : Frames
+        As a caller made them.
+
+    Raises
+    ------
+    InvalidInputError
+        A pointer below /frames for each column that is empty, of another length, not finite, or
+        (gain) not positive.
+    """
+    first, second = sensor.columns
+    readings = np.asarray(frames.readings)
+    if readings.ndim != 2 or readings.shape[1] != 2:
+        raise InvalidInputError.at("/frames", "readings must be of shape (n, 2)")
+    columns = {
+        first: readings[:, 0],
+        second: readings[:, 1],
+        "time_s": frames.time_s,
+        "gain": frames.gain,
+        "object_present": frames.object_present,
+    }
+    try:
+        frames_from_columns(sensor, columns)
+    except InvalidInputError as error:
+        raise error.below("/frames") from None
+
+
+def check_scene_for_posterior(sensor: Sensor, scene: Scene, frames: Frames) -> None:
+    """Check whether a posterior of these frames can say anything in this scene.
+
+    Parameters
+    ----------
+    sensor, scene : Sensor, Scene
+        The scene with its optional terms.
+    frames : Frames
+        Usable ones, checked.
+
+    Raises
+    ------
+    InvalidInputError
+        Where the scene breaks a rule; pointers below /scene.
+    RefusedError
+        Where no honest answer exists; with the remedy.
+    """
+    try:
+        parameters = parameters_of(sensor, scene)
+    except InvalidInputError as error:
+        raise error.below("/scene") from None
+    if scene.motion == "static" and scene.discrepancy is not None:
+        raise RefusedError(
+            "an object at rest has one range, at which a discrepancy of its flux is no different "
+            "from another c2; leave `discrepancy` out, and give `object.c2` a wider prior"
+        )
+    if len(parameters) > MOST_UNKNOWNS:
+        raise RefusedError(
+            f"the scene has {len(parameters)} unknowns, and posteriors were tested up to "
+            f"{MOST_UNKNOWNS}; state more of them as known numbers"
+        )
+    if len(frames) > MOST_FRAMES:
+        raise RefusedError(
+            f"{len(frames)} frames that are not saturated, and posteriors were tested up to "
+            f"{MOST_FRAMES}; send every {-(-len(frames) // MOST_FRAMES)}th of them, or several "
+            "posteriors of a part each"
+        )
+    _check_priors(parameters)
+    if not frames.present.any():
+        _check_empty(parameters)
+
+
+def check_best_fit(density: CollapsedDensity, z: Array) -> None:
+    """Refuse readings that nothing in the scene comes near.
+
+    Parameters
+    ----------
+    density : CollapsedDensity
+        The density.
+    z : ndarray, shape (d,)
+        The best parameters that were found.
+
+    Raises
+    ------
+    RefusedError
+        With the frame that fits worst. A misfit that is merely too large to be noise is answered,
+        and flagged in `Fit`.
+    """
+    shares = log_top(density.read) - density.frame_log_likelihoods(z[None])[0]
+    misfit = float(np.sqrt(max(shares.mean(), 0.0)))
+    if misfit > _MOST_MISFIT:
+        raise RefusedError(
+            f"the readings miss the best fit by {misfit:.1e} times their noise in the mean, most "
+            f"of all the usable frame number {int(shares.argmax())} (from 0): check the units of "
+            "the readings and of the noise's `read`, leave out frames that something else has "
+            "spoilt, or widen the priors"
+        )
+
+
+def _check_priors(parameters: Parameters) -> None:
+    """Refuse priors that exclude one another, or every range."""
+    # the effort is bounded; it refuses on its own where c0 and c1 exclude one another
+    draws = parameters.sample(np.random.default_rng(0), _PRIOR_DRAWS)
+    if not np.isfinite(parameters.terms(draws).ranges[:, 0]).any():
+        raise RefusedError(
+            "the shadow's c1 is so far below zero that the background would be negative at every "
+            "range in `range_m`; raise `background.shadow.c1`, or widen `range_m`"
+        )
+
+
+def _check_empty(parameters: Parameters) -> None:
+    """Refuse frames without an object that can teach nothing."""
+    seen = ("crosstalk.", "background.strength", "background.distance_m")
+    if not any(name.startswith(seen) for name in parameters.names):
+        raise RefusedError(
+            "no frame holds an object, and neither crosstalk nor a background is unknown: there is "
+            "nothing that these frames could tell; send frames with `object_present` true, or give "
+            "crosstalk or background a prior"
+        )

@@ -1,0 +1,220 @@
+"""Bad input of the posterior: refused before any sampling, or answered with what is wrong said."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from inference.posterior import checks, fold
+from inference.posterior.infer import infer
+from inference.posterior.settings import SamplerSettings
+from simulator.errors import InvalidInputError, RefusedError
+from simulator.frames import Frames
+from simulator.scene import parse_scene
+from simulator.sensor import parse_sensor
+from tests.posterior.scenes import OBJECT, UNKNOWN_CROSSTALK, data, sensor_of
+
+QUICK = SamplerSettings(seed=7, target_ess=50, max_seconds=30)
+SENSOR = sensor_of("pulsed")
+FRAMES = data(SENSOR).frames
+
+
+def with_reading(value: float) -> Frames:
+    readings = FRAMES.readings.copy()
+    readings[3, 0] = value
+    return Frames(readings)
+
+
+@pytest.mark.parametrize(
+    ("frames", "pointer"),
+    [
+        (Frames(np.empty((0, 2))), "/frames/w1"),
+        (Frames(np.empty(0)), "/frames"),
+        (Frames(np.ones((4, 3))), "/frames"),
+        (with_reading(np.nan), "/frames/w1"),
+        (with_reading(-np.inf), "/frames/w1"),
+        (dataclasses.replace(FRAMES, gain=np.zeros(20)), "/frames/gain"),
+        (dataclasses.replace(FRAMES, gain=np.full(20, np.nan)), "/frames/gain"),
+        (dataclasses.replace(FRAMES, gain=np.ones(19)), "/frames/gain"),
+        (
+            dataclasses.replace(FRAMES, object_present=np.ones(3, dtype=bool)),
+            "/frames/object_present",
+        ),
+    ],
+)
+def test_frames_that_no_border_has_checked(frames: Frames, pointer: str) -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        fold.prepare(SENSOR, parse_scene({}), frames, QUICK)
+    assert pointer in {problem.pointer for problem in caught.value.problems}
+
+
+@pytest.mark.parametrize(
+    ("scene", "pointer"),
+    [
+        ({"object": {"c0": {"prior": "loguniform", "low": 0.0, "high": 1.0}}}, "/object/c0/low"),
+        ({"object": {"c0": {"prior": "uniform", "low": 1.0, "high": 1.0}}}, "/object/c0"),
+        (
+            {"object": {"c2": {"prior": "lognormal", "median": 0.1, "sigma": 0.0}}},
+            "/object/c2/sigma",
+        ),
+        ({"range_m": {"prior": "uniform", "low": 0.0, "high": np.inf}}, "/range_m/high"),
+        ({"crosstalk": [{"prior": "normal", "mean": np.nan, "sd": 1.0}, 0.0]}, "/crosstalk/0/mean"),
+        ({"crosstalk": [{"prior": "normal", "mean": 0.0, "sd": np.inf}, 0.0]}, "/crosstalk/0/sd"),
+    ],
+)
+def test_improper_priors_are_not_even_scenes(scene: dict[str, Any], pointer: str) -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        parse_scene(scene)
+    assert any(problem.pointer.startswith(pointer) for problem in caught.value.problems)
+
+
+@pytest.mark.parametrize(
+    ("scene", "pointer"),
+    [
+        (
+            {
+                "object": {
+                    "c0": {"prior": "uniform", "low": 1e-6, "high": 1e-4},
+                    "c1": {"prior": "uniform", "low": -10.0, "high": -5.0},
+                }
+            },
+            "/scene/object/c1",
+        ),
+        ({"object": {"c2": {"prior": "uniform", "low": -2.0, "high": -1.0}}}, "/scene/object/c2"),
+        ({"range_m": {"prior": "uniform", "low": 100.0, "high": 200.0}}, "/scene/range_m"),
+        ({"range_m": {"prior": "stroke", "low": 100.0, "high": 200.0}}, "/scene/range_m/low"),
+        ({"background": {"strength": 0.1, "distance_m": 99.0}}, "/scene/background/distance_m"),
+    ],
+)
+def test_priors_that_physics_excludes_are_named(scene: dict[str, Any], pointer: str) -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        fold.prepare(SENSOR, parse_scene(scene), FRAMES, QUICK)
+    assert pointer in {problem.pointer for problem in caught.value.problems}
+
+
+REMEDIES: dict[str, tuple[dict[str, Any], str]] = {
+    "priors of c0 and c1 that all but exclude one another": (
+        {
+            "object": {
+                "c0": {"prior": "lognormal", "median": 1e-12, "sigma": 0.1},
+                "c1": {"prior": "normal", "mean": -1.0, "sd": 0.1},
+            }
+        },
+        "bring them into agreement",
+    ),
+    "a shadow that leaves no range": (
+        {
+            "background": {
+                "strength": 0.02,
+                "distance_m": 3.0,
+                "shadow": {"c0": 900.0, "c1": -59.0},
+            },
+        },
+        "raise `background.shadow.c1`",
+    ),
+    "an amplitude that changes": ({"motion": "tangential"}, "differential"),
+    "a discrepancy at one range": (
+        {"motion": "static", "discrepancy": 0.05},
+        "leave `discrepancy`",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REMEDIES)
+def test_scenes_without_an_honest_answer_are_refused_with_the_remedy(name: str) -> None:
+    scene, remedy = REMEDIES[name]
+    with pytest.raises(RefusedError, match=remedy):
+        fold.prepare(SENSOR, parse_scene(scene), FRAMES, QUICK)
+
+
+def test_more_unknowns_than_were_tested_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = {
+        "crosstalk": UNKNOWN_CROSSTALK,
+        "range_m": {"prior": "stroke", "low": 0.1, "high": 5.0},
+    }
+    scene["background"] = {
+        "strength": {"prior": "loguniform", "low": 1e-4, "high": 1.0},
+        "distance_m": {"prior": "uniform", "low": 1.0, "high": 10.0},
+    }
+    largest = fold.prepare(SENSOR, parse_scene(scene), FRAMES, QUICK)
+    assert len(largest.density().parameters) == checks.MOST_UNKNOWNS == 11
+    monkeypatch.setattr(checks, "MOST_UNKNOWNS", 10)
+    with pytest.raises(RefusedError, match="as known numbers"):
+        fold.prepare(SENSOR, parse_scene(scene), FRAMES, QUICK)
+
+
+def test_more_frames_than_were_tested_are_refused() -> None:
+    many = Frames(np.tile(FRAMES.readings, (101, 1)))
+    with pytest.raises(RefusedError, match="every 2th"):
+        fold.prepare(SENSOR, parse_scene({}), many, QUICK)
+    some = dataclasses.replace(many, object_present=np.ones(len(many), dtype=bool))
+    assert fold.prepare(SENSOR, parse_scene({}), some.select(slice(0, 2000)), QUICK).usable.all()
+
+
+def test_frames_that_are_all_saturated_are_refused() -> None:
+    sensor = parse_sensor({**SENSOR.model_dump(exclude_none=True), "full_scale": [1e-9, 1e-9]})
+    with pytest.raises(RefusedError, match="lower the gain or the exposure"):
+        fold.prepare(sensor, parse_scene({}), FRAMES, QUICK)
+
+
+@pytest.mark.parametrize("crosstalk", [None, [0.0, 0.0]])
+def test_empty_frames_that_can_teach_nothing_are_refused(crosstalk: Any) -> None:
+    empty = dataclasses.replace(FRAMES, object_present=np.zeros(20, dtype=bool))
+    with pytest.raises(RefusedError, match="object_present"):
+        fold.prepare(SENSOR, parse_scene({"crosstalk": crosstalk}), empty, QUICK)
+
+
+@pytest.mark.parametrize("value", [1e160, 1e300])
+def test_readings_beyond_any_number_are_refused_before_sampling(value: float) -> None:
+    job = fold.prepare(SENSOR, parse_scene({}), with_reading(value), QUICK)
+    with pytest.raises(RefusedError, match="check the noise's `read`"):
+        fold.start(job)
+
+
+def test_a_reading_a_million_times_its_noise_away_is_refused_before_sampling() -> None:
+    job = fold.prepare(SENSOR, parse_scene({}), with_reading(1e3), QUICK)
+    with pytest.raises(RefusedError, match=r"number 3 \(from 0\): check the units"):
+        fold.start(job)
+
+
+WRONG: dict[str, Callable[[], tuple[dict[str, Any], Frames]]] = {
+    "crosstalk far outside its prior": lambda: (
+        {"object": OBJECT, "crosstalk": [{"prior": "normal", "mean": 0.0, "sd": 1e-9}] * 2},
+        data(SENSOR, {"crosstalk": [0.002, 0.01]}).frames,
+    ),
+    "an object far brighter than its prior": lambda: (
+        {"object": OBJECT | {"c2": {"prior": "lognormal", "median": 1e-6, "sigma": 0.01}}},
+        FRAMES,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_priors_and_readings_that_contradict_one_another_are_a_misfit(name: str) -> None:
+    scene, frames = WRONG[name]()
+    posterior = infer(SENSOR, parse_scene(scene), frames, QUICK)
+    assert posterior.fit.misfit
+    document = posterior.to_json()
+    assert document["fit"]["p_value"] < 1e-3
+
+
+@pytest.mark.parametrize("factor", [1e-12, 1e12])
+def test_no_answer_depends_on_the_unit_of_readings(factor: float) -> None:
+    settings = SamplerSettings(seed=3, method="importance")
+    scene = {"crosstalk": [{"prior": "normal", "mean": 0.0, "sd": 0.02}] * 2}
+    scaled = {"crosstalk": [{"prior": "normal", "mean": 0.0, "sd": 0.02 * factor}] * 2}
+    noise = {"read": [read * factor for read in SENSOR.noise.read]}
+    sensor = parse_sensor({**SENSOR.model_dump(exclude_none=True), "gain": factor, "noise": noise})
+    frames = data(SENSOR, {"crosstalk": [0.002, 0.01]}).frames
+    plain = infer(SENSOR, parse_scene(scene), frames, settings)
+    other = infer(sensor, parse_scene(scaled), Frames(frames.readings * factor), settings)
+    # rounding differs, and each step of a climb multiplies it; draws themselves are as good as 1 %
+    assert other.range_m.q50 == pytest.approx(plain.range_m.q50, rel=1e-4)
+    assert other.parameters["object.c0"].mean == pytest.approx(
+        plain.parameters["object.c0"].mean, rel=1e-3
+    )
+    assert other.parameters["crosstalk.w1"].mean == pytest.approx(
+        factor * plain.parameters["crosstalk.w1"].mean, rel=1e-3
+    )
