@@ -43,7 +43,8 @@ def create_app(settings: Settings | None = None, fold: Fold = posterior_fold) ->
     """
     settings = settings or Settings()
     pool = ProcessPool(settings.workers)
-    jobs = Jobs(fold, MemoryJobStore(settings.max_jobs), pool, running=settings.workers)
+    store = MemoryJobStore(settings.max_jobs, settings.max_draws_bytes)
+    jobs = Jobs(fold, store, pool, running=settings.workers)
     state = State(settings, jobs, anyio.CapacityLimiter(settings.threads))
 
     @asynccontextmanager

@@ -10,6 +10,9 @@
         ├── BodyTooLargeError
         ├── UnsupportedMediaTypeError
         ├── NotFoundError
+        ├── ConflictError              the resource is not in a state to be asked this
+        ├── GoneError                  it was there, and is kept no longer
+        ├── NotAcceptableError         no form that the client accepts
         ├── IdempotencyError           a key was used before with another request
         ├── BusyError                  the service takes no more work now
         └── WorkerDiedError            a task killed every worker that ran it
@@ -20,8 +23,11 @@ from simulator.errors import HybridTofError
 __all__ = [
     "BodyTooLargeError",
     "BusyError",
+    "ConflictError",
+    "GoneError",
     "IdempotencyError",
     "MalformedError",
+    "NotAcceptableError",
     "NotFoundError",
     "ServiceError",
     "UnsupportedMediaTypeError",
@@ -47,6 +53,18 @@ class UnsupportedMediaTypeError(ServiceError):
 
 class NotFoundError(ServiceError):
     """There is no such resource."""
+
+
+class ConflictError(ServiceError):
+    """The resource is not in a state in which it could answer this."""
+
+
+class GoneError(ServiceError):
+    """It was there, and is kept no longer."""
+
+
+class NotAcceptableError(ServiceError):
+    """No form of the resource is one that the client accepts."""
 
 
 class IdempotencyError(ServiceError):

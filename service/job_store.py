@@ -37,7 +37,7 @@ class JobRecord:
     cancel_requested : bool
         Whether to stop at the end of the chunk.
     checkpoint : bytes or None
-        State of the fold after the last whole chunk.
+        State of the fold after the last whole chunk; of a finished job until room is needed.
     progress : dict or None
         As sent to clients.
     wall_s, cpu_s : float
@@ -109,10 +109,14 @@ class MemoryJobStore:
     ----------
     capacity : int
         Records that are kept; finished ones make room, the oldest first.
+    draws_bytes : int
+        Bytes of the checkpoints of finished jobs that are kept, from which draws are made; the
+        oldest make room.
     """
 
-    def __init__(self, capacity: int) -> None:
+    def __init__(self, capacity: int, draws_bytes: int = 2**30) -> None:
         self._capacity = capacity
+        self._draws_bytes = draws_bytes
         self._lock = threading.Lock()
         self._records: dict[str, JobRecord] = {}
         self._sequence = 0
@@ -151,8 +155,19 @@ class MemoryJobStore:
             known = self._records.get(job_id)
             if known is None:
                 return None
-            self._records[job_id] = dataclasses.replace(known, **changes)
+            changed = dataclasses.replace(known, **changes)
+            self._records[job_id] = changed
+            if changed.status in FINISHED:
+                self._forget_draws()
             return self._records[job_id]
+
+    def _forget_draws(self) -> None:
+        kept = 0
+        for known in reversed(list(self._records.values())):
+            if known.status in FINISHED and known.checkpoint is not None:
+                kept += len(known.checkpoint)
+                if kept > self._draws_bytes:
+                    self._records[known.id] = dataclasses.replace(known, checkpoint=None)
 
     def delete(self, job_id: str) -> bool:
         """See `JobStore.delete`."""

@@ -14,7 +14,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from typing import Any, Protocol, TypeVar
 
-from service.errors import BusyError, NotFoundError
+from service.draws_formats import write_draws
+from service.errors import BusyError, ConflictError, GoneError, NotFoundError
 from service.job_store import FINISHED, JobRecord, JobStore
 from service.problems import describe
 from service.worker import timed
@@ -56,6 +57,9 @@ class Fold(Protocol):
 
     def summarise(self, job: Any, checkpoint: Any, wall_s: float, cpu_s: float, /) -> Any:
         """Return the posterior so far."""
+
+    def draw(self, job: Any, checkpoint: Any, /) -> Any:
+        """Return the job as it was sampled and its draws."""
 
 
 def _summary(summarise: Callable[..., Any], *arguments: Any) -> dict[str, Any]:
@@ -199,6 +203,44 @@ class Jobs:
         """Return jobs, newest first; see `JobStore.page`."""
         return await asyncio.to_thread(self._store.page, after, limit)
 
+    async def draws(self, job_id: str, media_type: str) -> bytes:
+        """Return the draws of a finished job, made anew from its last checkpoint.
+
+        Parameters
+        ----------
+        job_id : str
+            Which job.
+        media_type : str
+            One of `service.draws_formats.FORMATS`.
+
+        Returns
+        -------
+        bytes
+            A file.
+
+        Raises
+        ------
+        NotFoundError
+            Where there is none of that name.
+        ConflictError
+            Where the job has not ended, or ended without draws.
+        GoneError
+            Where the draws had to make room for others.
+        """
+        record = await self.get(job_id)
+        if record.status not in FINISHED:
+            raise ConflictError("the posterior is not finished: wait for it, or cancel it")
+        if record.status == "failed" or record.result is None:
+            raise ConflictError("this posterior ended before anything was drawn")
+        if record.checkpoint is None:
+            raise GoneError(
+                "the draws made room for those of other posteriors; the same request with this "
+                "seed gives the same draws"
+            )
+        fold = (self._fold.Job.from_bytes, self._fold.Checkpoint.from_bytes, self._fold.draw)
+        data, _ = await self._execute(write_draws, fold, media_type, record.job, record.checkpoint)
+        return data
+
     async def cancel(self, job_id: str) -> JobRecord:
         """End a job after the chunk that runs; one that has ended is left as it is.
 
@@ -315,5 +357,4 @@ class Jobs:
             }
         cancelled = known.cancel_requested and not progress.finished
         status = "cancelled" if cancelled else "done"
-        # nothing reads the checkpoint of a finished job
-        await self._save(record.id, status=status, result=result, checkpoint=None)
+        await self._save(record.id, status=status, result=result)

@@ -8,6 +8,9 @@ RefusedError               422    valid input for which no honest answer exists
 IdempotencyError           422    the key came before with another request
 MalformedError             400    not JSON, or an unreadable header or query parameter
 NotFoundError              404
+NotAcceptableError         406    no form that ``Accept`` names
+ConflictError              409    not in a state to be asked this
+GoneError                  410    was there, and is kept no longer
 BodyTooLargeError          413
 UnsupportedMediaTypeError  415
 BusyError                  503    with ``Retry-After``
@@ -32,8 +35,11 @@ from starlette.exceptions import HTTPException
 from service.errors import (
     BodyTooLargeError,
     BusyError,
+    ConflictError,
+    GoneError,
     IdempotencyError,
     MalformedError,
+    NotAcceptableError,
     NotFoundError,
     UnsupportedMediaTypeError,
 )
@@ -81,6 +87,9 @@ _KINDS: Mapping[type[HybridTofError], tuple[HTTPStatus, str, str]] = {
     IdempotencyError: (HTTPStatus(422), "idempotency", "The idempotency key was used before"),
     MalformedError: (HTTPStatus.BAD_REQUEST, "malformed", "The request cannot be read"),
     NotFoundError: (HTTPStatus.NOT_FOUND, "not-found", "There is no such resource"),
+    NotAcceptableError: (HTTPStatus(406), "not-acceptable", "There is no form that is accepted"),
+    ConflictError: (HTTPStatus.CONFLICT, "conflict", "This cannot be asked now"),
+    GoneError: (HTTPStatus.GONE, "gone", "It is kept no longer"),
     BodyTooLargeError: (HTTPStatus(413), "too-large", "The body is too large"),
     UnsupportedMediaTypeError: (
         HTTPStatus.UNSUPPORTED_MEDIA_TYPE,

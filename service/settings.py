@@ -27,6 +27,8 @@ class Settings(pydantic.BaseModel):
         Largest request body: a million frames of six columns need about 128 MiB.
     max_jobs : int
         Posteriors that are kept; finished ones make room for new ones, the oldest first.
+    max_draws_bytes : int
+        Memory for the draws of finished posteriors; the oldest make room.
     shutdown_s : float
         How long open requests may take to end after SIGTERM [s].
     """
@@ -37,6 +39,7 @@ class Settings(pydantic.BaseModel):
     threads: Count = 2
     max_body_bytes: Count = 128 * 2**20
     max_jobs: Count = 1000
+    max_draws_bytes: Count = 2**30
     shutdown_s: Annotated[float, pydantic.Field(ge=0, le=10)] = 5.0
 
     @classmethod

@@ -26,6 +26,7 @@ from inference.posterior.diagnostics import (
     effective_sample_size,
     split_r_hat,
 )
+from inference.posterior.draws import draw
 from inference.posterior.ensemble import Ensemble, advance, forget, new_ensemble
 from inference.posterior.importance import MAX_K_HAT, WeightedDraws, draw_weighted
 from inference.posterior.job import Checkpoint, Job, chains, prepare
@@ -53,6 +54,7 @@ __all__ = [
     "Piece",
     "Progress",
     "Task",
+    "draw",
     "merge",
     "prepare",
     "progress",

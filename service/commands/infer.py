@@ -30,6 +30,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--ensembles", type=int)
     parser.add_argument("--target-ess", type=int)
     parser.add_argument("--max-seconds", type=float)
+    parser.add_argument("--draws", type=Path, help="write the draws here, as .nc or .ndjson")
     parser.add_argument("--seed", type=int, help="left out: drawn and printed")
     parser.set_defaults(run=_run)
 
@@ -41,6 +42,7 @@ def _run(args: argparse.Namespace) -> int:
     from service.schemas import PosteriorRequest, SystemDescription
     from simulator.validated import parse
 
+    form = None if args.draws is None else _format_of(args.draws)
     system = read_document(SystemDescription, args.scene)
     columns = read_columns(args.frames)
     names = ("method", "ensembles", "target_ess", "max_seconds", "seed")
@@ -56,7 +58,9 @@ def _run(args: argparse.Namespace) -> int:
                 "sampler": sampler,
             },
         )
-        record = asyncio.run(_infer(request))
+        record, draws = asyncio.run(_infer(request, form))
+    if draws is not None:
+        args.draws.write_bytes(draws)
     write_result(json.dumps(full(record), allow_nan=False).encode())
     if record.problem is None:
         return 0
@@ -64,7 +68,19 @@ def _run(args: argparse.Namespace) -> int:
     return 3 if record.problem["status"] < 500 else 4
 
 
-async def _infer(request: "PosteriorRequest") -> "JobRecord":
+def _format_of(path: Path) -> str:
+    """Return the media type of a file, before any time is spent on what goes into it."""
+    from service.draws_formats import FORMATS
+    from simulator.errors import InvalidInputError, Problem
+
+    for form in FORMATS:
+        if path.suffix == form.suffix:
+            return form.media_type
+    known = " or ".join(form.suffix for form in FORMATS)
+    raise InvalidInputError(Problem(f"--draws {path}", f"draws are written as {known}"))
+
+
+async def _infer(request: "PosteriorRequest", form: str | None) -> tuple["JobRecord", bytes | None]:
     """Run one job of the service, without the service."""
     from inference.posterior import fold
     from service.checks import system_with_frames
@@ -83,7 +99,10 @@ async def _infer(request: "PosteriorRequest") -> "JobRecord":
             if progress is not None and progress != seen:
                 _show(progress)
                 seen = progress
-        return await jobs.get(record.id)
+        record = await jobs.get(record.id)
+        if form is None or record.problem is not None:
+            return record, None
+        return record, await jobs.draws(record.id, form)
     finally:
         await jobs.close()
 

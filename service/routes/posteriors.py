@@ -10,7 +10,8 @@ from fastapi.responses import JSONResponse, Response
 
 from service.bodies import body_of, openapi_body
 from service.checks import system_with_frames
-from service.errors import MalformedError
+from service.draws_formats import FORMATS, accepted_format
+from service.errors import MalformedError, NotAcceptableError
 from service.posterior_json import brief, full
 from service.problems import problem_responses
 from service.schemas import PosteriorPage, PosteriorRequest, PosteriorResponse
@@ -81,6 +82,27 @@ async def page(
 async def get(request: Request, job_id: str) -> Response:
     """Return a posterior as it stands."""
     return JSONResponse(full(await state_of(request).jobs.get(job_id)))
+
+
+@router.get(
+    "/{job_id}/draws",
+    response_model=None,
+    response_class=Response,
+    responses={
+        200: {"content": {form.media_type: {} for form in FORMATS}},
+        **problem_responses(404, 406, 409, 410),
+    },
+)
+async def draws(request: Request, job_id: str) -> Response:
+    """Return the draws of a finished posterior as NetCDF that ArviZ reads, or as NDJSON."""
+    form = accepted_format(",".join(request.headers.getlist("accept")))
+    if form is None:
+        names = " or ".join(form.media_type for form in FORMATS)
+        raise NotAcceptableError(f"draws come as {names}")
+    data = await state_of(request).jobs.draws(job_id, form.media_type)
+    name = f'attachment; filename="{job_id}{form.suffix}"'
+    headers = {"Content-Disposition": name, "Vary": "Accept"}
+    return Response(data, headers=headers, media_type=form.media_type)
 
 
 @router.post(

@@ -16,6 +16,7 @@ from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
+from tests.service import drawn
 
 CHUNKS = 6
 STEPS = 10
@@ -42,6 +43,7 @@ class Job:
 class Checkpoint:
     chunk: int
     sums: tuple[float, ...]
+    method: str = "emcee"
 
     def to_bytes(self) -> bytes:
         out = io.BytesIO()
@@ -164,3 +166,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
             "runtime": {"wall_s": wall_s, "cpu_s": cpu_s, "likelihood_calls": 1, "k_hat": None},
         }
     )
+
+
+def draw(_: Job, checkpoint: Checkpoint) -> tuple[Any, Any]:
+    return drawn.job(), drawn.draws(checkpoint.chunk)

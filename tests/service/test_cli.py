@@ -122,6 +122,7 @@ def test_errors_name_file_and_field(
             "--seed: ",
         ),
         (("infer", frames, "--scene", scene, "--ensembles", "0"), "sampler#/ensembles: "),
+        (("infer", frames, "--scene", scene, "--draws", "draws.csv"), "--draws draws.csv: "),
         (
             ("infer", bad(tmp_path, "f.csv", "w1\n1\n"), "--scene", scene),
             "f.csv#/w2: is missing",

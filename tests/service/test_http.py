@@ -325,6 +325,40 @@ async def test_cancel(client: httpx.AsyncClient, request_body: dict[str, Any]) -
     assert (await ended(client, location))["status"] == "cancelled"
 
 
+async def test_draws(client: httpx.AsyncClient, request_body: dict[str, Any]) -> None:
+    fake_fold.order(sleep=0.02)
+    location = (await client.post("/v1/posteriors", json=request_body)).headers["location"]
+    assert_problem(await client.get(location + "/draws"), 409)
+    assert (await ended(client, location))["status"] == "done"
+    netcdf = await client.get(location + "/draws")
+    assert netcdf.status_code == 200
+    assert netcdf.headers["content-type"] == "application/x-netcdf"
+    assert netcdf.headers["vary"] == "Accept"
+    assert netcdf.headers["content-disposition"].endswith('.nc"')
+    assert netcdf.content.startswith(b"\x89HDF")
+    ndjson = await client.get(location + "/draws", headers={"Accept": "application/x-ndjson"})
+    assert ndjson.headers["content-type"] == "application/x-ndjson"
+    drawn = [json.loads(line) for line in ndjson.text.splitlines()]
+    assert {"ensemble", "walker", "step", "parameters"} <= drawn[0].keys()
+    refused = await client.get(location + "/draws", headers={"Accept": "application/json"})
+    assert_problem(refused, 406)
+    assert_problem(await client.get("/v1/posteriors/none/draws"), 404)
+
+
+async def test_draws_that_were_dropped(request_body: dict[str, Any]) -> None:
+    fake_fold.order()
+    app = create_app(Settings(workers=1, max_draws_bytes=1), fake_fold)
+    async with (
+        app.router.lifespan_context(app),
+        httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://test") as http,
+    ):
+        location = (await http.post("/v1/posteriors", json=request_body)).headers["location"]
+        assert (await ended(http, location))["status"] == "done"
+        response = await http.get(location + "/draws")
+    assert_problem(response, 410)
+    assert "seed" in response.json()["detail"]
+
+
 async def test_idempotency_key(client: httpx.AsyncClient, request_body: dict[str, Any]) -> None:
     key = {"Idempotency-Key": "one"}
     first = await client.post("/v1/posteriors", json=request_body, headers=key)

@@ -1,10 +1,12 @@
 """The real posterior through the service: its shape, and what survives a kill."""
 
 import asyncio
+import io
 import os
 import signal
 from typing import Any
 
+import h5netcdf
 import httpx
 import pytest
 
@@ -52,6 +54,12 @@ async def test_over_http() -> None:
         location = response.headers["location"]
         while (body := (await client.get(location)).json())["status"] in {"queued", "running"}:
             await asyncio.sleep(0.2)
+        netcdf = (await client.get(location + "/draws")).content
+    with h5netcdf.File(io.BytesIO(netcdf), "r") as file:
+        drawn = file["posterior"]["object.c0"][...].ravel()
+        assert file["posterior_predictive"]["range_m"].shape[2] == 40
+    # made anew from the checkpoint: the draws that the summary is of
+    assert body["parameters"]["object.c0"]["mean"] == pytest.approx(drawn.mean(), rel=1e-12)
     assert body["status"] == "done", body
     assert body["seed"] == 2
     answer = PosteriorResponse.model_validate(body)
