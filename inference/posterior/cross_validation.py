@@ -23,7 +23,8 @@ Array = NDArray[np.float64]
 _DRAWS = 2000
 _MOST_EVALUATIONS = 200_000  # of a frame, in one round: fewer draws where frames are many
 _LEAST_DRAWS = 400
-_CONDITIONAL_DRAWS = 300
+_DEPENDENT_DRAWS = 300  # where frames depend on one another given the parameters
+_MOST_DEPENDENT = 60  # frames, each of which is then left out in turn
 _MOST_INFLUENTIAL = 6  # frames; the others keep a k-hat that says what they are worth
 _ROUNDS = 3
 
@@ -36,6 +37,13 @@ def _without(density: CollapsedDensity, frame: int) -> CollapsedDensity:
         frames=np.delete(density.frames, frame, axis=0),
         present=None if present is None else np.delete(present, frame),
     )
+
+
+def _given_others(density: CollapsedDensity, z: Array, frame: int) -> Array:
+    """Return log p(y_frame | the other frames, z), shape (len(z),)."""
+    if type(density) is CollapsedDensity:  # frames are independent given z
+        return density.frame_log_likelihoods(z)[:, frame]
+    return density.log_likelihood(z) - _without(density, frame).log_likelihood(z)
 
 
 def _predict(
@@ -56,13 +64,24 @@ def _predict(
         if weighted.k_hat < k_hat:
             inside = weighted.weights > 0
             logs = np.log(weighted.weights[inside])
-            found = density.frame_log_likelihoods(weighted.z[inside])[:, frame]
+            found = _given_others(density, weighted.z[inside], frame)
             calls += len(found)
             best, k_hat = float(special.logsumexp(logs + found)), weighted.k_hat
         if k_hat < MAX_K_HAT or not np.isfinite(weighted.log_evidence):
             break
         pilot = weighted.z[resample(weighted, rng, _DRAWS)]
     return best, k_hat, calls
+
+
+def _draws(weighed: Weighed, independent: bool, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Return not too many of the draws, and the logs of their weights."""
+    kept = np.flatnonzero(np.isfinite(weighed.log_weights))
+    logs = weighed.log_weights[kept]
+    if independent:
+        chosen = np.linspace(0, kept.size - 1, min(kept.size, _DRAWS)).astype(int)
+        return weighed.z[kept[chosen]], logs[chosen]
+    chosen = rng.choice(kept.size, size=_DEPENDENT_DRAWS, p=special.softmax(logs))
+    return weighed.z[kept[chosen]], np.zeros(_DEPENDENT_DRAWS)
 
 
 def cross_validate(
@@ -82,23 +101,26 @@ def cross_validate(
     Returns
     -------
     LeaveOneOut
-        Minus infinity throughout where no parameters explain the frames.
+        Minus infinity throughout where no parameters explain the frames; nan with k-hat infinite
+        where frames depend on one another and are too many to be left out one by one.
     int
         Density evaluations.
     """
     n = len(density.frames)
     if not np.isfinite(weighed.evidence.log_evidence):
         return LeaveOneOut(np.full(n, -np.inf), np.full(n, -np.inf)), 0
+    independent = type(density) is CollapsedDensity  # frames, given z
+    if not independent and n > _MOST_DEPENDENT:
+        return LeaveOneOut(np.full(n, np.nan), np.full(n, np.inf)), 0
+    z, log_weights = _draws(weighed, independent, rng)
+    if independent:
+        likelihoods, calls = density.frame_log_likelihoods(z), len(z)
+    else:
+        columns = [_given_others(density, z, frame) for frame in range(n)]
+        likelihoods, calls = np.column_stack(columns), 2 * n * len(z)
     if len(density.parameters) == 0:
-        # nothing that other frames could tell: a frame's density is the predictive one
-        return LeaveOneOut(density.frame_log_likelihoods(weighed.z)[0], np.full(n, -np.inf)), 1
-    kept = np.flatnonzero(np.isfinite(weighed.log_weights))
-    if kept.size > _DRAWS:
-        kept = kept[np.linspace(0, kept.size - 1, _DRAWS).astype(int)]
-    z = weighed.z[kept]
-    likelihoods = density.frame_log_likelihoods(z)
-    found = leave_one_out(likelihoods, weighed.log_weights[kept])
-    calls = len(z)
+        return LeaveOneOut(likelihoods[0], np.full(n, -np.inf)), calls
+    found = leave_one_out(likelihoods, log_weights)
     influential = np.flatnonzero(found.k_hat > MAX_K_HAT)
     influential = influential[np.argsort(-found.k_hat[influential])][:_MOST_INFLUENTIAL]
     if weighed.laplace is None or n < 2 or not np.isfinite(likelihoods).all():
@@ -106,7 +128,7 @@ def cross_validate(
     predictive, k_hat = found.log_predictive.copy(), found.k_hat.copy()
     for frame in influential:
         # the square root of the weights: half the way to the posterior without the frame
-        logs = weighed.log_weights[kept] - 0.5 * likelihoods[:, frame]
+        logs = log_weights - 0.5 * likelihoods[:, frame]
         weights = np.exp(logs - logs.max())
         pilot = z[rng.choice(len(z), size=_DRAWS, p=weights / weights.sum())]
         value, shape, used = _predict(density, int(frame), weighed.laplace, pilot, rng)

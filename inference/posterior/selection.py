@@ -237,7 +237,12 @@ class _Comparison:
         spread = "" if math.isnan(self.predictive_error) else f" +- {self.predictive_error:.1f}"
         text = (
             f"with it the log evidence changes by {self.evidence:+.1f} +- {self.evidence_error:.1f}"
-            f" (demanded above {EVIDENCE_MARGIN:.1f}) and the cross-validated log predictive "
+            f" (demanded above {EVIDENCE_MARGIN:.1f})"
+        )
+        if not math.isfinite(self.predictive):
+            return text + ", and the cross-validated log predictive density is not known"
+        text += (
+            f" and the cross-validated log predictive "
             f"density by {self.predictive:+.1f}{spread} (demanded above {PREDICTIVE_MARGIN:.0f})"
         )
         if not self.predictive_trusted:

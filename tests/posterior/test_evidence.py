@@ -15,8 +15,10 @@ from inference.posterior.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.cross_validation import cross_validate
 from inference.posterior.evidence import log_prior_mass, weigh
 from inference.posterior.leave_one_out import leave_one_out
+from inference.posterior.static import with_common_range
 from simulator.parameters import parameters_of
 from simulator.scene import parse_scene
+from simulator.simulate import mean_readings
 from tests.posterior.scenes import OBJECT, data, sensor_of
 
 Array = NDArray[np.float64]
@@ -116,6 +118,31 @@ def test_every_frame_is_predicted_as_by_quadrature_without_it(name: str) -> None
         # 2000 draws, weights of k-hat below 0.7: a few percent
         assert found.k_hat[j] < 0.7
         assert found.log_predictive[j] == pytest.approx(wanted, abs=0.2)
+
+
+def test_frames_at_one_range_are_predicted_given_the_others() -> None:
+    """A static object, nothing unknown but its range: the predictive density in closed form.
+
+    Frames with independent additive noise depend on one another through the range alone.
+    """
+    sensor = sensor_of("pulsed", 300.0)
+    frames = data(sensor, frames=6, span=(0.7, 0.7000001)).frames
+    density = with_common_range(
+        collapsed_density(sensor, parse_scene({"object": OBJECT, "motion": "static"}), frames)
+    )
+    found, _ = cross_validate(
+        density, weigh(density, np.random.default_rng(0)), np.random.default_rng(1)
+    )
+    u = np.linspace(math.log(0.69), math.log(0.71), 20_001)
+    means = mean_readings(sensor, density.parameters.terms(np.empty((1, 0))), np.exp(u))
+    read = np.array(sensor.noise.read)
+    residual = (frames.readings[:, None] - means) / read
+    single = -0.5 * (residual**2).sum(axis=2) - np.log(read).sum() - math.log(2 * math.pi)
+    whole = special.logsumexp(single.sum(axis=0))
+    for j in range(6):
+        rest = special.logsumexp(np.delete(single, j, axis=0).sum(axis=0))
+        # the loguniform prior is flat over u; the integrals are good to 1e-6
+        assert found.log_predictive[j] == pytest.approx(whole - rest, abs=1e-4)
 
 
 def test_scale_of_readings_shifts_the_evidence_by_its_jacobian_alone() -> None:
