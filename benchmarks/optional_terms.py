@@ -85,10 +85,7 @@ def main() -> None:
                 ]
             shares = " | ".join(f"{count:.0f} of {options.sets}" for count in counts)
             seconds = (time.process_time() - began) / options.sets
-            print(
-                f"| {sensor.kind} | {term} | {strength:g} | {shares} | {seconds:.1f} |",
-                flush=True,
-            )
+            print(f"| {term} | {strength:g} | {shares} | {seconds:.1f} |", flush=True)
 
 
 if __name__ == "__main__":
