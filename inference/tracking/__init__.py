@@ -1,0 +1,1 @@
+"""Streams: a multi-hypothesis filter in (log r, rate)."""

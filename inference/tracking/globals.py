@@ -1,0 +1,112 @@
+"""What is known of the scene besides the range: a centre, and independent directions around it."""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.posterior.posterior import Posterior
+from simulator.errors import InvalidInputError, RefusedError
+from simulator.parameters import Parameters, Terms
+
+__all__ = ["Globals", "globals_of"]
+
+Array = NDArray[np.float64]
+
+_FEWEST_DRAWS = 20  # a direction
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Globals:
+    """A normal law of the unknowns, in the coordinates in which their prior is normal.
+
+    Attributes
+    ----------
+    centre : Terms
+        Physical values at its mean.
+    plus, minus : tuple of Terms
+        One standard deviation away on either side along each principal direction. The readings'
+        change with a direction is taken as a secant between the two, which feels the curvature.
+    """
+
+    centre: Terms
+    plus: tuple[Terms, ...]
+    minus: tuple[Terms, ...]
+
+
+def globals_of(
+    parameters: Parameters,
+    posterior: Posterior | Array | None,
+    learnt: tuple[str, ...],
+) -> Globals:
+    """Summarise what is known of the unknowns.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        The scene's unknowns.
+    posterior : Posterior or ndarray, shape (draws, d), optional
+        Draws in SI units in the order of ``parameters.names``, or a posterior of this scene.
+    learnt : tuple of str
+        Unknowns that need no posterior.
+
+    Returns
+    -------
+    Globals
+
+    Raises
+    ------
+    InvalidInputError
+        Where the draws are not finite, too few, or of another scene.
+    RefusedError
+        Where something is unknown and there is no posterior.
+    """
+    names = parameters.names
+    free = [name for name in names if name not in learnt and not name.startswith("range_m.")]
+    origin = np.zeros(len(names))
+    if posterior is None:
+        if free:
+            raise RefusedError(
+                f"{', '.join(free)} unknown: a tracker needs numbers or a posterior; infer one "
+                "from frames of this scene first, and pass it"
+            )
+        return Globals(parameters.terms(origin[None]), (), ())
+    draws = _draws(parameters, posterior)
+    with np.errstate(all="ignore"):
+        z = parameters.standard(draws)
+    if not np.isfinite(z).all():
+        raise InvalidInputError.at("/posterior", "holds draws outside the scene's priors")
+    centre = z.mean(axis=0)
+    _, sizes, directions = np.linalg.svd(z - centre, full_matrices=False)
+    roots = directions * (sizes / np.sqrt(len(z) - 1.0))[:, None]
+    roots = roots[sizes > 1e-12 * sizes.max(initial=0.0)]
+    return Globals(
+        parameters.terms(centre[None]),
+        tuple(parameters.terms((centre + root)[None]) for root in roots),
+        tuple(parameters.terms((centre - root)[None]) for root in roots),
+    )
+
+
+def _draws(parameters: Parameters, posterior: Posterior | Array) -> Array:
+    """Check draws and bring them into shape (n, d)."""
+    names = parameters.names
+    if isinstance(posterior, Posterior):
+        if posterior.draws.names != names:
+            raise InvalidInputError.at(
+                "/posterior",
+                f"is of {', '.join(posterior.draws.names)}, the scene's unknowns are "
+                f"{', '.join(names) or 'none'}",
+            )
+        draws = posterior.draws.parameters.reshape(-1, len(names))
+    else:
+        draws = np.asarray(posterior, dtype=np.float64)
+    if draws.ndim != 2 or draws.shape[1] != len(names):
+        raise InvalidInputError.at(
+            "/posterior", f"must have a column for each of {', '.join(names) or 'no unknowns'}"
+        )
+    if len(draws) < _FEWEST_DRAWS * max(len(names), 1):
+        wanted = _FEWEST_DRAWS * max(len(names), 1)
+        raise InvalidInputError.at("/posterior", f"holds {len(draws)} draws, needs {wanted}")
+    if not np.isfinite(draws).all():
+        raise InvalidInputError.at("/posterior", "holds draws that are not finite")
+    return draws

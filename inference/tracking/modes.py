@@ -1,0 +1,307 @@
+"""Where a frame and what is known before it agree: all modes along the range, and their mass."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.tracking.curve import (
+    GLOBALS,
+    Curve,
+    Prior,
+    Triple,
+    add_factor,
+    log_density,
+    mean_at,
+)
+from simulator.compiled import compiled
+
+__all__ = ["CHOICE_COLUMNS", "REACH", "find_choices"]
+
+Array = NDArray[np.float64]
+
+REACH = 7.0  # standard deviations of a prediction that are searched
+CHOICE_COLUMNS = 6  # log mass, mean, standard deviation, mode, its scale, parent
+_CLOSE = 0.05  # standard deviations within which a mode has to be found
+_GAUSSIAN = 0.4  # nats by which a peak may leave its parabola at sqrt(3) standard deviations
+_DROP = 18.0  # nats below the top where a numerical integral ends
+_INTERVALS = 32  # of Simpson's rule on either side of a mode
+_ROOT3 = math.sqrt(3.0)
+_LOG_ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
+
+
+@compiled
+def _climb_plain(
+    u: float,
+    low: float,
+    high: float,
+    first: float,
+    second: float,
+    prior: Prior,
+    root: Triple,
+    curve: Curve,
+) -> tuple[float, float]:
+    """Climb by bracketed Gauss-Newton where the covariance is constant; the mode and its scale."""
+    curvature = 0.0
+    moved = high - low
+    for _ in range(60):
+        value1, value2, slope1, slope2 = mean_at(u, curve)
+        away = 0.0 if prior.born else u - prior.centre
+        e1 = first - prior.gain * value1 - prior.offset1 - prior.slope1 * away
+        e2 = second - prior.gain * value2 - prior.offset2 - prior.slope2 * away
+        t1 = (prior.gain * slope1 + prior.slope1) / root[0]
+        t2 = (prior.gain * slope2 + prior.slope2 - root[1] * t1) / root[2]
+        z1 = e1 / root[0]
+        z2 = (e2 - root[1] * z1) / root[2]
+        precision = 0.0 if prior.born else prior.precision
+        slope = t1 * z1 + t2 * z2 - away * precision
+        curvature = t1 * t1 + t2 * t2 + precision
+        if slope > 0.0:
+            low = u
+        else:
+            high = u
+        step = slope / curvature if curvature > 0.0 else math.inf
+        if abs(step) * math.sqrt(curvature) < _CLOSE or high - low < 1e-15 * (1.0 + abs(u)):
+            break
+        trial = u + step
+        # Gauss-Newton overshoots where residuals are large: steps must shrink, or halve
+        if not low < trial < high or abs(step) > 0.7 * moved:
+            trial = 0.5 * (low + high)
+        moved = abs(trial - u)
+        u = trial
+    return u, 1.0 / math.sqrt(curvature) if curvature > 0.0 else high - low
+
+
+@compiled
+def _climb(
+    u: float,
+    low: float,
+    high: float,
+    scale: float,
+    first: float,
+    second: float,
+    prior: Prior,
+    spread: Array,
+    curve: Curve,
+) -> tuple[float, float]:
+    """Climb by bracketed Newton with differences: the covariance changes along the way."""
+    moved = high - low
+    for _ in range(60):
+        h = 0.3 * scale
+        middle = log_density(u, first, second, prior, spread, curve)
+        right = log_density(u + h, first, second, prior, spread, curve)
+        left = log_density(u - h, first, second, prior, spread, curve)
+        if left == -math.inf or right == -math.inf:
+            # at an end of the support: one side alone tells the way
+            if max(left, right) <= middle or h < 1e-15 * (1.0 + abs(u)):
+                scale *= 0.5
+                if h < 1e-3 * (high - low) or h < 1e-15 * (1.0 + abs(u)):
+                    return u, scale
+                continue
+            slope, curvature = right - left, 0.0
+        else:
+            slope = (right - left) / (2.0 * h)
+            curvature = -(right - 2.0 * middle + left) / (h * h)
+        if slope > 0.0:
+            low = u
+        else:
+            high = u
+        if curvature > 0.0:
+            scale = min(1.0 / math.sqrt(curvature), 3.0 * scale)
+            trial = u + slope / curvature
+            if abs(trial - u) < _CLOSE * scale and scale * curvature * scale > 0.5:
+                break
+        else:
+            trial = math.inf
+        if high - low < 1e-15 * (1.0 + abs(u)):
+            break
+        if not low < trial < high or abs(trial - u) > 0.7 * moved:
+            trial = 0.5 * (low + high)
+        moved = abs(trial - u)
+        scale = min(scale, max(moved, 1e-3 * scale))
+        u = trial
+    return u, scale
+
+
+@compiled
+def _edge(
+    u: float,
+    top: float,
+    end: float,
+    scale: float,
+    first: float,
+    second: float,
+    prior: Prior,
+    spread: Array,
+    curve: Curve,
+) -> float:
+    """Return where the density has fallen to nothing on the way from a mode to an end."""
+    step = math.copysign(scale, end - u)
+    at = u
+    while abs(end - at) > abs(step):
+        at += step
+        if log_density(at, first, second, prior, spread, curve) < top - _DROP:
+            return at
+        step *= 1.5
+    return end
+
+
+@compiled
+def _integrate(
+    choices: Array,
+    place: int,
+    u: float,
+    scale: float,
+    low: float,
+    high: float,
+    first: float,
+    second: float,
+    prior: Prior,
+    spread: Array,
+    curve: Curve,
+) -> None:
+    """Fill log mass, mean and standard deviation of one mode between its valleys.
+
+    Three Gauss-Hermite nodes where the peak is near a Gaussian, which is exact to the fifth power
+    of the distance; otherwise, as at folds and at ends of the support, Simpson's rule.
+    """
+    top = log_density(u, first, second, prior, spread, curve)
+    choices[place, 3], choices[place, 4] = u, scale
+    if u - _ROOT3 * scale >= low and u + _ROOT3 * scale <= high:
+        left = log_density(u - _ROOT3 * scale, first, second, prior, spread, curve) - top + 1.5
+        right = log_density(u + _ROOT3 * scale, first, second, prior, spread, curve) - top + 1.5
+        if abs(left) < _GAUSSIAN and abs(right) < _GAUSSIAN:
+            left, right = math.exp(left), math.exp(right)
+            mass = (4.0 + left + right) / 6.0
+            shift = _ROOT3 * (right - left) / (6.0 * mass)
+            square = 0.5 * (left + right) / mass - shift * shift
+            choices[place, 0] = top + math.log(mass * scale) + _LOG_ROOT_2PI
+            choices[place, 1] = u + shift * scale
+            choices[place, 2] = scale * math.sqrt(square)
+            return
+    begin = _edge(u, top, low, scale, first, second, prior, spread, curve)
+    end = _edge(u, top, high, scale, first, second, prior, spread, curve)
+    total, mean, square = 0.0, 0.0, 0.0
+    for side in range(2):
+        width = ((begin if side == 0 else end) - u) / _INTERVALS
+        for k in range(_INTERVALS + 1):
+            weight = 1.0 if k in (0, _INTERVALS) else (4.0 if k % 2 == 1 else 2.0)
+            away = k * width
+            density = log_density(u + away, first, second, prior, spread, curve)
+            part = weight * abs(width) / 3.0 * math.exp(min(density - top, 50.0))
+            total += part
+            mean += part * away
+            square += part * away * away
+    if not total > 0.0:
+        choices[place, 0] = -math.inf
+        return
+    mean /= total
+    choices[place, 0] = top + math.log(total)
+    choices[place, 1] = u + mean
+    choices[place, 2] = math.sqrt(max(square / total - mean * mean, 0.0))
+
+
+@compiled
+def _place(choices: Array, count: int) -> int:
+    """Return where the next choice goes: the end, or the place of the lightest one."""
+    if count < choices.shape[0]:
+        return count
+    lightest = 0
+    for j in range(count):
+        if choices[j, 0] < choices[lightest, 0]:
+            lightest = j
+    return lightest
+
+
+@compiled
+def find_choices(
+    choices: Array,
+    count: int,
+    parent: float,
+    first: float,
+    second: float,
+    prior: Prior,
+    spread: Array,
+    curve: Curve,
+    scan: Array,
+    next_scan: NDArray[np.int64],
+    values: Array,
+) -> int:
+    """Append every mode of a frame under one prior to a list.
+
+    Parameters
+    ----------
+    choices : ndarray, shape (capacity, CHOICE_COLUMNS)
+        The list; where it is full, its lightest member gives way.
+    count : int
+        Its length so far.
+    parent : float
+        What the last column says.
+    first, second : float
+        Readings in units of the read noise.
+    prior, spread, curve
+        As for `log_density`.
+    scan : ndarray, shape (s,)
+        Log ranges between which the curve is near straight, ascending from its start to its end.
+    next_scan : ndarray of int, shape (knots,)
+        Index of the first of them at or after each knot.
+    values : ndarray, shape (at least s + 2, 2)
+        Overwritten.
+
+    Returns
+    -------
+    int
+        The new length.
+    """
+    low, high, width = curve.start, curve.end, curve.end - curve.start
+    if not prior.born:
+        width = 1.0 / math.sqrt(prior.precision)
+        low = max(low, prior.centre - REACH * width)
+        high = min(high, prior.centre + REACH * width)
+        if not low < high:  # gone beyond the support
+            return count
+    plain = curve.plain and not curve.by_rate
+    plain = plain and not (prior.born and curve.table.shape[1] > GLOBALS)
+    root = add_factor((1.0, 0.0, 1.0), prior.root11, prior.root21)
+    root = add_factor(root, 0.0, prior.root22)
+    k = next_scan[min(max(int((low - curve.start) / curve.step), 0), next_scan.size - 1)]
+    values[0, 0] = low
+    points = 1
+    while k < scan.size and scan[k] < high:
+        if scan[k] > low:
+            values[points, 0] = scan[k]
+            points += 1
+        k += 1
+    values[points, 0] = high
+    points += 1
+    # with one knot within reach the curve is near straight over all of it
+    single = points <= 3 and not prior.born
+    if not single:
+        for j in range(points):
+            values[j, 1] = log_density(values[j, 0], first, second, prior, spread, curve)
+    valley = 0
+    for j in range(1 if single else points):
+        start, below, above = min(max(prior.centre, low), high), low, high
+        left, right = low, high
+        if not single:
+            before = values[j - 1, 1] if j > 0 else -math.inf
+            after = values[j + 1, 1] if j + 1 < points else -math.inf
+            if not before <= values[j, 1] > after:
+                continue
+            last = j
+            while last + 1 < points and values[last + 1, 1] <= values[last, 1]:
+                last += 1
+            left, right = values[valley, 0], values[last, 0]
+            valley = last
+            start = values[j, 0]
+            below, above = values[max(j - 1, 0), 0], values[min(j + 1, points - 1), 0]
+        if plain:
+            u, scale = _climb_plain(start, below, above, first, second, prior, root, curve)
+        else:
+            scale = min(width, above - below)
+            u, scale = _climb(start, below, above, scale, first, second, prior, spread, curve)
+        place = _place(choices, count)
+        _integrate(choices, place, u, scale, left, right, first, second, prior, spread, curve)
+        choices[place, 5] = parent
+        count = max(count, place + 1)
+    return count

@@ -1,0 +1,128 @@
+"""What happens between frames: the object moves, leaves, or comes.
+
+The rate v = d log r / dt is an Ornstein-Uhlenbeck process, so that after a gap of any length the
+prediction is neither too sure nor endlessly wide; presence is a Markov chain of two states.
+"""
+
+import math
+from typing import NamedTuple
+
+from inference.tracking.curve import Triple
+from simulator.compiled import compiled
+
+__all__ = ["Presence", "Rules", "motion_over", "presence_over"]
+
+
+class Rules(NamedTuple):
+    """Numbers that the filter's kernels need besides the curve.
+
+    Attributes
+    ----------
+    leave, arrive : float
+        Rates at which an object leaves and comes [1/s].
+    rate_sd, rate_time : float
+        Standard deviation [1/s] and correlation time [s] of d log r / dt.
+    drift1, drift2 : float
+        Drift of the crosstalk, in units of the read noise per square root of a second.
+    outlier : float
+        Probability that a frame's readings have nothing to do with the scene.
+    breadth : float
+        Width of the Cauchy law that such readings follow around what was expected, in units of the
+        noise.
+    log_negligible : float
+        Log weight below which a hypothesis is dropped.
+    same : float
+        Information lost, in nats per weight of the lighter one, below which two hypotheses merge.
+    memory : float
+        Share of the running surprise that a frame leaves as it was.
+    most_surprise : float
+        Surprise at which a single frame is cut.
+    unique_above : float
+        Weight, given that an object is there, above which one range is the answer.
+    """
+
+    leave: float
+    arrive: float
+    rate_sd: float
+    rate_time: float
+    drift1: float
+    drift2: float
+    outlier: float
+    breadth: float
+    log_negligible: float
+    same: float
+    memory: float
+    most_surprise: float
+    unique_above: float
+
+
+class Presence(NamedTuple):
+    """Probabilities over one time step.
+
+    Attributes
+    ----------
+    arrived : float
+        From absent to present.
+    left : float
+        From present to absent.
+    stayed : float
+        The same object stayed.
+    replaced : float
+        Present before and after, but left in between.
+    """
+
+    arrived: float
+    left: float
+    stayed: float
+    replaced: float
+
+
+@compiled
+def presence_over(seconds: float, leave: float, arrive: float) -> Presence:
+    """Return the presence chain's probabilities, right to rounding also for short steps."""
+    both = leave + arrive
+    change = -math.expm1(-both * seconds)
+    left = leave / both * change
+    gone = -math.expm1(-leave * seconds)
+    return Presence(arrive / both * change, left, 1.0 - gone, max(gone - left, 0.0))
+
+
+@compiled
+def motion_over(seconds: float, sd: float, time: float) -> tuple[float, float, Triple]:
+    """Return how (u, v) moves: carry, decay, and the triangular root of the noise that enters.
+
+    u grows by carry v and v shrinks by the factor decay (integrated Ornstein-Uhlenbeck process).
+
+    Parameters
+    ----------
+    seconds : float
+        Time step [s].
+    sd, time : float
+        Standard deviation [1/s] and correlation time [s] of v.
+    """
+    x = seconds / time
+    fall = -math.expm1(-x)
+    decay = 1.0 - fall
+    if x < 0.1:
+        # 2 x - 3 + 4 exp(-x) - exp(-2 x), whose first three orders cancel
+        square = x**3 * (
+            2.0 / 3.0
+            + x
+            * (
+                -0.5
+                + x
+                * (
+                    7.0 / 30.0
+                    + x
+                    * (-1.0 / 12.0 + x * (31.0 / 1260.0 + x * (-1.0 / 160.0 + x * 127.0 / 90720.0)))
+                )
+            )
+        )
+    else:
+        square = 2.0 * x - 3.0 + 4.0 * decay - decay * decay
+    first = sd * time * math.sqrt(square)
+    if not first > 0.0:
+        return time * fall, decay, (0.0, 0.0, 0.0)
+    mixed = sd * fall * fall / math.sqrt(square)
+    rest = -sd * sd * math.expm1(-2.0 * x) - mixed * mixed
+    return time * fall, decay, (first, mixed, math.sqrt(max(rest, 0.0)))

@@ -1,0 +1,165 @@
+"""What the filter says of a frame."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.estimates import Status
+from simulator.compiled import compiled
+
+__all__ = [
+    "BEST",
+    "CROSSTALK",
+    "HYPOTHESES",
+    "HYPOTHESIS_COLUMNS",
+    "OUTLIER",
+    "POSITION",
+    "PRESENT",
+    "RATE",
+    "RATE_SD",
+    "REPORT_COLUMNS",
+    "SD",
+    "STATIC_SD",
+    "STATUS",
+    "SURPRISE",
+    "WEIGHT",
+    "report",
+]
+
+Array = NDArray[np.float64]
+
+# columns of a report
+STATUS, PRESENT, OUTLIER, SURPRISE, HYPOTHESES, BEST, CROSSTALK, REPORT_COLUMNS = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    11,
+    15,
+)
+# columns of a hypothesis, and of the best range: u, its sd, the part of it that is from globals,
+# rate, its sd, weight (of the best range given that an object is there)
+POSITION, SD, STATIC_SD, RATE, RATE_SD, WEIGHT, HYPOTHESIS_COLUMNS = range(7)
+_UNIQUE, _AMBIGUOUS, _NONE = int(Status.UNIQUE), int(Status.AMBIGUOUS), int(Status.NONE)
+
+
+@compiled
+def _describe(rows: Array, i: int, at: int, x: Array, X: Array, weight: Array, j: int) -> None:
+    """Fill one row of the hypotheses."""
+    own, common, rate = 0.0, 0.0, 0.0
+    n = x.shape[1]
+    for k in range(X.shape[2]):
+        square = X[j, 0, k] * X[j, 0, k]
+        if k >= n:
+            common += square
+        own += square
+        rate += X[j, 1, k] * X[j, 1, k]
+    rows[i, at, POSITION], rows[i, at, SD], rows[i, at, STATIC_SD] = (
+        x[j, 0],
+        math.sqrt(own),
+        math.sqrt(common),
+    )
+    rows[i, at, RATE], rows[i, at, RATE_SD], rows[i, at, WEIGHT] = (
+        x[j, 1],
+        math.sqrt(rate),
+        weight[j],
+    )
+
+
+@compiled
+def _pool(out: Array, rows: Array, i: int, first: int, last: int, total: float) -> None:
+    """Fill the mean and standard deviations of a group of hypotheses."""
+    u, static, rate = 0.0, 0.0, 0.0
+    for j in range(first, last):
+        share = rows[i, j, WEIGHT] / total
+        u += share * (rows[i, j, POSITION] - rows[i, first, POSITION])
+        static += share * rows[i, j, STATIC_SD]
+        rate += share * rows[i, j, RATE]
+    u += rows[i, first, POSITION]
+    square, rate_square = 0.0, 0.0
+    for j in range(first, last):
+        share = rows[i, j, WEIGHT] / total
+        square += share * (rows[i, j, SD] ** 2 + (rows[i, j, POSITION] - u) ** 2)
+        rate_square += share * (rows[i, j, RATE_SD] ** 2 + (rows[i, j, RATE] - rate) ** 2)
+    out[i, BEST + POSITION], out[i, BEST + SD] = u, math.sqrt(square)
+    out[i, BEST + STATIC_SD] = static
+    out[i, BEST + RATE], out[i, BEST + RATE_SD] = rate, math.sqrt(rate_square)
+
+
+@compiled
+def _describe_crosstalk(out: Array, i: int, x: Array, X: Array, weight: Array, count: int) -> None:
+    """Fill mean and standard deviation of the crosstalk over all hypotheses."""
+    for k in range(2):
+        mean, square, total = 0.0, 0.0, 0.0
+        for j in range(count + 1):
+            variance = 0.0
+            for c in range(X.shape[2]):
+                variance += X[j, 2 + k, c] * X[j, 2 + k, c]
+            gap = x[j, 2 + k] - x[0, 2 + k]
+            mean += weight[j] * gap
+            square += weight[j] * (variance + gap * gap)
+            total += weight[j]
+        mean, square = mean / total, square / total
+        out[i, CROSSTALK + k] = x[0, 2 + k] + mean
+        out[i, CROSSTALK + 2 + k] = math.sqrt(max(square - mean * mean, 0.0))
+
+
+@compiled
+def report(
+    out: Array,
+    rows: Array,
+    i: int,
+    x: Array,
+    X: Array,
+    weight: Array,
+    count: int,
+    unique_above: float,
+) -> None:
+    """Describe the state after frame i.
+
+    Parameters
+    ----------
+    out : ndarray, shape (frames, REPORT_COLUMNS)
+        Status, probability that an object is there, number of hypotheses, best range, learnt
+        crosstalk and its standard deviations in units of the noise are filled in; the latter two
+        stay nan where there is none.
+    rows : ndarray, shape (frames, capacity, HYPOTHESIS_COLUMNS)
+        The hypotheses, by ascending range.
+    i : int
+        The frame.
+    x, X, weight, count
+        The state.
+    unique_above : float
+        As in `Rules`.
+    """
+    out[i, PRESENT], out[i, HYPOTHESES], out[i, STATUS] = 1.0 - weight[0], count, _NONE
+    for j in range(1, count + 1):
+        # by insertion, ascending
+        at = j - 1
+        while at > 0 and rows[i, at - 1, POSITION] > x[j, 0]:
+            for k in range(HYPOTHESIS_COLUMNS):
+                rows[i, at, k] = rows[i, at - 1, k]
+            at -= 1
+        _describe(rows, i, at, x, X, weight, j)
+    if x.shape[1] > 2:
+        _describe_crosstalk(out, i, x, X, weight, count)
+    if weight[0] > 0.5 or count == 0:
+        return
+    # neighbours that overlap are one range; a mean is never taken over two that do not
+    heaviest, begin, group = -1.0, 0, 0.0
+    best_begin, best_end = 0, 0
+    for j in range(count):
+        if j > 0:
+            gap = rows[i, j, POSITION] - rows[i, j - 1, POSITION]
+            if gap > rows[i, j, SD] + rows[i, j - 1, SD]:
+                begin, group = j, 0.0
+        group += rows[i, j, WEIGHT]
+        if group > heaviest:
+            heaviest, best_begin, best_end = group, begin, j + 1
+    _pool(out, rows, i, best_begin, best_end, heaviest)
+    out[i, BEST + WEIGHT] = heaviest / (1.0 - weight[0])
+    unique = heaviest > unique_above * (1.0 - weight[0])
+    out[i, STATUS] = _UNIQUE if unique else _AMBIGUOUS

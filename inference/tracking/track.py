@@ -1,0 +1,245 @@
+"""Tracking: frames in, ranges with their hypotheses out, in one batch or frame by frame."""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.estimates import Status
+from inference.posterior.posterior import Posterior
+from inference.tracking.filter import EMPTY, EMPTY_SATURATED, SATURATED, TIME, run_filter
+from inference.tracking.report import (
+    BEST,
+    CROSSTALK,
+    HYPOTHESES,
+    HYPOTHESIS_COLUMNS,
+    OUTLIER,
+    POSITION,
+    PRESENT,
+    RATE,
+    RATE_SD,
+    REPORT_COLUMNS,
+    SD,
+    STATIC_SD,
+    STATUS,
+    SURPRISE,
+    WEIGHT,
+)
+from inference.tracking.settings import TrackingSettings
+from inference.tracking.state import TrackState
+from inference.tracking.tracker import Tracker, tracker
+from simulator.errors import InvalidInputError
+from simulator.frames import Frames
+from simulator.scene import Scene
+from simulator.sensor import Sensor
+
+__all__ = ["Track", "step", "track"]
+
+Array = NDArray[np.float64]
+
+_FARTHEST = 1e100  # a reading this many standard deviations off is off by any measure
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Track:
+    """What the tracker says of n frames.
+
+    Attributes
+    ----------
+    status : ndarray of uint8, shape (n,)
+        `Status`: one range, several, no object, or saturated (then everything is predicted).
+    present : ndarray, shape (n,)
+        Probability that an object is there.
+    best_m, best_sd_m : ndarray, shape (n,)
+        The heaviest range and its standard deviation [m]; nan where no object is there.
+    static_sd_m : ndarray, shape (n,)
+        The part of it that all frames share, because the scene is not known exactly [m].
+    rate_m_s, rate_sd_m_s : ndarray, shape (n,)
+        dr/dt and its standard deviation [m/s].
+    weight : ndarray, shape (n,)
+        Probability of that range, given that an object is there.
+    outlier : ndarray, shape (n,)
+        Probability that the frame's readings have nothing to do with the scene.
+    surprise : ndarray, shape (n,)
+        Running mean of the normalised innovation squared per reading: 1 where all is as modelled.
+    misfit : ndarray of bool, shape (n,)
+        Whether it is above what chance allows: scene, noise or motion are not as stated.
+    hypotheses_m, hypotheses_sd_m, hypotheses_weight : ndarray, shape (n, k)
+        All ranges by ascending order, padded with nan [m].
+    crosstalk, crosstalk_sd : ndarray, shape (n, 2), optional
+        What was learnt of the crosstalk [reading units]; None where it is not learnt.
+    """
+
+    status: NDArray[np.uint8]
+    present: Array
+    best_m: Array
+    best_sd_m: Array
+    static_sd_m: Array
+    rate_m_s: Array
+    rate_sd_m_s: Array
+    weight: Array
+    outlier: Array
+    surprise: Array
+    misfit: NDArray[np.bool_]
+    hypotheses_m: Array
+    hypotheses_sd_m: Array
+    hypotheses_weight: Array
+    crosstalk: Array | None
+    crosstalk_sd: Array | None
+
+    def __len__(self) -> int:
+        return int(self.status.size)
+
+    @property
+    def range_m(self) -> Array:
+        """The range where it is unique, else nan; shape (n,) [m]."""
+        return np.where(self.status == Status.UNIQUE, self.best_m, np.nan)
+
+    @property
+    def sd_m(self) -> Array:
+        """Standard deviation of the unique range, else nan; shape (n,) [m]."""
+        return np.where(self.status == Status.UNIQUE, self.best_sd_m, np.nan)
+
+
+def step(
+    model: Tracker, state: TrackState, frames: Frames, full: bool = False
+) -> tuple[TrackState, Track]:
+    """Take in one frame or many.
+
+    Pure: the same state and frames give the same result, and however a stream is cut, its results
+    are the same to the last bit.
+
+    Parameters
+    ----------
+    model : Tracker
+        From `tracker`.
+    state : TrackState
+        `Tracker.first`, or what the last step returned.
+    frames : Frames
+        With times that increase and are later than the state's. ``object_present`` false says that
+        no object is there; true says nothing.
+    full : bool
+        Whether to look for new objects along the whole range in every frame, also where none could
+        be heavy enough to be kept: slower, with the same answer to within what is negligible.
+
+    Returns
+    -------
+    (TrackState, Track)
+
+    Raises
+    ------
+    InvalidInputError
+        At "/frames/time_s" where times are missing, repeated or go back; at "/frames/dw1_dt" and
+        its like where derivatives are tracked and missing; at "/state" for another tracker's state.
+    """
+    if state.signature != model.first.signature:
+        raise InvalidInputError.at("/state", "belongs to another tracker")
+    times = _times(frames, float(state.numbers[TIME]))
+    kinds = np.zeros(len(frames), dtype=np.uint8)
+    if model.sensor.full_scale is not None:
+        beyond = np.abs(frames.readings) >= np.asarray(model.sensor.full_scale)
+        kinds[beyond.any(axis=1)] = SATURATED
+    if frames.object_present is not None:
+        kinds[~frames.object_present] = EMPTY
+        if model.sensor.full_scale is not None:
+            # crosstalk cannot be learnt from a reading that is cut
+            kinds[~frames.object_present & beyond.any(axis=1)] = EMPTY_SATURATED
+    values = _observations(model, frames)
+    gain = np.ones(len(frames)) if frames.gain is None else frames.gain
+    out = np.full((len(frames), REPORT_COLUMNS), np.nan)
+    rows = np.full((len(frames), model.settings.hypotheses, HYPOTHESIS_COLUMNS), np.nan)
+    x, X, weight = state.x.copy(), state.X.copy(), state.weight.copy()
+    numbers = state.numbers.copy()
+    table = np.ascontiguousarray(np.column_stack([values, gain]))
+    run_filter(out, rows, times, table, kinds, x, X, weight, numbers, *model.arguments, full)
+    return TrackState(x, X, weight, numbers, state.signature), _track(model, out, rows)
+
+
+def track(
+    sensor: Sensor,
+    scene: Scene,
+    frames: Frames,
+    settings: TrackingSettings | None = None,
+    posterior: Posterior | Array | None = None,
+) -> Track:
+    """Track an object through all frames of a recording.
+
+    Parameters
+    ----------
+    sensor, scene, settings, posterior
+        As for `tracker`.
+    frames : Frames
+        With times that increase.
+
+    Returns
+    -------
+    Track
+
+    Raises
+    ------
+    InvalidInputError, RefusedError
+        As `tracker` and `step`.
+    """
+    model = tracker(sensor, scene, settings, posterior)
+    return step(model, model.first, frames)[1]
+
+
+def _times(frames: Frames, last: float) -> Array:
+    """Return the times, checked."""
+    if frames.time_s is None:
+        raise InvalidInputError.at("/frames/time_s", "is missing: a tracker needs it")
+    times = np.ascontiguousarray(frames.time_s, dtype=np.float64)
+    backward = np.flatnonzero(~(times[1:] > times[:-1]))
+    if backward.size:
+        raise InvalidInputError.at(
+            "/frames/time_s", f"must increase: entry {backward[0] + 1} does not"
+        )
+    if not np.isnan(last) and not times[0] > last:
+        raise InvalidInputError.at(
+            "/frames/time_s", f"entry 0 is not later than the last frame, {last:.9g} s"
+        )
+    return times
+
+
+def _observations(model: Tracker, frames: Frames) -> Array:
+    """Return what is tracked, in units of its noise, shape (n, 2)."""
+    values = frames.readings
+    if model.curve.by_rate:
+        if frames.derivatives is None:
+            first, second = (f"d{name}_dt" for name in model.sensor.columns)
+            raise InvalidInputError.at(f"/frames/{first}", f"is missing, with {second}")
+        values = frames.derivatives
+    observables = model.settings.observables
+    used = np.array([observables != "w2", observables != "w1"])
+    with np.errstate(over="ignore"):
+        scaled = np.where(used, values / np.asarray(model.units), 0.0)
+    return np.clip(scaled, -_FARTHEST, _FARTHEST)
+
+
+def _track(model: Tracker, out: Array, rows: Array) -> Track:
+    """Turn the kernel's report into metres and seconds."""
+    width = max(int(out[:, HYPOTHESES].max(initial=0.0)), 1)
+    rows = rows[:, :width]
+    crosstalk = crosstalk_sd = None
+    if model.learns_crosstalk:
+        crosstalk = out[:, CROSSTALK : CROSSTALK + 2] * model.units
+        crosstalk_sd = out[:, CROSSTALK + 2 : CROSSTALK + 4] * model.units
+    range_m, ranges = np.exp(out[:, BEST + POSITION]), np.exp(rows[:, :, POSITION])
+    return Track(
+        status=out[:, STATUS].astype(np.uint8),
+        present=out[:, PRESENT].copy(),
+        best_m=range_m,
+        best_sd_m=range_m * out[:, BEST + SD],
+        static_sd_m=range_m * out[:, BEST + STATIC_SD],
+        rate_m_s=range_m * out[:, BEST + RATE],
+        rate_sd_m_s=range_m * out[:, BEST + RATE_SD],
+        weight=out[:, BEST + WEIGHT].copy(),
+        outlier=out[:, OUTLIER].copy(),
+        surprise=out[:, SURPRISE].copy(),
+        misfit=out[:, SURPRISE] > model.limit,
+        hypotheses_m=ranges,
+        hypotheses_sd_m=ranges * rows[:, :, SD],
+        hypotheses_weight=rows[:, :, WEIGHT].copy(),
+        crosstalk=crosstalk,
+        crosstalk_sd=crosstalk_sd,
+    )
