@@ -37,7 +37,7 @@ Triple = tuple[float, float, float]
 GROUP = 16  # boxes
 _UNSEEN = 120.0  # square of the distance beyond which a box holds nothing of a density
 # columns of a curve's table
-MEAN1, MEAN2, SLOPE1, SLOPE2, SIGNAL1, SIGNAL2, LOG_PRIOR, GLOBALS = range(8)
+MEAN, SIGNAL, LOG_PRIOR, GLOBALS = 0, 4, 8, 9
 
 
 class Curve(NamedTuple):
@@ -45,10 +45,10 @@ class Curve(NamedTuple):
 
     Attributes
     ----------
-    table : ndarray, shape (knots, 7 + 2 p)
-        Mean readings in units of the read noise, their derivatives along u times ``step``, the
-        object's part of the readings, log prior density of u, and the change of either reading with
-        each of p independent standard normal globals. By rate the means are factors of du/dt.
+    table : ndarray, shape (knots, 9 + 2 p)
+        Mean readings in units of the read noise and their derivatives along u times ``step``, the
+        object's part of both, log prior density of u, and the change of either reading with each of
+        p independent standard normal globals. By rate the means are factors of du/dt.
     start, step : float
         First knot and spacing of u.
     end : float
@@ -187,23 +187,36 @@ def mass_bound(
 
 
 @compiled
-def mean_at(u: float, curve: Curve) -> tuple[float, float, float, float]:
-    """Return the two means and their derivatives along u, by cubic Hermite interpolation."""
+def _hermite(u: float, curve: Curve, first: int) -> tuple[float, float, float, float]:
+    """Interpolate two columns and their derivatives, cubically."""
     position = (u - curve.start) / curve.step
     p = curve.table
     i = min(max(int(position), 0), p.shape[0] - 2)
     t = position - i
-    gap1, gap2 = p[i + 1, 0] - p[i, 0], p[i + 1, 1] - p[i, 1]
-    c1 = 3.0 * gap1 - 2.0 * p[i, 2] - p[i + 1, 2]
-    d1 = p[i, 2] + p[i + 1, 2] - 2.0 * gap1
-    c2 = 3.0 * gap2 - 2.0 * p[i, 3] - p[i + 1, 3]
-    d2 = p[i, 3] + p[i + 1, 3] - 2.0 * gap2
+    a1, a2, left1, left2 = p[i, first], p[i, first + 1], p[i, first + 2], p[i, first + 3]
+    right1, right2 = p[i + 1, first + 2], p[i + 1, first + 3]
+    gap1, gap2 = p[i + 1, first] - a1, p[i + 1, first + 1] - a2
+    c1, d1 = 3.0 * gap1 - 2.0 * left1 - right1, left1 + right1 - 2.0 * gap1
+    c2, d2 = 3.0 * gap2 - 2.0 * left2 - right2, left2 + right2 - 2.0 * gap2
     return (
-        p[i, 0] + t * (p[i, 2] + t * (c1 + t * d1)),
-        p[i, 1] + t * (p[i, 3] + t * (c2 + t * d2)),
-        (p[i, 2] + t * (2.0 * c1 + 3.0 * t * d1)) / curve.step,
-        (p[i, 3] + t * (2.0 * c2 + 3.0 * t * d2)) / curve.step,
+        a1 + t * (left1 + t * (c1 + t * d1)),
+        a2 + t * (left2 + t * (c2 + t * d2)),
+        (left1 + t * (2.0 * c1 + 3.0 * t * d1)) / curve.step,
+        (left2 + t * (2.0 * c2 + 3.0 * t * d2)) / curve.step,
     )
+
+
+@compiled
+def mean_at(u: float, curve: Curve) -> tuple[float, float, float, float]:
+    """Return the two mean readings and their derivatives along u."""
+    return _hermite(u, curve, MEAN)
+
+
+@compiled
+def object_at(u: float, curve: Curve) -> tuple[float, float]:
+    """Return the object's part of the readings."""
+    value1, value2, _, _ = _hermite(u, curve, SIGNAL)
+    return value1, value2
 
 
 @compiled
@@ -212,17 +225,6 @@ def cell_of(u: float, curve: Curve) -> tuple[int, float]:
     position = (u - curve.start) / curve.step
     i = min(max(int(position), 0), curve.table.shape[0] - 2)
     return i, min(max(position - i, 0.0), 1.0)
-
-
-@compiled
-def object_at(u: float, curve: Curve) -> tuple[float, float]:
-    """Return the object's part of the readings, interpolated linearly: noise needs no more."""
-    i, t = cell_of(u, curve)
-    p = curve.table
-    return (
-        p[i, SIGNAL1] + t * (p[i + 1, SIGNAL1] - p[i, SIGNAL1]),
-        p[i, SIGNAL2] + t * (p[i + 1, SIGNAL2] - p[i, SIGNAL2]),
-    )
 
 
 @compiled
@@ -281,7 +283,7 @@ def prior_term(u: float, prior: Prior, curve: Curve) -> float:
     if prior.born:
         i, t = cell_of(u, curve)
         low, high = curve.table[i, LOG_PRIOR], curve.table[i + 1, LOG_PRIOR]
-        return prior.log_scale + low + t * (high - low)
+        return float(prior.log_scale + low + t * (high - low))
     away = u - prior.centre
     return prior.log_scale - 0.5 * away * away * prior.precision
 

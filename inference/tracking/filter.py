@@ -23,7 +23,7 @@ from inference.tracking.hypotheses import (
 from inference.tracking.modes import CHOICE_COLUMNS, find_choices
 from inference.tracking.motion import Rules, motion_over, presence_over
 from inference.tracking.report import OUTLIER, STATUS, SURPRISE, report
-from inference.tracking.square_root import merge, merge_equals, move
+from inference.tracking.square_root import drop_lightest, merge, merge_equals, move
 from simulator.compiled import compiled
 
 __all__ = [
@@ -47,6 +47,8 @@ TIME, PENDING, RUNNING, COUNT = range(4)
 _NEVER = -math.inf
 _LEAST = -700.0  # log of a weight that underflows
 _ODD = math.log(1e-2)  # log weight from which on a frame may have been an outlier
+_SPARE = 5  # times as many hypotheses may be made by a frame as are kept after it
+_UNLIKE = 1.0  # nats at which hypotheses are no longer merged for want of room
 _SATURATED = int(Status.SATURATED)
 
 
@@ -182,7 +184,7 @@ def _weigh(
     if outlying > heaviest:
         heaviest, surprise = outlying, rules.most_surprise
     kept, total = 0, empty + odd_mass
-    while kept < x.shape[0] - 1:
+    while kept < room.weight.size - 1:
         top = 0
         for j in range(1, found):
             if choices[j, 0] > choices[top, 0]:
@@ -230,6 +232,12 @@ def _weigh(
     weight[0] = (empty + odd_mass) / total
     numbers[PENDING] = pending / total
     kept = merge_equals(room.x, room.X, room.weight, kept, rules.same, work)
+    same = rules.same
+    while kept > x.shape[0] - 1 and same < _UNLIKE:
+        same *= 3.0
+        kept = merge_equals(room.x, room.X, room.weight, kept, same, work)
+    while kept > x.shape[0] - 1:
+        kept = drop_lightest(room.x, room.X, room.weight, kept)
     for j in range(1, kept + 1):
         _copy(x, X, j, room.x, room.X, j)
         weight[j] = room.weight[j] / total
@@ -278,10 +286,10 @@ def run_filter(
     """
     capacity, n, m = X.shape
     room = Room(
-        np.zeros((capacity, n)),
-        np.zeros((capacity, n, m)),
-        np.zeros(capacity),
-        np.empty((8 * capacity, CHOICE_COLUMNS)),
+        np.zeros((_SPARE * capacity, n)),
+        np.zeros((_SPARE * capacity, n, m)),
+        np.zeros(_SPARE * capacity),
+        np.empty((2 * _SPARE * capacity, CHOICE_COLUMNS)),
         np.empty((places.scan.size + 3, 2)),
         np.zeros((2, m - n)),
         np.zeros((n, 4 * n + m + 4)),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from inference.tracking.curve import Triple, add_factor
 from simulator.compiled import compiled
 
-__all__ = ["merge", "merge_equals", "move", "solve", "triangularise", "update"]
+__all__ = ["drop_lightest", "merge", "merge_equals", "move", "solve", "triangularise", "update"]
 
 Array = NDArray[np.float64]
 
@@ -237,6 +237,27 @@ def _log_determinant(x: Array, X: Array, one: int, other: int, share: float) -> 
 
 
 @compiled
+def _replace(x: Array, X: Array, weight: Array, row: int, other: int) -> None:
+    """Put one hypothesis in the place of another."""
+    weight[row] = weight[other]
+    for i in range(x.shape[1]):
+        x[row, i] = x[other, i]
+        for c in range(X.shape[2]):
+            X[row, i, c] = X[other, i, c]
+
+
+@compiled
+def drop_lightest(x: Array, X: Array, weight: Array, count: int) -> int:
+    """Drop the lightest of the hypotheses in rows 1 to count; how many are left."""
+    lightest = 1
+    for j in range(2, count + 1):
+        if weight[j] < weight[lightest]:
+            lightest = j
+    _replace(x, X, weight, lightest, count)
+    return count - 1
+
+
+@compiled
 def merge_equals(x: Array, X: Array, weight: Array, count: int, same: float, work: Array) -> int:
     """Merge hypotheses that say the same.
 
@@ -275,12 +296,7 @@ def merge_equals(x: Array, X: Array, weight: Array, count: int, same: float, wor
             # the mixture is symmetric in the two: merged into j, whichever is heavier
             merge(x, X, j, k, weight[k] / (weight[j] + weight[k]), 0, work)
             weight[j] += weight[k]
-            if k != count:
-                weight[k] = weight[count]
-                for i in range(x.shape[1]):
-                    x[k, i] = x[count, i]
-                    for c in range(X.shape[2]):
-                        X[k, i, c] = X[count, i, c]
+            _replace(x, X, weight, k, count)
             count -= 1
             k = j + 1  # the merged one may equal others now
         j += 1

