@@ -24,7 +24,7 @@ __all__ = ["born_prior", "expected_readings", "learn", "learn_empty", "log_outli
 Array = NDArray[np.float64]
 
 _LOG_2PI = math.log(2.0 * math.pi)
-_BROAD = 1e3  # standard deviations of a frame by which a new hypothesis is vaguer before it
+_BROAD = 10.0  # standard deviation of log r before the first frame: vague, but no more
 
 
 @compiled
@@ -164,7 +164,7 @@ def learn(
     """Update a hypothesis at one mode of a frame.
 
     A Kalman step, linear at the mode, says what the frame tells about rate and crosstalk; the mean
-    and standard deviation of u are then those that were integrated along the curve.
+    and standard deviation of u are then those that were integrated along the curve, if they were.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def learn(
         x[row, 0], x[row, 1] = u, 0.0
         for j in range(m):
             X[row, 0, j], X[row, 1, j] = 0.0, 0.0
-        X[row, 0, 0], X[row, 1, 1] = min(_BROAD * choices[choice, 4], 100.0), prior.rate_sd
+        X[row, 0, 0], X[row, 1, 1] = _BROAD, prior.rate_sd
     noise = (1.0, 0.0, 1.0)
     if curve.by_rate:
         away = 0.0 if prior.born else u - prior.centre
@@ -223,7 +223,7 @@ def learn(
     variance = 0.0
     for j in range(m):
         variance += X[row, 0, j] * X[row, 0, j]
-    if variance > 0.0:
+    if variance > 0.0 and choices[choice, 2] > 0.0:
         stretch = choices[choice, 2] / math.sqrt(variance) - 1.0
         shift = choices[choice, 1] - x[row, 0]
         for i in range(n - 1, -1, -1):

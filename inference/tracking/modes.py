@@ -87,20 +87,20 @@ def _climb(
     curve: Curve,
 ) -> tuple[float, float]:
     """Climb by bracketed Newton with differences: the covariance changes along the way."""
-    moved = high - low
+    moved, width = high - low, high - low
+    h = 0.3 * scale
     for _ in range(60):
-        h = 0.3 * scale
         middle = log_density(u, first, second, prior, spread, curve)
         right = log_density(u + h, first, second, prior, spread, curve)
         left = log_density(u - h, first, second, prior, spread, curve)
         if left == -math.inf or right == -math.inf:
             # at an end of the support: one side alone tells the way
-            if max(left, right) <= middle or h < 1e-15 * (1.0 + abs(u)):
-                scale *= 0.5
-                if h < 1e-3 * (high - low) or h < 1e-15 * (1.0 + abs(u)):
-                    return u, scale
+            if max(left, right) <= middle and h < 1e-3 * width:
+                return u, h
+            slope, curvature = right - left if max(left, right) > middle else 0.0, 0.0
+            h *= 0.3
+            if slope == 0.0:
                 continue
-            slope, curvature = right - left, 0.0
         else:
             slope = (right - left) / (2.0 * h)
             curvature = -(right - 2.0 * middle + left) / (h * h)
@@ -108,19 +108,21 @@ def _climb(
             low = u
         else:
             high = u
+        trial = math.inf
         if curvature > 0.0:
-            scale = min(1.0 / math.sqrt(curvature), 3.0 * scale)
+            scale = 1.0 / math.sqrt(curvature)
             trial = u + slope / curvature
-            if abs(trial - u) < _CLOSE * scale and scale * curvature * scale > 0.5:
+            # steps of the differences and of the peak must be alike before either is believed
+            if abs(trial - u) < _CLOSE * scale and 0.02 * scale < h < scale:
                 break
+            h = min(0.3 * scale, 3.0 * h)
         else:
-            trial = math.inf
-        if high - low < 1e-15 * (1.0 + abs(u)):
+            h *= 0.5
+        if high - low < 1e-14 * (1.0 + abs(u)):
             break
         if not low < trial < high or abs(trial - u) > 0.7 * moved:
             trial = 0.5 * (low + high)
         moved = abs(trial - u)
-        scale = min(scale, max(moved, 1e-3 * scale))
         u = trial
     return u, scale
 
@@ -254,12 +256,21 @@ def _integrate(
     prior: Prior,
     spread: Array,
     curve: Curve,
+    linear: bool,
 ) -> int:
     """Append one mode between its valleys, with its log mass, mean and standard deviation.
 
     Three Gauss-Hermite nodes where the peak is near a Gaussian, which is exact to the fifth power
     of the distance.
+
+    Where globals or crosstalk are uncertain only the mode is taken. What they do to the readings is
+    linear here, and the curve is not: integrated over a wide prediction, the difference would pass
+    for knowledge of the range, a little in every frame.
     """
+    if linear:
+        top = log_density(u, first, second, prior, spread, curve)
+        log_mass = top + math.log(scale) + _LOG_ROOT_2PI
+        return _add(choices, count, log_mass, u, 0.0, u, scale, parent)
     if u - _ROOT3 * scale >= low and u + _ROOT3 * scale <= high:
         top = log_density(u, first, second, prior, spread, curve)
         left = log_density(u - _ROOT3 * scale, first, second, prior, spread, curve) - top + 1.5
@@ -322,6 +333,7 @@ def find_choices(
         if not low < high:  # gone beyond the support
             return count
     plain = curve.plain and not curve.by_rate
+    linear = spread.shape[1] > 2
     plain = plain and not (prior.born and curve.table.shape[1] > GLOBALS)
     root = add_factor((1.0, 0.0, 1.0), prior.root11, prior.root21)
     root = add_factor(root, 0.0, prior.root22)
@@ -362,6 +374,18 @@ def find_choices(
             scale = min(width, above - below)
             u, scale = _climb(start, below, above, scale, first, second, prior, spread, curve)
         count = _integrate(
-            choices, count, parent, u, scale, left, right, first, second, prior, spread, curve
+            choices,
+            count,
+            parent,
+            u,
+            scale,
+            left,
+            right,
+            first,
+            second,
+            prior,
+            spread,
+            curve,
+            linear,
         )
     return count

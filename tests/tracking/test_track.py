@@ -130,7 +130,7 @@ def test_one_mode_is_an_extended_kalman_filter() -> None:
     """Textbook matrices, linearised at the mode; what differs is of second order in the noise."""
     sensor = sensor_of(SNR_1000 / 10)
     scene = scene_of(PLATE, range_m={"prior": "loguniform", "low": 0.1, "high": 14.0})
-    settings = TrackingSettings()
+    settings = TrackingSettings(rate_sd=0.3)
     rng = np.random.default_rng(4)
     u, _ = wander(rng, 100, settings, (np.log(0.8), 0.2))
     readings = read(sensor, scene, np.exp(u), rng)
