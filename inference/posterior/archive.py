@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from inference.posterior.ensemble import Ensemble
 from inference.posterior.importance import WeightedDraws
-from inference.posterior.proposal import Mixture
+from inference.posterior.population import Population
+from inference.posterior.proposal import Mixture, Proposal
 from inference.posterior.selection import Candidate, Decision, Selection
+from inference.posterior.transport import TriangularMap
 from inference.posterior.verdict import Verdict
 from simulator.frames import Frames
 
@@ -59,7 +61,10 @@ _PARTS = {
         Ensemble,
         Frames,
         Mixture,
+        Population,
+        Proposal,
         Selection,
+        TriangularMap,
         Verdict,
         WeightedDraws,
     )

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.collapsed import CollapsedDensity
-from inference.posterior.proposal import Mixture
+from inference.posterior.proposal import Proposal
 
-__all__ = ["Ensemble", "advance", "forget", "new_ensemble"]
+__all__ = ["Ensemble", "advance", "new_ensemble", "restart"]
 
 Array = NDArray[np.float64]
 Stream = tuple[NDArray[np.uint32], int, int, float]
@@ -23,13 +23,13 @@ class Ensemble:
     Attributes
     ----------
     coords : ndarray, shape (walkers, d)
-        Present positions.
+        Present positions, in the coordinates of the proposal.
     log_prob : ndarray, shape (walkers,)
-        Their log density.
+        Their log density in these coordinates.
     chain : ndarray, shape (steps, walkers, d)
-        Past positions.
+        Past positions z.
     chain_log_prob : ndarray, shape (steps, walkers)
-        Their log density.
+        Their log density as parameters z.
     accepted : ndarray of int, shape (walkers,)
         Accepted proposals.
     random : (ndarray of uint32, int, int, float)
@@ -55,14 +55,18 @@ def _stream(state: Any) -> Stream:
     return np.asarray(state[1], dtype=np.uint32), int(state[2]), int(state[3]), float(state[4])
 
 
-def new_ensemble(coords: Array, log_prob: Array, seed: np.random.SeedSequence) -> Ensemble:
+def new_ensemble(
+    proposal: Proposal, z: Array, log_density: Array, seed: np.random.SeedSequence
+) -> Ensemble:
     """Make an ensemble that has not moved yet, with a random stream of its own.
 
     Parameters
     ----------
-    coords : ndarray, shape (walkers, d)
+    proposal : Proposal
+        In whose coordinates it will walk.
+    z : ndarray, shape (walkers, d)
         Starting points, linearly independent.
-    log_prob : ndarray, shape (walkers,)
+    log_density : ndarray, shape (walkers,)
         Their log density, finite.
     seed : numpy.random.SeedSequence
         One of its own, spawned.
@@ -71,11 +75,12 @@ def new_ensemble(coords: Array, log_prob: Array, seed: np.random.SeedSequence) -
     -------
     Ensemble
     """
-    walkers, d = coords.shape
+    walkers, d = z.shape
     state: Any = np.random.RandomState(np.random.MT19937(seed)).get_state(legacy=True)
+    coords, log_det = proposal.unbend(z)
     return Ensemble(
         coords,
-        log_prob,
+        log_density - log_det,
         np.empty((0, walkers, d)),
         np.empty((0, walkers)),
         np.zeros(walkers, dtype=np.int64),
@@ -83,21 +88,25 @@ def new_ensemble(coords: Array, log_prob: Array, seed: np.random.SeedSequence) -
     )
 
 
-def forget(ensemble: Ensemble) -> Ensemble:
-    """Return the ensemble where it stands, without its past."""
+def restart(ensemble: Ensemble, old: Proposal, new: Proposal) -> Ensemble:
+    """Return the ensemble where it stands, in another proposal's coordinates, without its past."""
+    z, old_det = old.bend(ensemble.coords)
+    coords, new_det = new.unbend(z)
     return dataclasses.replace(
         ensemble,
+        coords=coords,
+        log_prob=ensemble.log_prob - old_det - new_det,
         chain=ensemble.chain[:0],
         chain_log_prob=ensemble.chain_log_prob[:0],
         accepted=np.zeros_like(ensemble.accepted),
     )
 
 
-def _moves(mixture: Mixture, share: float) -> list[tuple[Any, float]]:
-    """Independent jumps between the optima, and local moves that know nothing of them."""
-    rest = 1.0 - share
+def _moves(proposal: Proposal) -> list[tuple[Any, float]]:
+    """Independent jumps, and local moves that know nothing of the optima or the map's fit."""
+    rest = 1.0 - proposal.share
     return [
-        (emcee.moves.MHMove(mixture.propose), share),
+        (emcee.moves.MHMove(proposal.propose), proposal.share),
         (emcee.moves.DEMove(sigma=0.2), 0.4 * rest),
         (emcee.moves.DESnookerMove(), 0.2 * rest),
         (emcee.moves.StretchMove(), 0.4 * rest),
@@ -105,7 +114,7 @@ def _moves(mixture: Mixture, share: float) -> list[tuple[Any, float]]:
 
 
 def advance(
-    density: CollapsedDensity, mixture: Mixture, ensemble: Ensemble, steps: int
+    density: CollapsedDensity, proposal: Proposal, ensemble: Ensemble, steps: int
 ) -> Ensemble:
     """Carry an ensemble on by some steps; the same whether in one call or in several.
 
@@ -113,8 +122,8 @@ def advance(
     ----------
     density : CollapsedDensity
         Target.
-    mixture : Mixture
-        Proposal of the independent move; must not change during a run.
+    proposal : Proposal
+        Of the independent move, and the coordinates of all moves; must not change during a run.
     ensemble : Ensemble
         Where it stands.
     steps : int
@@ -126,9 +135,12 @@ def advance(
         With the steps appended.
     """
     walkers, d = ensemble.coords.shape
-    sampler = emcee.EnsembleSampler(
-        walkers, d, density, moves=_moves(mixture, mixture.share), vectorize=True
-    )
+
+    def log_density(x: Array) -> Array:
+        z, log_det = proposal.bend(x)
+        return density(z) + log_det
+
+    sampler = emcee.EnsembleSampler(walkers, d, log_density, moves=_moves(proposal), vectorize=True)
     state = emcee.State(
         ensemble.coords.copy(),
         log_prob=ensemble.log_prob.copy(),
@@ -139,11 +151,13 @@ def advance(
     if not np.array_equal(sampler.random_state[1], ensemble.random[0]):
         raise RuntimeError("emcee did not take the ensemble's random state")
     state = sampler.run_mcmc(state, steps, skip_initial_state_check=True)
+    chain, log_prob = sampler.get_chain(), sampler.get_log_prob()
+    z, log_det = proposal.bend(chain.reshape(-1, d))
     return Ensemble(
         np.array(state.coords),
         np.array(state.log_prob),
-        np.concatenate([ensemble.chain, sampler.get_chain()]),
-        np.concatenate([ensemble.chain_log_prob, sampler.get_log_prob()]),
+        np.concatenate([ensemble.chain, z.reshape(chain.shape)]),
+        np.concatenate([ensemble.chain_log_prob, log_prob - log_det.reshape(log_prob.shape)]),
         ensemble.accepted + sampler.backend.accepted.astype(np.int64),
         _stream(sampler.random_state),
     )

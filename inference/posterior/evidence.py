@@ -17,7 +17,8 @@ from scipy.stats import qmc
 from inference.posterior.bridge import bridge, walk
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.importance import WeightedDraws, draw_weighted
-from inference.posterior.proposal import Mixture, adapted, mixture_of
+from inference.posterior.local_mixture import adapted
+from inference.posterior.proposal import Mixture, mixture_of
 from inference.posterior.start import Optimum, climb, find_optima, refine
 from inference.posterior.tempering import temper
 from simulator.parameters import Parameters

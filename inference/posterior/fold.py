@@ -9,6 +9,10 @@
     posterior = summarise(job, checkpoint, wall_s, cpu_s)
 
 Between chunks a checkpoint may be stored and read again: the result is the same to the last bit.
+
+Where the Laplace shapes at the optima fit, ensembles walk at once. Where they do not, populations
+are first carried from the prior to the posterior, a map is fitted to them, and ensembles walk in
+its coordinates.
 """
 
 import dataclasses
@@ -19,34 +23,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior import summary
-from inference.posterior.checks import check_best_fit
-from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.diagnostics import (
     autocorrelation_time,
     effective_sample_size,
     split_r_hat,
 )
 from inference.posterior.draws import draw
-from inference.posterior.ensemble import Ensemble, advance, forget, new_ensemble
-from inference.posterior.importance import MAX_K_HAT, WeightedDraws, draw_weighted
+from inference.posterior.ensemble import Ensemble, advance, restart
 from inference.posterior.job import Checkpoint, Job, chains, prepare
+from inference.posterior.launch import POPULATIONS, WALKERS, new_ensembles, start
+from inference.posterior.population import Population, first_population, temper
 from inference.posterior.posterior import Posterior
-from inference.posterior.proposal import Mixture, adapted, mixture_of
+from inference.posterior.proposal import Proposal
 from inference.posterior.selecting import (
     AssessTask,
     StartTask,
     assess_tasks,
     awaits_start,
-    begin,
     run_assessment,
     sampled,
     take_in,
 )
 from inference.posterior.selection import Candidate
-from inference.posterior.start import Optimum, climb, find_optima, refine
-from inference.posterior.tempering import tempered_walkers
+from inference.posterior.transport import fit_map
 from inference.posterior.verdict import Chains, Verdict, judge
-from simulator.errors import RefusedError
 
 __all__ = [
     "Checkpoint",
@@ -66,33 +66,49 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-WALKERS = 32
-_IMPORTANCE_DRAWS = 2000
-_MOST_IMPORTANCE_DRAWS = 200_000
 _CHUNK_S = 0.33  # of the first chunk; later ones grow to about a second
 _MOST_STEPS = 20_000
-_TRIAL_DRAWS = 400
-_MOST_ADAPTATIONS = 2
-_FAST = 10.0  # steps of autocorrelation below which the proposal needs no adaptation
-_PILOT_DRAWS = 6000
+# steps of autocorrelation above which the proposal is adapted: as often as there are entries
+_SLOW = (10.0, 10.0, 40.0)
+_PILOT_DRAWS = 10_000
+_MAP_SHARE = 0.55  # of the steps that are independent jumps through a map
 _EVALUATION_S = 1.2e-6  # a frame under one parameter vector, for sizing chunks only
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Task:
-    """One ensemble's share of a chunk."""
+    """One share of a chunk: steps of an ensemble, or temperatures of a population.
+
+    Attributes
+    ----------
+    job : Job
+        The job.
+    proposal : Proposal or None
+        Of the ensemble.
+    ensemble : Ensemble or None
+        None where populations are carried to the posterior.
+    population : Population or None
+        None before it is drawn from the prior.
+    index : int
+        Of the ensemble or the population.
+    steps : int
+        Steps of an ensemble; of a population the density evaluations after which to stop.
+    """
 
     job: Job
-    proposal: Mixture
-    ensemble: Ensemble
+    proposal: Proposal | None
+    ensemble: Ensemble | None
+    population: Population | None
+    index: int
     steps: int
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Piece:
-    """An ensemble after its share of a chunk."""
+    """An ensemble or a population after its share of a chunk."""
 
-    ensemble: Ensemble
+    ensemble: Ensemble | None
+    population: Population | None
     calls: int
 
 
@@ -117,139 +133,6 @@ class Progress:
     finished: bool
 
 
-def start(job: Job) -> Checkpoint:
-    """Find the optima, and set up ensembles or draw weighted samples.
-
-    With optional terms in the scene this is done once they are decided, by the first chunks.
-
-    Parameters
-    ----------
-    job : Job
-        From `prepare`.
-
-    Returns
-    -------
-    Checkpoint
-
-    Raises
-    ------
-    RefusedError
-        Where no parameters explain the frames at all, or importance sampling alone was asked for
-        and cannot be trusted.
-    """
-    if job.scene.optional_terms:
-        return begin(job)
-    density = job.density()
-    settings = job.settings
-    pending = Verdict(False, ("no steps were made",))
-    if len(density.parameters) == 0:
-        known = Verdict(True, ())
-        if not np.isfinite(density(np.empty((1, 0)))[0]):
-            raise RefusedError("no range allowed by the scene explains every frame")
-        return Checkpoint("importance", None, None, 0, (), None, 1, known, None, None, True)
-    optima = find_optima(density, job.stream(0))
-    tempered, calls = tempered_walkers(density, job.stream(1), WALKERS)
-    if len(tempered):
-        optima = _with(optima, refine(density, climb(density, tempered[0])[0]))
-        optima = _with(optima, refine(density, tempered[0]))
-    if not optima:
-        raise RefusedError(
-            "no parameters within their priors explain the frames; widen the priors, or check the "
-            "noise's `read` against the readings"
-        )
-    check_best_fit(density, optima[0].z)
-    mixture = mixture_of(optima)
-    if settings.method in ("importance", "auto"):
-        weighted, used = _importance(density, mixture, job)
-        calls += used
-        trusted = weighted.k_hat < MAX_K_HAT and weighted.ess >= settings.target_ess
-        if trusted or settings.method == "importance":
-            if not weighted.k_hat < MAX_K_HAT:
-                raise RefusedError(
-                    f"importance sampling cannot be trusted here: Pareto k-hat is "
-                    f"{weighted.k_hat:.2f}, above {MAX_K_HAT}; use the method emcee"
-                )
-            verdict = Verdict(
-                trusted,
-                ()
-                if trusted
-                else (f"the effective sample size is {weighted.ess:.0f}, below the target",),
-            )
-            return Checkpoint(
-                "importance",
-                mixture,
-                mixture,
-                0,
-                (),
-                weighted,
-                calls,
-                verdict,
-                weighted.ess,
-                None,
-                True,
-            )
-    trial = draw_weighted(density, mixture, job.stream(8), _TRIAL_DRAWS)
-    calls += _TRIAL_DRAWS
-    if trial.ess > 0.5 * _TRIAL_DRAWS:  # jumps that are mostly accepted forget fastest
-        mixture = dataclasses.replace(mixture, share=0.8)
-    ensembles = _ensembles(density, mixture, tempered, job)
-    calls += WALKERS * len(ensembles)
-    return Checkpoint(
-        "emcee", mixture, mixture, 0, ensembles, None, calls, pending, None, None, False
-    )
-
-
-def _with(optima: list[Optimum], found: Optimum | None) -> list[Optimum]:
-    """Add an optimum that is not among those found before, and drop what it makes negligible."""
-    if found is None:
-        return optima
-    for other in optima:
-        step = np.linalg.solve(other.factor, found.z - other.z)
-        if np.linalg.norm(step) < 0.5:
-            return optima
-    every = sorted([*optima, found], key=lambda optimum: -optimum.log_density)
-    return [o for o in every if o.log_density > every[0].log_density - 20.0]
-
-
-def _importance(density: CollapsedDensity, mixture: Mixture, job: Job) -> tuple[WeightedDraws, int]:
-    """Draw until the effective sample size is reached, if that is in sight."""
-    count = max(_IMPORTANCE_DRAWS, 2 * job.settings.target_ess)
-    weighted = draw_weighted(density, mixture, job.stream(2), count)
-    used = count
-    if weighted.k_hat < MAX_K_HAT and weighted.ess < job.settings.target_ess:
-        wanted = int(1.5 * count * job.settings.target_ess / max(weighted.ess, 1.0))
-        count = min(wanted, _MOST_IMPORTANCE_DRAWS)
-        weighted = draw_weighted(density, mixture, job.stream(2), count)
-        used += count
-    return weighted, used
-
-
-def _ensembles(
-    density: CollapsedDensity, mixture: Mixture, tempered: Array, job: Job
-) -> tuple[Ensemble, ...]:
-    """Set up the ensembles: the last from the tempered prior, the others around the optima."""
-    seeds = np.random.SeedSequence(job.seed, spawn_key=(3,)).spawn(job.settings.ensembles)
-    d = mixture.centres.shape[1]
-    ensembles = []
-    for k, seed in enumerate(seeds):
-        coords = np.empty((0, d))
-        if k == len(seeds) - 1 and np.linalg.matrix_rank(tempered - tempered[:1]) == d:
-            coords = tempered
-        rng = np.random.default_rng(seed.spawn(1)[0])
-        log_prob = density(coords) if len(coords) else np.empty(0)
-        for _ in range(50):
-            if len(coords) >= WALKERS:
-                break
-            more = mixture.draw(rng, WALKERS)
-            found = density(more)
-            coords = np.concatenate([coords, more[np.isfinite(found)]])
-            log_prob = np.concatenate([log_prob, found[np.isfinite(found)]])
-        if len(coords) < WALKERS:
-            raise RefusedError("the prior leaves no room around its best parameters")
-        ensembles.append(new_ensemble(coords[:WALKERS], log_prob[:WALKERS], seed))
-    return tuple(ensembles)
-
-
 def tasks(
     job: Job, checkpoint: Checkpoint
 ) -> tuple[Task, ...] | tuple[AssessTask | StartTask, ...]:
@@ -263,11 +146,27 @@ def tasks(
     proposal = checkpoint.proposal
     if checkpoint.finished or proposal is None:
         return ()
+    evaluation_s = int(job.usable.sum()) * _EVALUATION_S
+    if not checkpoint.ensembles:
+        calls = int(3 * _CHUNK_S / evaluation_s)
+        return tuple(
+            Task(job, None, None, population, k, calls)
+            for k, population in enumerate(checkpoint.populations)
+            if not _has_arrived(population)
+        )
     done = checkpoint.ensembles[0].steps
-    step_s = 5e-4 + WALKERS * int(job.usable.sum()) * _EVALUATION_S
+    step_s = 5e-4 + WALKERS * evaluation_s
     seconds = _CHUNK_S if done == 0 else 2 * _CHUNK_S
     steps = int(min(max(seconds / step_s, 20), 500, _MOST_STEPS - done))
-    return tuple(Task(job, proposal, ensemble, steps) for ensemble in checkpoint.ensembles)
+    return tuple(
+        Task(job, proposal, ensemble, None, k, steps)
+        for k, ensemble in enumerate(checkpoint.ensembles)
+    )
+
+
+def _has_arrived(population: Population | None) -> bool:
+    """Tell whether a population is at the posterior, or died on the way."""
+    return population is not None and (population.power == 1.0 or len(population.z) == 0)
 
 
 def run(task: Task | AssessTask | StartTask) -> Piece | Candidate | Checkpoint:
@@ -276,8 +175,18 @@ def run(task: Task | AssessTask | StartTask) -> Piece | Candidate | Checkpoint:
         return run_assessment(task)
     if isinstance(task, StartTask):
         return start(task.job)
-    ensemble = advance(task.job.density(), task.proposal, task.ensemble, task.steps)
-    return Piece(ensemble, task.steps * WALKERS)
+    density = task.job.density()
+    if task.ensemble is not None and task.proposal is not None:
+        ensemble = advance(density, task.proposal, task.ensemble, task.steps)
+        return Piece(ensemble, None, task.steps * WALKERS)
+    population = task.population
+    before = 0 if population is None else population.calls
+    if population is None:
+        population = first_population(density, task.job.stream(9, task.index, 0))
+    while not _has_arrived(population) and population.calls - before < task.steps:
+        rng = task.job.stream(9, task.index, 1 + population.steps)
+        population = temper(density, population, rng)
+    return Piece(None, population, population.calls - before)
 
 
 def merge(
@@ -293,14 +202,23 @@ def merge(
             return dataclasses.replace(piece, calls=calls, selection=checkpoint.selection)
     job = sampled(job, checkpoint)
     moved = [piece for piece in pieces if isinstance(piece, Piece)]
-    checkpoint = dataclasses.replace(
-        checkpoint,
-        ensembles=tuple(piece.ensemble for piece in moved),
-        calls=checkpoint.calls + sum(piece.calls for piece in moved),
-    )
+    calls = checkpoint.calls + sum(piece.calls for piece in moved)
+    checkpoint = dataclasses.replace(checkpoint, calls=calls)
+    ensembles = tuple(piece.ensemble for piece in moved if piece.ensemble is not None)
+    if not ensembles:
+        carried = iter(piece.population for piece in moved)
+        populations = tuple(
+            population if _has_arrived(population) else next(carried)
+            for population in checkpoint.populations
+        )
+        checkpoint = dataclasses.replace(checkpoint, populations=populations)
+        return _set_out(job, checkpoint) if all(map(_has_arrived, populations)) else checkpoint
+    checkpoint = dataclasses.replace(checkpoint, ensembles=ensembles)
     kept = chains(job, checkpoint)
-    if checkpoint.adaptations < _MOST_ADAPTATIONS and _is_slow(kept):
-        return _adapt(job, checkpoint, kept)
+    done = checkpoint.adaptations
+    # a parameter that does not move has no finite time
+    if done < len(_SLOW) and not _slowest(kept) < _SLOW[done]:
+        return _adapt(checkpoint, kept)
     verdict = judge(kept, job.settings.target_ess)
     columns = np.moveaxis(kept.z, -1, 0)
     least = min(effective_sample_size(draws) for draws in columns)
@@ -314,26 +232,56 @@ def merge(
     )
 
 
-def _is_slow(kept: Chains) -> bool:
-    """Tell whether some parameter needs more than a few steps to be forgotten."""
-    steps = kept.z.shape[2]
-    taus = [autocorrelation_time(x.reshape(-1, steps).T) for x in np.moveaxis(kept.z, -1, 0)]
-    return not max(taus) < _FAST  # a parameter that does not move has no finite time
+def _set_out(job: Job, checkpoint: Checkpoint) -> Checkpoint:
+    """Fit a map to the populations that arrived, and set up ensembles in its coordinates.
 
-
-def _adapt(job: Job, checkpoint: Checkpoint, kept: Chains) -> Checkpoint:
-    """Adapt the proposal to what was drawn so far, and forget the draws."""
-    if checkpoint.optima is None:
-        raise ValueError("nothing was sampled")
-    rng = job.stream(6 + checkpoint.adaptations)
-    flat = kept.z.reshape(-1, kept.z.shape[-1])
-    pilot = flat[np.linspace(0, len(flat) - 1, min(len(flat), _PILOT_DRAWS)).astype(int)]
+    The last ensemble starts around the optima of the multistart, the others from populations that
+    came from the prior and know nothing of them: they can contradict one another.
+    """
+    proposal = checkpoint.proposal
+    arrived = [p.z for p in checkpoint.populations if p is not None and len(p.z)]
+    if proposal is None:
+        raise ValueError("nothing is to be sampled")
+    density = job.density()
+    count = job.settings.ensembles
+    starts = [np.empty((0, len(density.parameters)))] * count
+    if arrived:
+        transport = fit_map(np.concatenate(arrived))
+        proposal = dataclasses.replace(proposal, transport=transport, share=_MAP_SHARE)
+        for k in range(count - 1):
+            members = arrived[k % len(arrived)]
+            order = job.stream(10, k).permutation(len(members))
+            starts[k] = members[order]
+    ensembles = new_ensembles(density, proposal, tuple(starts), job)
     return dataclasses.replace(
         checkpoint,
-        proposal=adapted(checkpoint.optima, pilot, rng),
-        adaptations=checkpoint.adaptations + 1,
-        ensembles=tuple(forget(ensemble) for ensemble in checkpoint.ensembles),
-        verdict=Verdict(False, ("the proposal was still being adapted",)),
+        proposal=proposal,
+        ensembles=ensembles,
+        adaptations=1,
+        calls=checkpoint.calls + WALKERS * count,
+    )
+
+
+def _slowest(kept: Chains) -> float:
+    """Return the longest autocorrelation time of the parameters, in steps."""
+    steps = kept.z.shape[2]
+    return max(autocorrelation_time(x.reshape(-1, steps).T) for x in np.moveaxis(kept.z, -1, 0))
+
+
+def _adapt(checkpoint: Checkpoint, kept: Chains) -> Checkpoint:
+    """Fit the map to what was drawn so far, and forget the draws; or call for populations."""
+    pending = Verdict(False, ("the proposal was still being adapted",))
+    begun = dataclasses.replace(checkpoint, adaptations=checkpoint.adaptations + 1, verdict=pending)
+    old = checkpoint.proposal
+    if old is None or old.transport is None:
+        return dataclasses.replace(begun, ensembles=(), populations=(None,) * POPULATIONS)
+    flat = kept.z.reshape(-1, kept.z.shape[-1])
+    pilot = flat[np.linspace(0, len(flat) - 1, min(len(flat), _PILOT_DRAWS)).astype(int)]
+    new = dataclasses.replace(old, transport=fit_map(pilot))
+    return dataclasses.replace(
+        begun,
+        proposal=new,
+        ensembles=tuple(restart(ensemble, old, new) for ensemble in checkpoint.ensembles),
     )
 
 
@@ -344,7 +292,7 @@ def progress(job: Job, checkpoint: Checkpoint) -> Progress:
     if checkpoint.method == "importance":
         count = 0 if checkpoint.weighted is None else len(checkpoint.weighted.z)
         return Progress(count, count, checkpoint.ess, None, checkpoint.finished)
-    steps = checkpoint.ensembles[0].steps
+    steps = checkpoint.ensembles[0].steps if checkpoint.ensembles else 0
     target = steps
     if not checkpoint.finished:
         share = (checkpoint.ess or 1.0) / job.settings.target_ess

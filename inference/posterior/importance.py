@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from inference.posterior.collapsed import CollapsedDensity
-from inference.posterior.proposal import Mixture
+from inference.posterior.proposal import Mixture, Proposal
 
 __all__ = ["MAX_K_HAT", "WeightedDraws", "draw_weighted", "generalised_pareto", "pareto_k_hat"]
 
@@ -100,15 +100,15 @@ def pareto_k_hat(log_weights: Array) -> float:
 
 
 def draw_weighted(
-    density: CollapsedDensity, mixture: Mixture, rng: np.random.Generator, n: int
+    density: CollapsedDensity, proposal: Mixture | Proposal, rng: np.random.Generator, n: int
 ) -> WeightedDraws:
-    """Draw from a mixture and weight by the collapsed density.
+    """Draw from a proposal and weight by the collapsed density.
 
     Parameters
     ----------
     density : CollapsedDensity
         Target.
-    mixture : Mixture
+    proposal : Mixture or Proposal
         Proposal.
     rng : numpy.random.Generator
         Source of randomness.
@@ -120,9 +120,9 @@ def draw_weighted(
     WeightedDraws
         With k_hat inf where no draw has a positive density.
     """
-    z = mixture.draw(rng, n)
+    z = proposal.draw(rng, n)
     log_density = density(z)
-    log_weights = log_density - mixture.log_density(z)
+    log_weights = log_density - proposal.log_density(z)
     k_hat = pareto_k_hat(log_weights)
     total = float(special.logsumexp(log_weights))
     if not math.isfinite(total):

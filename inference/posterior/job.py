@@ -11,7 +11,8 @@ from inference.posterior.checks import check_frames, check_scene_for_posterior
 from inference.posterior.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.ensemble import Ensemble
 from inference.posterior.importance import WeightedDraws
-from inference.posterior.proposal import Mixture
+from inference.posterior.population import Population
+from inference.posterior.proposal import Mixture, Proposal
 from inference.posterior.selection import Selection
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.static import with_common_range
@@ -88,9 +89,9 @@ class Job:
         density = collapsed_density(self.sensor, self.scene, self.frames.select(self.usable))
         return with_common_range(density) if self.scene.motion == "static" else density
 
-    def stream(self, purpose: int) -> np.random.Generator:
+    def stream(self, *purpose: int) -> np.random.Generator:
         """Return the random stream of one purpose; streams of different purposes are distinct."""
-        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(purpose,)))
+        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=purpose))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -103,18 +104,21 @@ class Checkpoint:
         What is being done.
     optima : Mixture or None
         Laplace approximations at the optima; None where nothing is unknown.
-    proposal : Mixture or None
+    proposal : Proposal or None
         What the independent move proposes from; adapted to pilot draws that are then thrown away.
-    adaptations : int
-        How often it was adapted.
-    ensembles : tuple of Ensemble
-        Empty with importance sampling.
-    weighted : WeightedDraws or None
-        With importance sampling.
     calls : int
         Density evaluations so far.
     verdict : Verdict
         On the draws so far.
+    adaptations : int
+        How often the proposal was adapted.
+    populations : tuple of Population or None
+        On their way from the prior to the posterior, where the Laplace shapes do not fit; None
+        before they are drawn.
+    ensembles : tuple of Ensemble
+        Empty with importance sampling, and as long as populations are on their way.
+    weighted : WeightedDraws or None
+        With importance sampling.
     ess, r_hat : float or None
         Least effective sample size and largest R-hat so far.
     finished : bool
@@ -125,15 +129,16 @@ class Checkpoint:
 
     method: str
     optima: Mixture | None
-    proposal: Mixture | None
-    adaptations: int
-    ensembles: tuple[Ensemble, ...]
-    weighted: WeightedDraws | None
+    proposal: Proposal | None
     calls: int
     verdict: Verdict
-    ess: float | None
-    r_hat: float | None
-    finished: bool
+    adaptations: int = 0
+    populations: tuple[Population | None, ...] = ()
+    ensembles: tuple[Ensemble, ...] = ()
+    weighted: WeightedDraws | None = None
+    ess: float | None = None
+    r_hat: float | None = None
+    finished: bool = False
     selection: Selection | None = None
 
     def to_bytes(self) -> bytes:

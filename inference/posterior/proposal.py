@@ -1,4 +1,4 @@
-"""A mixture of Student-t laws on the optima: importance sampling, and an emcee move."""
+"""What independent jumps propose from: Student-t laws on the optima, and a map that unbends."""
 
 import dataclasses
 import functools
@@ -7,17 +7,17 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, spatial, special
+from scipy import special
 
 from inference.posterior.start import Optimum
+from inference.posterior.transport import TriangularMap
 
-__all__ = ["Mixture", "adapted", "mixture_of"]
+__all__ = ["Mixture", "Proposal", "log_student", "mixture_of", "student"]
 
 Array = NDArray[np.float64]
 
-_COMPONENTS = 96  # local pieces of an adapted mixture
-_LAPLACE_SHARE = 0.15  # of an adapted mixture that stays with the optima
-
+_LAPLACE_SHARE = 0.15  # of a proposal with a map that stays with the optima
+_MAP_DEGREES = 6.0  # of freedom in a map's coordinates, where the posterior is nearly normal
 _DEGREES = 5.0  # of freedom: heavier tails than any posterior that the Laplace shape fits
 
 
@@ -33,14 +33,11 @@ class Mixture:
         Lower triangular scale factors.
     weights : ndarray, shape (m,)
         Sum to one.
-    share : float
-        Of the steps of an ensemble that propose from it.
     """
 
     centres: Array
     factors: Array
     weights: Array
-    share: float = 0.5
 
     def log_density(self, z: Array) -> Array:
         """Return the log density at z of shape (n, d), shape (n,)."""
@@ -71,11 +68,6 @@ class Mixture:
         step = np.einsum("nij,nj->ni", self.factors[component], normal)
         return np.asarray(self.centres[component] + scale[:, None] * step)
 
-    def propose(self, coords: Array, random: np.random.RandomState) -> tuple[Array, Array]:
-        """Propose independently of where the walkers are, for `emcee.moves.MHMove`."""
-        new = self.draw(random, coords.shape[0])
-        return new, self.log_density(coords) - self.log_density(new)
-
     def nearest(self, z: Array) -> NDArray[np.intp]:
         """Return the component that each z of shape (n, d) belongs to most."""
         nearest: NDArray[np.intp] = np.argmin(self._squares(z), axis=0)
@@ -105,37 +97,75 @@ def mixture_of(optima: Sequence[Optimum]) -> Mixture:
     )
 
 
-def adapted(optima: Mixture, draws: Array, rng: np.random.Generator) -> Mixture:
-    """Make a mixture that follows a curved posterior: a local piece at each of many draws.
+def student(random: np.random.Generator | np.random.RandomState, n: int, d: int) -> Array:
+    """Draw n points of a standard Student-t law in d dimensions, shape (n, d)."""
+    normal = random.standard_normal((n, d))
+    scale = np.sqrt(_MAP_DEGREES / random.chisquare(_MAP_DEGREES, size=n))
+    return np.asarray(scale[:, None] * normal)
 
-    Parameters
+
+def log_student(x: Array) -> Array:
+    """Return the log density of a standard Student-t law at x of shape (n, d), shape (n,)."""
+    d = x.shape[1]
+    constant = special.gammaln((_MAP_DEGREES + d) / 2) - special.gammaln(_MAP_DEGREES / 2)
+    constant -= 0.5 * d * math.log(_MAP_DEGREES * math.pi)
+    tail = np.log1p(np.einsum("ni,ni->n", x, x) / _MAP_DEGREES)
+    return np.asarray(constant - 0.5 * (_MAP_DEGREES + d) * tail)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Proposal:
+    """The law of independent jumps.
+
+    Attributes
     ----------
     optima : Mixture
-        Laplace approximations, which keep a share.
-    draws : ndarray, shape (n, d)
-        Pilot draws of all ensembles together, none of which may be kept as a result.
-    rng : numpy.random.Generator
-        Chooses the draws that become centres.
-
-    Returns
-    -------
-    Mixture
-        Each piece has the covariance of the draws nearest to its centre.
+        Laplace approximations at the optima.
+    transport : TriangularMap or None
+        Where the Laplace shapes do not fit: a Student-t law in its coordinates takes most of the
+        weight, and ensembles walk in these coordinates.
+    share : float
+        Of the steps of an ensemble that propose from it.
     """
-    n, d = draws.shape
-    spread = linalg.cholesky(np.cov(draws.T).reshape(d, d) + 1e-12 * np.eye(d), lower=True)
-    white = linalg.solve_triangular(spread, draws.T, lower=True).T
-    chosen = rng.choice(n, size=min(_COMPONENTS, n), replace=False)
-    near = spatial.cKDTree(white).query(white[chosen], k=min(10 * d + 10, n))[1]
-    factors = []
-    for neighbours in np.atleast_2d(near):
-        local = np.cov(white[neighbours].T).reshape(d, d)
-        # nearest neighbours have less spread than the piece of the law that they stand for
-        local = local + 0.02 * np.trace(local) / d * np.eye(d)
-        factors.append(spread @ linalg.cholesky(local, lower=True))
-    pieces = np.full(chosen.size, (1 - _LAPLACE_SHARE) / chosen.size)
-    return Mixture(
-        np.concatenate([optima.centres, draws[chosen]]),
-        np.concatenate([optima.factors, np.array(factors)]),
-        np.concatenate([_LAPLACE_SHARE * optima.weights, pieces]),
-    )
+
+    optima: Mixture
+    transport: TriangularMap | None
+    share: float
+
+    def unbend(self, z: Array) -> tuple[Array, Array]:
+        """Return the walkers' coordinates of z, and log |dx/dz|."""
+        if self.transport is None:
+            return z, np.zeros(len(z))
+        return self.transport.unbend(z)
+
+    def bend(self, x: Array) -> tuple[Array, Array]:
+        """Return z of the walkers' coordinates, and log |dz/dx|."""
+        if self.transport is None:
+            return x, np.zeros(len(x))
+        return self.transport.bend(x)
+
+    def log_density(self, z: Array) -> Array:
+        """Return the log density at z of shape (n, d), shape (n,)."""
+        laplace = self.optima.log_density(z)
+        if self.transport is None:
+            return laplace
+        x, log_det = self.transport.unbend(z)
+        mapped = math.log1p(-_LAPLACE_SHARE) + log_student(x) + log_det
+        return np.asarray(np.logaddexp(math.log(_LAPLACE_SHARE) + laplace, mapped))
+
+    def draw(self, random: np.random.Generator | np.random.RandomState, n: int) -> Array:
+        """Draw n points z, shape (n, d); emcee brings a RandomState."""
+        z = self.optima.draw(random, n)
+        if self.transport is None:
+            return z
+        mapped = self.transport.bend(student(random, *z.shape))[0]
+        laplace = random.uniform(size=n) < _LAPLACE_SHARE
+        return np.where(laplace[:, None], z, mapped)
+
+    def propose(self, coords: Array, random: np.random.RandomState) -> tuple[Array, Array]:
+        """Propose walkers' coordinates independently of where they are, for emcee's `MHMove`."""
+        new = self.draw(random, coords.shape[0])
+        x, new_det = self.unbend(new)
+        old, old_det = self.bend(coords)
+        # densities in the walkers' coordinates: that of z times |dz/dx|
+        return x, self.log_density(old) + old_det - self.log_density(new) + new_det

@@ -85,9 +85,8 @@ def sample_of(
         z, log_density = weighted.z[keep], weighted.log_density[keep]
     else:
         # nothing unknown, or stopped before the first chunk: the starts are all there is
-        starts = [e.coords for e in checkpoint.ensembles]
         weighted = None
-        z = np.concatenate(starts or [np.empty((_WHERE_NOTHING_IS_UNKNOWN, 0))])
+        z = _starts(checkpoint)
         log_density = density(z)
     n = len(z)
     mode = np.zeros(n, dtype=np.intp)
@@ -102,3 +101,16 @@ def sample_of(
         None,
         weighted,
     )
+
+
+def _starts(checkpoint: Checkpoint) -> Array:
+    """Return where the walkers, or else the populations on their way, stand."""
+    proposal = checkpoint.proposal
+    if proposal is None:
+        return np.empty((_WHERE_NOTHING_IS_UNKNOWN, 0))
+    if checkpoint.ensembles:
+        return np.concatenate(
+            [proposal.bend(ensemble.coords)[0] for ensemble in checkpoint.ensembles]
+        )
+    arrived = [p.z for p in checkpoint.populations if p is not None and len(p.z)]
+    return np.concatenate(arrived or [proposal.optima.centres])

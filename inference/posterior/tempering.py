@@ -13,7 +13,7 @@ from scipy import optimize
 
 from inference.posterior.collapsed import CollapsedDensity
 
-__all__ = ["Population", "temper", "tempered_walkers"]
+__all__ = ["Population", "next_power", "temper", "tempered_walkers"]
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ _LAST_SWEEPS = 6
 _MOST_TEMPERATURES = 200
 
 
-def _next_power(log_likelihood: Array, power: float) -> float:
+def next_power(log_likelihood: Array, power: float) -> float:
     """Return the power at which half of the population still counts."""
     span = log_likelihood - log_likelihood.max()
 
@@ -96,7 +96,7 @@ def temper(
     power = 0.0
     jump = 2.38 / np.sqrt(2 * d)
     for _ in range(_MOST_TEMPERATURES):
-        new_power = _next_power(likelihood, power)
+        new_power = next_power(likelihood, power)
         weights = np.exp((new_power - power) * (likelihood - likelihood.max()))
         log_evidence += (new_power - power) * float(likelihood.max()) + np.log(weights.mean())
         weights /= weights.sum()

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.posterior.ensemble import Ensemble, new_ensemble
 from inference.posterior.importance import WeightedDraws
-from inference.posterior.proposal import Mixture
+from inference.posterior.population import Population
+from inference.posterior.proposal import Mixture, Proposal
+from inference.posterior.transport import fit_map
 from inference.posterior.verdict import Verdict
 from simulator.frames import Frames
 
@@ -73,11 +75,16 @@ def test_json_and_arrays(meta: dict[str, Any], arrays: dict[str, NDArray[Any]]) 
 
 def parts() -> list[Any]:
     rng = np.random.default_rng(120)
-    ensemble = new_ensemble(rng.standard_normal((4, 2)), np.zeros(4), np.random.SeedSequence(7))
+    mixture = Mixture(rng.standard_normal((1, 2)), np.ones((1, 2, 2)), np.ones(1))
+    proposal = Proposal(mixture, fit_map(rng.standard_normal((50, 2))), 0.5)
+    start = rng.standard_normal((4, 2))
+    ensemble = new_ensemble(proposal, start, np.zeros(4), np.random.SeedSequence(7))
     return [
         ensemble,
         (ensemble, ensemble),
-        Mixture(rng.standard_normal((1, 2)), np.ones((1, 2, 2)), np.ones(1)),
+        mixture,
+        proposal,
+        Population(start, np.zeros(4), np.ones(4), 0.25, -1e308, 3, 99),
         WeightedDraws(np.ones((3, 2)), np.ones(3), np.ones(3) / 3, math.inf, -1e308),
         Frames(np.ones((2, 2)), gain=np.array([1.0, np.nextafter(1.0, 2.0)])),
         Verdict(False, ("one", "two")),
@@ -93,7 +100,9 @@ def test_parts_of_a_checkpoint(value: Any) -> None:
 
 
 def test_a_random_stream_goes_on_where_it_stood() -> None:
-    ensemble = new_ensemble(np.zeros((4, 2)), np.zeros(4), np.random.SeedSequence(8))
+    mixture = Mixture(np.zeros((1, 2)), np.eye(2)[None], np.ones(1))
+    proposal = Proposal(mixture, None, 0.5)
+    ensemble = new_ensemble(proposal, np.zeros((4, 2)), np.zeros(4), np.random.SeedSequence(8))
     again = through(ensemble)
     assert isinstance(again, Ensemble)
     first, second = (np.random.RandomState(), np.random.RandomState())
