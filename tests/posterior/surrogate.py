@@ -14,7 +14,7 @@ from scipy import linalg, signal, special, stats
 
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.ensemble import advance, new_ensemble
-from inference.posterior.proposal import Mixture
+from inference.posterior.proposal import Mixture, Proposal
 from inference.posterior.verdict import Chains, chains_of
 
 Array = NDArray[np.float64]
@@ -101,13 +101,13 @@ def target(law: str) -> Callable[[Array], Array]:
     return lambda z: np.asarray(-0.5 * (z * z).sum(axis=1))
 
 
-def optima_of(law: str, d: int = 3, share: float = 0.5) -> Mixture:
+def optima_of(law: str, d: int = 3) -> Mixture:
     """Return the Laplace approximations of a law's optima."""
     centres = np.zeros((2 if law == "bimodal" else 1, d))
     weights = np.ones(1)
     if law == "bimodal":
         centres[1, 0], weights = DISTANCE, np.array([1 - UPPER, UPPER])
-    return Mixture(centres, np.repeat(np.eye(d)[None], len(centres), axis=0), weights, share)
+    return Mixture(centres, np.repeat(np.eye(d)[None], len(centres), axis=0), weights)
 
 
 def banana(z: Array) -> Array:
@@ -140,6 +140,7 @@ def ensembles_of(
     steps: int,
     starts: Array | None = None,
     shared: bool = False,
+    share: float = 0.5,
 ) -> Chains:
     """Run four real ensembles of 32 walkers.
 
@@ -155,17 +156,21 @@ def ensembles_of(
         Instead of draws from the optima.
     shared : bool
         Whether all ensembles are given one stream, which is a defect.
+    share : float
+        Of the steps that jump to the optima.
 
     Returns
     -------
     Chains
     """
     density, made = cheap(function), []
+    proposal = Proposal(optima, None, share)
     for k in range(4):
         stream = np.random.SeedSequence(seed, spawn_key=(0 if shared else k,))
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(9, k)))
         coords = optima.draw(rng, 32) if starts is None else starts[k]
-        made.append(advance(density, optima, new_ensemble(coords, function(coords), stream), steps))
+        ensemble = new_ensemble(proposal, coords, function(coords), stream)
+        made.append(advance(density, proposal, ensemble, steps))
     return chains_of(tuple(made), optima.nearest, tuple("abcdefgh"[: optima.centres.shape[1]]))
 
 

@@ -137,7 +137,7 @@ def test_real_ensembles_one_of_which_starts_in_another_mode() -> None:
         far = z - np.array([60.0, 0.0, 0.0])
         return np.asarray(np.logaddexp(-0.5 * (z**2).sum(axis=1), -0.5 * (far**2).sum(axis=1)))
 
-    chains = ensembles_of(two, dataclasses.replace(optima, share=0.1), 5, 600, starts=starts)
+    chains = ensembles_of(two, optima, 5, 600, starts=starts, share=0.1)
     assert "R-hat of" in " ".join(judge(chains, 400).reasons)
 
 

@@ -33,7 +33,7 @@ def test_inverse(transport: TriangularMap, seed: int, scale: float) -> None:
     z, log_det = transport.bend(x)
     assert np.isfinite(z).all()
     back, back_det = transport.unbend(z)
-    # a rounding of the widest coordinate is this much of the thinnest scale, a dozen operations each
+    # a rounding of the widest coordinate is so much of the thinnest scale, over some operations
     lost = 100 * 2.2e-16 * (1 + np.abs(z).max()) / np.exp(transport.scales[:, 0]).min() / 1e-4
     assert back == pytest.approx(x, rel=lost, abs=lost)
     assert back_det == pytest.approx(-log_det, rel=lost, abs=lost)
