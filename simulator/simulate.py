@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from simulator.compiled import compiled
+from simulator.discrepancy import matern
 from simulator.errors import InvalidInputError
 from simulator.frames import Frames
 from simulator.overflow import check_drawn, check_readings
@@ -20,9 +21,6 @@ __all__ = ["Simulation", "mean_readings", "simulate"]
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
-
-# correlation length of the model discrepancy in log r (design: about 1)
-DISCREPANCY_LENGTH = 1.0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -124,10 +122,8 @@ def _discrepancy(rng: np.random.Generator, ranges: Array, sd: float) -> Array:
     if logs.size == 0:
         return np.ones(ranges.size)
     knots = np.linspace(logs.min() - 1e-9, logs.max() + 1e-9, 200)
-    lag = np.sqrt(5.0) * np.abs(knots[:, None] - knots[None, :]) / DISCREPANCY_LENGTH
-    kernel = (1.0 + lag + lag**2 / 3.0) * np.exp(-lag)
     # a smooth kernel is singular to rounding: the square root is taken from its eigenvalues
-    values, vectors = linalg.eigh(kernel)
+    values, vectors = linalg.eigh(matern(knots[:, None] - knots[None, :]))
     path = sd * vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(knots.size))
     finite = np.where(np.isfinite(ranges), ranges, np.exp(knots[0]))
     return np.asarray(np.exp(np.interp(np.log(finite), knots, path)))

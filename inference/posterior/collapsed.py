@@ -78,7 +78,7 @@ def _log_likelihoods(
         table = tabulate(bounds, shape, crosstalk, background, law, r0, wave, read, shot, strongest)
         values = np.empty(table.shape[1])
         modes = np.empty((values.size // 2 + 1, 6))
-        scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative)
+        scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative, None)
         for j in range(frames.shape[0]):
             frame = (frames[j, 0], frames[j, 1], frames[j, 2])
             if present is not None and not present[j]:
@@ -171,6 +171,27 @@ class CollapsedDensity:
         elif good.any():
             out[good] = self.frame_log_likelihoods(z[good])
         return out
+
+    def curves(self, z: Array, rng: np.random.Generator) -> tuple[Array | None, Pair | None]:  # noqa: ARG002
+        """Draw what multiplies the object's flux given each z: here nothing.
+
+        Parameters
+        ----------
+        z : ndarray, shape (n, d)
+            Parameter vectors.
+        rng : numpy.random.Generator
+            Source of randomness.
+
+        Returns
+        -------
+        (ndarray, (float, float)) or (None, None)
+            Knots of shape (n, knots, 2) and their grid (`inference.posterior.warp.Curve`).
+        """
+        return None, None
+
+    def flux_errors(self, log_r: Array, rng: np.random.Generator) -> Array | None:  # noqa: ARG002
+        """Draw errors of the object's log flux at given log ranges from their prior: here none."""
+        return None
 
     def log_likelihood(self, z: Array) -> Array:
         """Return log p(frames | z), shape (len(z),)."""

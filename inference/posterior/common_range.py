@@ -246,7 +246,7 @@ def integrate_common_range(
             out[i], tops[i, 1] = empty, empty
             continue
         table = tabulate(bounds, shape, crosstalk, background, law, r0, wave, read, shot, strongest)
-        scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative)
+        scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative, None)
         modes = np.empty((table.shape[1] // 2 + 1, 6))
         count = _find_modes(modes, table[0], seen, scene)
         best = 0

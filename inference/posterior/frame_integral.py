@@ -24,6 +24,7 @@ from inference.posterior.integrand import (
     log_top,
     slope_and_curvature,
 )
+from inference.posterior.warp import Curve, curve_at
 from simulator.compiled import compiled
 from simulator.readings import background_readings, object_readings
 
@@ -84,10 +85,14 @@ def _fill(
     law: Law,
     r0: float,
     wave: Pair | None,
+    delta: Curve | None,
 ) -> None:
     """Fill one column of a table."""
     r = math.exp(u)
-    o1, o2 = object_readings(r, r0, wave, shape[0], shape[1], shape[2])
+    strength = shape[0]
+    if delta is not None:
+        strength *= math.exp(curve_at(u, delta)[0])
+    o1, o2 = object_readings(r, r0, wave, strength, shape[1], shape[2])
     table[0, k], table[1, k] = u, log_range_density(r, u, law)
     table[2, k], table[3, k] = o1, o2
     table[4, k], table[5, k] = o1, o2
@@ -156,6 +161,7 @@ def tabulate(
     read: Pair,
     shot: float | None,
     strongest: float,
+    delta: Curve | None = None,
 ) -> Array:
     """Tabulate the curve of mean readings, knots closer where it turns.
 
@@ -171,6 +177,8 @@ def tabulate(
         As for `log_integrand`.
     strongest : float
         Largest gain factor of the frames: what a turn of the curve is held against.
+    delta : Curve, optional
+        As for `log_integrand`.
 
     Returns
     -------
@@ -186,7 +194,7 @@ def tabulate(
     table = np.empty((6, n))
     for k in range(n):
         u = bounds[0] + (bounds[1] - bounds[0]) * k / (n - 1)
-        _fill(table, k, u, shape, background, law, r0, wave)
+        _fill(table, k, u, shape, background, law, r0, wave, delta)
     while True:
         split = np.empty(n - 1, dtype=np.bool_)
         more = _too_coarse(split, table, offset, unit, wave is None, shot)
@@ -199,7 +207,7 @@ def tabulate(
             k += 1
             if j < n - 1 and split[j]:
                 middle = 0.5 * (table[0, j] + table[0, j + 1])
-                _fill(finer, k, middle, shape, background, law, r0, wave)
+                _fill(finer, k, middle, shape, background, law, r0, wave, delta)
                 k += 1
         table, n = finer, n + more
 

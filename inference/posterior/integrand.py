@@ -2,6 +2,7 @@
 
 import math
 
+from inference.posterior.warp import Curve, curve_at
 from simulator.compiled import compiled
 from simulator.readings import (
     background_readings,
@@ -12,6 +13,7 @@ from simulator.readings import (
 )
 
 __all__ = [
+    "covariance_slope",
     "gaussian",
     "log_integrand",
     "log_range_density",
@@ -19,14 +21,15 @@ __all__ = [
     "precision_times",
     "range_slope",
     "slope_and_curvature",
+    "squared_cross",
 ]
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 Quad = tuple[float, float, float, float]
 Law = tuple[float, float, float, float, float, float, float, float]
-# shape, crosstalk, background, law of the range, r0, wave, read, shot, relative: what the kernels
-# know of a scene and its sensor; what is None does not exist in the machine code
+# shape, crosstalk, background, law of the range, r0, wave, read, shot, relative, error of the flux:
+# what the kernels know of a scene and its sensor; what is None does not exist in the machine code
 SceneArguments = tuple[
     Triple,
     Pair | None,
@@ -37,6 +40,20 @@ SceneArguments = tuple[
     Pair,
     float | None,
     float | None,
+    Curve | None,
+]
+# the same where the flux does have an error
+WarpedArguments = tuple[
+    Triple,
+    Pair | None,
+    Quad | None,
+    Law,
+    float,
+    Pair | None,
+    Pair,
+    float | None,
+    float | None,
+    Curve,
 ]
 
 LOG_2PI = math.log(2 * math.pi)
@@ -132,7 +149,30 @@ def precision_times(
 
 
 @compiled
-def _covariance_slope(
+def squared_cross(
+    first: Pair,
+    second: Pair,
+    mean: Pair,
+    signal: Pair,
+    read: Pair,
+    shot: float | None,
+    relative: float | None,
+    pulsed: bool,
+) -> float:
+    """Return the squared cross product of two whitened vectors: of both readings, what is free."""
+    unit = read[1]
+    cross = (first[0] / unit) * (second[1] / unit) - (first[1] / unit) * (second[0] / unit)
+    if shot is not None or relative is not None:
+        own1, own2, shared, s1, s2 = noise_parts(read, shot, relative, pulsed, mean, signal)
+        own1, own2, shared = own1 / unit / unit, own2 / unit / unit, shared / unit / unit
+        return cross * cross / _determinant(own1, own2, shared, s1 / unit, s2 / unit)
+    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
+        cross *= unit / read[0]
+        return cross * cross
+
+
+@compiled
+def covariance_slope(
     pull: Pair,
     mean: Pair,
     mean_slope: Pair,
@@ -189,6 +229,7 @@ def log_integrand(
     read: Pair,
     shot: float | None,
     relative: float | None,
+    delta: Curve | None = None,
 ) -> float:
     """Return log p(y, u | theta) less `log_top`.
 
@@ -206,10 +247,15 @@ def log_integrand(
         Prior of the range.
     r0, wave, read, shot, relative
         The sensor, as for `simulator.readings`.
+    delta : Curve, optional
+        Logarithm of the factor by which the object's flux differs from the model's.
     """
     r = math.exp(u)
     gain = frame[2]
-    o1, o2 = object_readings(r, r0, wave, gain * shape[0], shape[1], shape[2])
+    strength = gain * shape[0]
+    if delta is not None:
+        strength *= math.exp(curve_at(u, delta)[0])
+    o1, o2 = object_readings(r, r0, wave, strength, shape[1], shape[2])
     m1, m2 = o1, o2
     if background is not None:
         b1, b2 = background_readings(r, r0, wave, background)
@@ -236,6 +282,7 @@ def slope_and_curvature(
     read: Pair,
     shot: float | None,
     relative: float | None,
+    delta: Curve | None = None,
 ) -> Pair:
     """Return the slope of `log_integrand` along u and its Gauss-Newton curvature, never negative.
 
@@ -243,8 +290,14 @@ def slope_and_curvature(
     """
     r = math.exp(u)
     gain = frame[2]
-    o1, o2 = object_readings(r, r0, wave, gain * shape[0], shape[1], shape[2])
-    t1, t2 = object_slopes(r, r0, wave, gain * shape[0], shape[1], shape[2])
+    strength, warp = gain * shape[0], 0.0
+    if delta is not None:
+        value, warp = curve_at(u, delta)
+        strength *= math.exp(value)
+    o1, o2 = object_readings(r, r0, wave, strength, shape[1], shape[2])
+    t1, t2 = object_slopes(r, r0, wave, strength, shape[1], shape[2])
+    if delta is not None:
+        t1, t2 = t1 + warp * o1, t2 + warp * o2
     m1, m2 = o1, o2
     signal_slope = (t1, t2)
     if background is not None:
@@ -258,7 +311,7 @@ def slope_and_curvature(
     pulsed = wave is None
     p1, p2 = precision_times((t1, t2), (m1, m2), (o1, o2), read, shot, relative, pulsed)
     pull = precision_times((e1, e2), (m1, m2), (o1, o2), read, shot, relative, pulsed)
-    change = _covariance_slope(
+    change = covariance_slope(
         pull, (m1, m2), (t1, t2), (o1, o2), signal_slope, read, shot, relative, pulsed
     )
     return (

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.posterior.checks import check_frames, check_scene_for_posterior
 from inference.posterior.collapsed import CollapsedDensity, collapsed_density
+from inference.posterior.discrepant import with_discrepancy
 from inference.posterior.ensemble import Ensemble
 from inference.posterior.importance import WeightedDraws
 from inference.posterior.population import Population
@@ -87,7 +88,11 @@ class Job:
     def density(self) -> CollapsedDensity:
         """Return the collapsed density of the usable frames."""
         density = collapsed_density(self.sensor, self.scene, self.frames.select(self.usable))
-        return with_common_range(density) if self.scene.motion == "static" else density
+        if self.scene.motion == "static":
+            return with_common_range(density)
+        if self.scene.discrepancy is None:
+            return density
+        return with_discrepancy(density, self.scene.discrepancy)
 
     def stream(self, *purpose: int) -> np.random.Generator:
         """Return the random stream of one purpose; streams of different purposes are distinct."""
@@ -183,11 +188,6 @@ def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSetti
         raise RefusedError(
             "the object's amplitude changes from frame to frame in tangential motion, and the "
             "posterior has one amplitude for all frames; use the technique `differential`"
-        )
-    if scene.discrepancy is not None:
-        raise RefusedError(
-            "the posterior has no term for a model discrepancy; leave `discrepancy` out, and state "
-            "an independent relative error as the noise's `relative`"
         )
     if settings.seed is None:
         seed = int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 1)

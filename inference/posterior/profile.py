@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.collapsed import CollapsedDensity, empty_frame_log_likelihood
+from inference.posterior.discrepant import DiscrepantDensity
 from inference.posterior.frame_integral import (
     find_modes,
     integration_bounds,
@@ -62,7 +63,7 @@ def fill_best_ranges(
         table = tabulate(bounds, shape, crosstalk, background, law, r0, wave, read, shot, strongest)
         values = np.empty(table.shape[1])
         modes = np.empty((values.size // 2 + 1, 6))
-        scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative)
+        scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative, None)
         for j in range(frames.shape[0]):
             frame = (frames[j, 0], frames[j, 1], frames[j, 2])
             if present is not None and not present[j]:
@@ -96,6 +97,7 @@ def _moments(
     read: Pair,
     shot: float | None,
     relative: float | None,
+    warps: Array | None,
 ) -> None:
     """Fill means (n, frames, 2), and for the first vector slopes (frames, 2) and noise parts."""
     for i in range(shapes.shape[0]):
@@ -108,8 +110,12 @@ def _moments(
             if math.isfinite(positions[j]):
                 r = math.exp(positions[j])
                 strength = gain * shapes[i, 0]
+                if warps is not None:
+                    strength *= math.exp(warps[j, 0])
                 o1, o2 = object_readings(r, r0, wave, strength, shapes[i, 1], shapes[i, 2])
                 t1, t2 = object_slopes(r, r0, wave, strength, shapes[i, 1], shapes[i, 2])
+                if warps is not None:
+                    t1, t2 = t1 + warps[j, 1] * o1, t2 + warps[j, 1] * o2
             m1, m2 = o1, o2
             if backgrounds is not None and background is not None:
                 b1, b2 = background_readings(r, r0, wave, background)
@@ -145,6 +151,8 @@ def best_ranges(density: CollapsedDensity, z: Array) -> Array:
     """
     if isinstance(density, StaticDensity):
         return density.best(z)
+    if isinstance(density, DiscrepantDensity):
+        return density.best(z)[0]
     terms = density.parameters.terms(z)
     out = np.empty((z.shape[0], density.frames.shape[0], 3))
     fill_best_ranges(out, *density.arguments(terms))
@@ -158,7 +166,8 @@ class Linearisation:
     Attributes
     ----------
     residual : ndarray, shape (frames, 2)
-        Whitened, the direction along the range projected out.
+        Whitened, the direction along the range projected out; with a discrepancy more rows, those
+        of its coefficients, and their directions projected out, too.
     jacobian : ndarray, shape (frames, 2, d)
         Derivative of the residual along z, projected likewise.
     """
@@ -205,7 +214,13 @@ def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearis
     n = density.frames.shape[0]
     means = np.empty((2 * d + 1, n, 2))
     slopes, parts = np.empty((n, 2)), np.empty((n, 5))
-    everything: list[Any] = [*arguments[:3], positions, density.frames, *arguments[6:]]
+    warps = basis = None
+    coefficients = np.empty(0)
+    if isinstance(density, DiscrepantDensity):
+        coefficients = density.best(z[None])[1][0]
+        basis, slope = density.functions(positions)
+        warps = np.column_stack([basis @ coefficients, slope @ coefficients])
+    everything: list[Any] = [*arguments[:3], positions, density.frames, *arguments[6:], warps]
     _moments(means, slopes, parts, *everything)
     whitener = _whitener(parts)
     residual = np.einsum("nij,nj->ni", whitener, density.frames[:, :2] - means[0])
@@ -230,4 +245,44 @@ def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearis
         return Linearisation(residual, jacobian)
     residual = residual - unit * np.einsum("ni,ni->n", unit, residual)[:, None]
     jacobian = jacobian - unit[:, :, None] * np.einsum("ni,nid->nd", unit, jacobian)[:, None, :]
-    return Linearisation(residual, jacobian)
+    if basis is None:
+        return Linearisation(residual, jacobian)
+    dark: list[Any] = [np.zeros_like(arguments[0][:1]), *everything[1:]]
+    dark[0][:, 1:] = arguments[0][:1, 1:]
+    rest = np.empty((1, n, 2))
+    _moments(rest, np.empty((n, 2)), np.empty((n, 5)), *dark)
+    flux = -np.einsum("nij,nj->ni", whitener, means[0] - rest[0])
+    flux = flux - unit * np.einsum("ni,ni->n", unit, flux)[:, None]
+    return _eliminate(residual, jacobian, flux[:, :, None] * basis[:, None, :], coefficients)
+
+
+def _eliminate(
+    residual: Array, jacobian: Array, other: Array, coefficients: Array
+) -> Linearisation:
+    """Project out coefficients with standard normal priors, which add residuals of their own.
+
+    Parameters
+    ----------
+    residual, jacobian : ndarray, shape (frames, 2) and (frames, 2, d)
+        Of what stays.
+    other : ndarray, shape (frames, 2, k)
+        Derivative of the residual along the coefficients.
+    coefficients : ndarray, shape (k,)
+        Where.
+
+    Returns
+    -------
+    Linearisation
+        With half as many rows more as there are coefficients.
+    """
+    d, k = jacobian.shape[2], coefficients.size
+    q = np.linalg.qr(np.concatenate([other.reshape(-1, k), np.eye(k)]))[0]
+    pad = k % 2
+    rows = np.concatenate([residual.ravel(), coefficients])
+    rows = rows - q @ (q.T @ rows)
+    matrix = np.concatenate([jacobian.reshape(-1, d), np.zeros((k, d))])
+    matrix = matrix - q @ (q.T @ matrix)
+    return Linearisation(
+        np.concatenate([rows, np.zeros(pad)]).reshape(-1, 2),
+        np.concatenate([matrix, np.zeros((pad, d))]).reshape(-1, 2, d),
+    )

@@ -15,7 +15,7 @@ from inference.posterior.frame_integral import (
     tabulate,
 )
 from inference.posterior.integrand import Pair, SceneArguments, Triple, log_integrand
-from inference.posterior.rows import background_of, crosstalk_of, law_of
+from inference.posterior.rows import background_of, crosstalk_of, curve_of, law_of
 from inference.posterior.static import StaticDensity
 from simulator.compiled import compiled
 from simulator.readings import background_readings, noise_parts, object_readings
@@ -80,9 +80,11 @@ def _draw_ranges(
     read: Pair,
     shot: float | None,
     relative: float | None,
+    curves: Array | None,
+    grid: Pair | None,
 ) -> None:
     """Fill out[i, j] with log r."""
-    grid = np.empty((2 * _SIDE + 1, 2))
+    cells = np.empty((2 * _SIDE + 1, 2))
     strongest = frames[:, 2].max()
     for i in range(shapes.shape[0]):
         shape = (shapes[i, 0], shapes[i, 1], shapes[i, 2])
@@ -90,10 +92,13 @@ def _draw_ranges(
         background = background_of(backgrounds, i)
         law = law_of(laws, i)
         bounds = integration_bounds(law)
-        table = tabulate(bounds, shape, crosstalk, background, law, r0, wave, read, shot, strongest)
+        delta = curve_of(curves, grid, i)
+        table = tabulate(
+            bounds, shape, crosstalk, background, law, r0, wave, read, shot, strongest, delta
+        )
         values = np.empty(table.shape[1])
         modes = np.empty((values.size // 2 + 1, 6))
-        scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative)
+        scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative, delta)
         for j in range(frames.shape[0]):
             out[i, j] = math.nan
             if present is not None and not present[j]:
@@ -110,7 +115,7 @@ def _draw_ranges(
             for k in range(count):
                 mass = math.exp(modes[k, 5] - best)
                 if left <= mass or k == count - 1:
-                    out[i, j] = _invert(modes[k], uniforms[i, j, 1], frame, scene, grid)
+                    out[i, j] = _invert(modes[k], uniforms[i, j, 1], frame, scene, cells)
                     break
                 left -= mass
 
@@ -129,6 +134,7 @@ def _replicate(
     read: Pair,
     shot: float | None,
     relative: float | None,
+    errors: Array | None,
 ) -> None:
     """Fill out[i, j] with readings drawn at the log ranges positions[i, j]."""
     for i in range(positions.shape[0]):
@@ -139,6 +145,8 @@ def _replicate(
             if math.isfinite(positions[i, j]):
                 r = math.exp(positions[i, j])
                 strength = gain * shapes[i, 0]
+                if errors is not None:
+                    strength *= math.exp(errors[i, j])
                 o1, o2 = object_readings(r, r0, wave, strength, shapes[i, 1], shapes[i, 2])
             m1, m2 = o1, o2
             if backgrounds is not None and background is not None:
@@ -175,8 +183,9 @@ def draw_ranges(density: CollapsedDensity, z: Array, rng: np.random.Generator) -
         return density.draw_log_ranges(z, rng)
     n, frames = z.shape[0], density.frames.shape[0]
     out = np.empty((n, frames))
-    arguments = density.arguments(density.parameters.terms(z))
-    _draw_ranges(out, rng.random((n, frames, 2)), *arguments)
+    curves = density.curves(z, rng)
+    everything: list[Any] = [*density.arguments(density.parameters.terms(z)), *curves]
+    _draw_ranges(out, rng.random((n, frames, 2)), *everything)
     return out
 
 
@@ -184,6 +193,8 @@ def replicate(
     density: CollapsedDensity, z: Array, positions: Array, rng: np.random.Generator
 ) -> Array:
     """Draw readings anew at given parameters and log ranges.
+
+    A smooth error of the object's flux is drawn anew, too, from its prior.
 
     Parameters
     ----------
@@ -203,8 +214,9 @@ def replicate(
     """
     out = np.empty((*positions.shape, 2))
     arguments = density.arguments(density.parameters.terms(z))
+    errors = density.flux_errors(positions, rng)
     normals = rng.standard_normal((*positions.shape, 4))
     gains = np.ascontiguousarray(density.frames[:, 2])
-    everything: list[Any] = [*arguments[:3], positions, gains, *arguments[6:]]
+    everything: list[Any] = [*arguments[:3], positions, gains, *arguments[6:], errors]
     _replicate(out, normals, *everything)
     return out

@@ -13,9 +13,10 @@ from numba import extending
 from numpy.typing import NDArray
 
 from inference.posterior.integrand import Law, Pair, Quad
+from inference.posterior.warp import Curve
 from simulator.compiled import compiled
 
-__all__ = ["background_of", "crosstalk_of", "law_of"]
+__all__ = ["background_of", "crosstalk_of", "curve_of", "law_of"]
 
 Array = NDArray[np.float64]
 
@@ -30,6 +31,11 @@ def background_of(rows: Array | None, i: int) -> Quad | None:
     if rows is None:
         return None
     return float(rows[i, 0]), float(rows[i, 1]), float(rows[i, 2]), float(rows[i, 3])
+
+
+def curve_of(knots: Array | None, grid: Pair | None, i: int) -> Curve | None:
+    """Return curve i of knots of shape (n, knots, 2), or None where the flux has no error."""
+    return None if knots is None or grid is None else (knots[i], grid[0], grid[1])
 
 
 @compiled
@@ -59,3 +65,10 @@ def _background_of(rows: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
     if rows is numba.types.none:
         return lambda rows, i: None  # noqa: ARG005
     return lambda rows, i: (rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3])
+
+
+@extending.overload(curve_of, strict=False)
+def _curve_of(knots: Any, grid: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
+    if knots is numba.types.none:
+        return lambda knots, grid, i: None  # noqa: ARG005
+    return lambda knots, grid, i: (knots[i], grid[0], grid[1])

@@ -1,0 +1,57 @@
+"""A smooth curve of log r that multiplies the object's flux, as the kernels take it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.compiled import compiled
+
+__all__ = ["Curve", "cubic_weights", "curve_at", "fill_curve"]
+
+Array = NDArray[np.float64]
+# knots of shape (n, 2), value and slope times spacing; log r of the first; one over the spacing
+Curve = tuple[Array, float, float]
+
+
+@compiled
+def cubic_weights(
+    u: float, first: float, rate: float, count: int
+) -> tuple[int, float, float, float, float]:
+    """Return the knot left of u and the weights of its and the next one's value and slope."""
+    x = min(max((u - first) * rate, 0.0), count - 1.0)
+    i = min(int(x), count - 2)
+    t = x - i
+    rest = 1.0 - t
+    return (
+        i,
+        rest * rest * (1.0 + 2.0 * t),
+        rest * rest * t,
+        t * t * (3.0 - 2.0 * t),
+        -t * t * rest,
+    )
+
+
+@compiled
+def curve_at(u: float, curve: Curve) -> tuple[float, float]:
+    """Return value and derivative at u; beyond the knots the curve is constant."""
+    knots, first, rate = curve
+    i, a, b, c, d = cubic_weights(u, first, rate, knots.shape[0])
+    value = a * knots[i, 0] + b * knots[i, 1] + c * knots[i + 1, 0] + d * knots[i + 1, 1]
+    x = (u - first) * rate
+    if x <= 0.0 or x >= knots.shape[0] - 1.0:
+        return value, 0.0
+    t = x - i
+    rest = 1.0 - t
+    slope = 6.0 * t * rest * (knots[i + 1, 0] - knots[i, 0])
+    slope += rest * (1.0 - 3.0 * t) * knots[i, 1] + t * (3.0 * t - 2.0) * knots[i + 1, 1]
+    return value, slope * rate
+
+
+@compiled
+def fill_curve(knots: Array, basis: Array, coefficients: Array) -> None:
+    """Fill a curve's knots from coefficients; basis has shape (knots, 2, functions)."""
+    for i in range(basis.shape[0]):
+        for part in range(2):
+            total = 0.0
+            for k in range(coefficients.size):
+                total += basis[i, part, k] * coefficients[k]
+            knots[i, part] = total
