@@ -82,7 +82,6 @@ def test_stopped_before_the_first_chunk_there_is_still_an_answer() -> None:
     ("scene", "words"),
     [
         ({"motion": "tangential"}, "differential"),
-        ({"discrepancy": 0.05}, "discrepancy"),
     ],
 )
 def test_what_the_posterior_cannot_answer_is_refused_with_a_remedy(
