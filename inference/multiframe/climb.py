@@ -52,7 +52,7 @@ def _settle(
     shape = (shapes[0, 0], shapes[0, 1], shapes[0, 2])
     crosstalk, background = crosstalk_of(crosstalks, 0), background_of(backgrounds, 0)
     law = law_of(laws, 0)
-    scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative)
+    scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative, None)
     low, high = math.log(law[6]), math.log(law[7])
     for j in range(frames.shape[0]):
         if not present[j] or not math.isfinite(best[0, j, 0]):

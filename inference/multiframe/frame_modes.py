@@ -44,7 +44,7 @@ def _fill_modes(
     table = tabulate(bounds, shape, crosstalk, background, law, r0, wave, read, shot, strongest)
     values = np.empty(table.shape[1])
     modes = np.empty((values.size // 2 + 1, 6))
-    scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative)
+    scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative, None)
     for j in range(frames.shape[0]):
         if not present[j]:
             continue
