@@ -47,7 +47,7 @@ def test_likelihood_and_ranges_agree_with_a_sum_over_paths(kind: str, snr: float
     scene = {"object": OBJECT, "crosstalk": CROSSTALK, "range_m": SPAN}
     density = density_of(sensor, scene, frames, sd)
     wanted = sum_over_paths(
-        sensor, C, (0.002, 0.01), frames.readings, (0.3, 1.5), sd, paths=12_000, seed=1
+        sensor, C, (0.002, 0.01), frames.readings, (0.3, 1.5), sd, paths=8000, seed=1
     )
     # four standard errors, and what Laplace's method leaves out: of the order of the squared
     # skewness of log-normal noise of this size, sd^2 a frame
@@ -122,7 +122,7 @@ def test_units_do_not_matter(scale: float) -> None:
 
 def test_an_empty_frame_counts_as_without_discrepancy(kind: str) -> None:
     sensor = sensor_of(kind)
-    frames = data(sensor, {"crosstalk": CROSSTALK}, 5).frames
+    frames = data(sensor, {"crosstalk": CROSSTALK}, 5, span=(0.4, 1.2)).frames
     scene = {"object": OBJECT, "crosstalk": CROSSTALK, "range_m": SPAN}
     empty = Frames(np.array([[0.0021, 0.0099]]), object_present=np.array([False]))
     both = Frames(
@@ -132,7 +132,7 @@ def test_an_empty_frame_counts_as_without_discrepancy(kind: str) -> None:
     alone = collapsed_density(sensor, parse_scene(scene), empty).log_likelihood(NOTHING)
     five = density_of(sensor, scene, frames, 0.05).log_likelihood(NOTHING)
     density = density_of(sensor, scene, both, 0.05)
-    assert density.log_likelihood(NOTHING) == pytest.approx(alone + five, abs=1e-9)
+    assert density.log_likelihood(NOTHING) == pytest.approx(alone + five, rel=1e-9)
     assert density_of(sensor, scene, empty, 0.05).log_likelihood(NOTHING) == pytest.approx(alone)
     drawn = draw_ranges(density, np.empty((3, 0)), np.random.default_rng(1))
     assert np.isnan(drawn[:, 5]).all()
@@ -233,11 +233,11 @@ def test_a_job_with_discrepancy_answers_for_every_frame() -> None:
         {
             "object": {"c0": OBJECT["c0"], "c1": OBJECT["c1"]},
             "crosstalk": CROSSTALK,
-            "range_m": {"prior": "stroke", "low": 0.1, "high": 3.0},
+            "range_m": SPAN,
             "discrepancy": 0.03,
         }
     )
-    frames = data(sensor, {"crosstalk": CROSSTALK, "discrepancy": 0.03}, 8).frames
+    frames = data(sensor, {"crosstalk": CROSSTALK, "discrepancy": 0.03}, 8, span=(0.4, 1.2)).frames
     job = fold.prepare(sensor, scene, frames, SamplerSettings(seed=1, method="importance"))
     assert isinstance(job.density(), DiscrepantDensity)
     assert type(job.from_bytes(job.to_bytes()).density()) is DiscrepantDensity
