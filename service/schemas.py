@@ -221,9 +221,21 @@ class _Identifiability(pydantic.BaseModel):
     reason: str
 
 
+class _FitCheck(pydantic.BaseModel):
+    name: Literal["total", "worst_frame", "neighbours", "wander"]
+    statistic: float
+    expected: float
+    p_value: float
+
+
 class _Fit(pydantic.BaseModel):
     p_value: float | None
     misfit: bool
+    reasons: list[str]
+    chi_square: float | None
+    degrees_of_freedom: float | None
+    checks: list[_FitCheck]
+    outliers: list[int]
 
 
 class _LeftOutTerm(pydantic.BaseModel):

@@ -14,6 +14,7 @@ from inference.posterior.verdict import Verdict
 
 __all__ = [
     "Fit",
+    "FitCheck",
     "JointMode",
     "LeftOutTerm",
     "Mode",
@@ -170,11 +171,53 @@ class RangeSummary:
 
 
 @dataclasses.dataclass(frozen=True)
+class FitCheck:
+    """One of the checks of a fit.
+
+    Attributes
+    ----------
+    name : str
+        "total": chi-square of all frames; "worst_frame": its squared residual; "neighbours":
+        correlation of residuals along the range; "wander": their slow wandering along it.
+    statistic, expected : float
+        Of the frames, and the mean over replicates of them.
+    p_value : float
+        How rarely a replicate is as large.
+    """
+
+    name: str
+    statistic: float
+    expected: float
+    p_value: float
+
+
+@dataclasses.dataclass(frozen=True)
 class Fit:
-    """Posterior predictive check: is the model able to make such readings at all."""
+    """Posterior predictive checks: is the model able to make such readings at all.
+
+    Attributes
+    ----------
+    p_value : float
+        Of all checks together.
+    misfit : bool
+        Whether it is below 1e-3.
+    reasons : tuple of str
+        What misfits, in plain words.
+    chi_square, degrees_of_freedom : float
+        Of the frames at their best ranges, parameters fitted, and what is expected of it.
+    checks : tuple of FitCheck
+        One by one.
+    outliers : tuple of int
+        Frames too far off the model, by index, where the worst frame is a reason.
+    """
 
     p_value: float
     misfit: bool
+    reasons: tuple[str, ...]
+    chi_square: float
+    degrees_of_freedom: float
+    checks: tuple[FitCheck, ...]
+    outliers: tuple[int, ...]
 
 
 @dataclasses.dataclass(frozen=True)

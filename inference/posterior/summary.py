@@ -97,7 +97,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
     log_r = np.log(draws.range_m[..., job.usable]).reshape(len(chosen), int(job.usable.sum()))
     conflicts = prior_conflicts(density, z, log_r)
     verdict = Verdict(verdict.converged and not conflicts, (*verdict.reasons, *conflicts))
-    fit = predictive_check(density, chosen, log_r, rng)
+    fit = predictive_check(job, density, chosen, rng)
     folds = near_fold(job, density, chosen, log_r)
     importance_ess = None if sample.weighted is None else sample.weighted.ess
     return Posterior(

@@ -161,7 +161,15 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
                 key: [] for key in ("q05", "q50", "q95", "mean", "sd", "near_fold", "modes")
             },
             "identifiability": [],
-            "fit": {"p_value": 0.5, "misfit": False},
+            "fit": {
+                "p_value": 0.5,
+                "misfit": False,
+                "reasons": [],
+                "chi_square": 1.0,
+                "degrees_of_freedom": 1.0,
+                "checks": [],
+                "outliers": [],
+            },
             "left_out": [],
             "runtime": {"wall_s": wall_s, "cpu_s": cpu_s, "likelihood_calls": 1, "k_hat": None},
         }
