@@ -36,7 +36,9 @@ def _neighbours(of: FitResiduals) -> Array:
         return np.zeros(len(of.across))
     size = np.sum(of.across**2, axis=1)
     products = np.sum(of.across[:, 1:] * of.across[:, :-1], axis=1)
-    return np.divide(products, size, out=np.zeros_like(size), where=size > 0)
+    correlation = np.zeros(len(size))
+    np.divide(products, size, out=correlation, where=size > 0)
+    return correlation
 
 
 def _wander(of: FitResiduals) -> Array:

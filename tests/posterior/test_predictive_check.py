@@ -34,12 +34,8 @@ def checked(sensor: Sensor, scene: Scene, frames: Frames, seed: int = 0) -> Fit:
     if not names:
         return predictive_check(job, density, np.empty((5, 0)), rng)
     values = {f"object.{name}": value for name, value in OBJECT.items()}
-    values |= {
-        "crosstalk.w1": 0.002,
-        "crosstalk.w2": 0.01,
-        "crosstalk.i": 0.002,
-        "crosstalk.q": 0.01,
-    }
+    columns = (f"crosstalk.{column}" for column in sensor.columns)
+    values |= dict(zip(columns, TRUTH["crosstalk"], strict=True))
     truth = density.parameters.standard(np.array([[values[name] for name in names]]))[0]
     optimum = refine(density, truth)
     assert isinstance(optimum, Optimum)
@@ -75,11 +71,14 @@ def test_false_alarms_are_as_rare_as_stated(kind: str, crosstalk: bool, snr: flo
 
 
 def wobble(amplitude: float) -> Callable[[Array, Array], Array]:
-    return lambda readings, r: readings * (1 + amplitude * np.sin(3 * np.log(r)))[:, None]
+    def spoil(readings: Array, r: Array) -> Array:
+        return np.asarray(readings * (1 + amplitude * np.sin(3 * np.log(r)))[:, None])
+
+    return spoil
 
 
 def one_off(readings: Array, _: Array) -> Array:
-    return readings * (1 + 0.02 * (np.arange(len(readings)) == 7))[:, None]
+    return np.asarray(readings * (1 + 0.02 * (np.arange(len(readings)) == 7))[:, None])
 
 
 @pytest.mark.parametrize(
@@ -135,9 +134,8 @@ def test_known_parameters_and_empty_frames() -> None:
     fit = checked(sensor, scene, told)
     assert not fit.misfit
     assert fit.degrees_of_freedom == pytest.approx(8 + 2 * 4, abs=1.0)
-    off = dataclasses.replace(
-        told, readings=told.readings + np.where(np.arange(12) == 9, 1e-3, 0.0)[:, None]
-    )
+    shift = np.where(np.arange(12) == 9, 1e-3, 0.0)[:, None]
+    off = dataclasses.replace(told, readings=told.readings + shift)
     spoilt = checked(sensor, scene, off)
     assert spoilt.misfit
     assert spoilt.outliers == (9,)
