@@ -76,6 +76,8 @@ class Cell:
             R_NAME: self.distance,
             "background.shadow.c0": 0.73 * C0,
             "background.shadow.c1": 0.23 * abs(C1),
+            "range_m.centre": float(np.exp(np.log(self.ranges).mean())),
+            "range_m.spread": float(np.log(self.ranges).std()),
         }
 
     @property
