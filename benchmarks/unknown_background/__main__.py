@@ -1,6 +1,6 @@
 """Finish the table, then draw the picture and print the table.
 
-    python -m benchmarks.unknown_background [--case A] [--seconds 60] [--sets 48]
+    python -m benchmarks.unknown_background [--case A] [--seconds 60] [--sets 53]
 
 Interrupt it at will: it goes on where it stopped. With `--sets 0` it only draws.
 """
@@ -19,7 +19,7 @@ FIGURE = Path(__file__).parents[2] / "docs" / "unknown_background.png"
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--case", choices=("A", "B"), help="default: both")
+    parser.add_argument("--case", choices=("A", "W", "B"), help="default: all")
     parser.add_argument("--seconds", type=float, default=60.0, help="at most, a posterior")
     parser.add_argument("--sets", type=int, default=len(CELLS), help="at most so many posteriors")
     given = parser.parse_args()
@@ -28,14 +28,16 @@ def main() -> None:
     resume(TABLE, COLUMNS, numbers, work)
     rows = sorted(rows_of(TABLE), key=lambda row: int(row["set"]))
     draw(rows, FIGURE)
-    print("| case | R [m] | ranges [m] | SNR | bound | predicted | posterior | converged |")
-    print("|---|---|---|---|---|---|---|---|")
+    print(
+        "| case | R [m] | ranges [m] | SNR | bound | predicted | posterior | its error | converged |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|")
     for row in rows:
         numbers_of = [f"{100 * float(row[name]):.2g} %" for name in ("bound", "predicted", "sd")]
         where = f"{row['from_m']}-{row['to_m']}"
         print(
             f"| {row['case']} | {row['distance_m']} | {where} | {float(row['snr']):.0e} | "
-            f"{' | '.join(numbers_of)} | {'yes' if row['converged'] == '1' else 'no'} |"
+            f"{' | '.join(numbers_of)} | {float(row['error']):+.1f} sd | {'yes' if row['converged'] == '1' else 'no'} |"
         )
 
 

@@ -31,9 +31,6 @@ SNRS = (1e2, 1e3, 1e4, 1e5, 1e6)
 C0, C1, C2 = 0.0769, -0.123, 0.0957
 # what is known beforehand: the order of magnitude
 DISTANCE = {"prior": "lognormal", "median": 5.0, "sigma": 0.7}
-# the ranges: a stroke of unknown centre and spread, before the background. Independent ranges under
-# a wide prior would be pushed as far as the readings allow, N nats an e-fold of their scale
-RANGES = {"prior": "stroke", "low": 0.05, "high": 3.0}
 STRENGTH = {"prior": "lognormal", "median": 0.01, "sigma": 1.5}
 
 
@@ -59,7 +56,9 @@ class Cell:
 
     @property
     def ranges(self) -> Array:
-        return np.linspace(*self.span, FRAMES)
+        """The expected order statistics of as many draws from the prior of log r."""
+        low, high = np.log(self.span)
+        return np.exp(low + (high - low) * np.arange(1, FRAMES + 1) / (FRAMES + 1))
 
     @property
     def strength(self) -> float:
@@ -76,17 +75,19 @@ class Cell:
             R_NAME: self.distance,
             "background.shadow.c0": 0.73 * C0,
             "background.shadow.c1": 0.23 * abs(C1),
-            "range_m.centre": float(np.exp(np.log(self.ranges).mean())),
-            "range_m.spread": float(np.log(self.ranges).std()),
         }
 
     @property
     def scene(self) -> Scene:
         """What the posterior is told."""
         background: dict[str, Any] = {"strength": STRENGTH, "distance_m": DISTANCE}
-        if self.case == "A":
+        if self.case != "B":
             background["shadow"] = "object"
-        return parse_scene({"background": background, "range_m": RANGES})
+        if self.case == "W":
+            return parse_scene({"background": background})
+        low, high = self.span
+        law = {"prior": "loguniform", "low": low, "high": high}
+        return parse_scene({"background": background, "range_m": law})
 
     @property
     def made_of(self) -> Scene:
@@ -95,7 +96,7 @@ class Cell:
         background = {
             "strength": self.strength,
             "distance_m": self.distance,
-            "shadow": "object" if self.case == "A" else shadow,
+            "shadow": shadow if self.case == "B" else "object",
         }
         return parse_scene({"object": {"c0": C0, "c1": C1, "c2": C2}, "background": background})
 
@@ -144,7 +145,8 @@ def _cells() -> list[Cell]:
         Cell("B", distance, span, snr, 0)
         for distance, span, snr in itertools.product((3.0, 10.0), SPANS, SNRS[::2])
     ]
-    return first + second
+    wide = [Cell("W", 3.0, SPANS[0], snr, 0) for snr in SNRS]
+    return first + wide + second
 
 
 CELLS = _cells()
@@ -152,7 +154,16 @@ CELLS = _cells()
 
 COLUMNS = (
     *("set", "case", "distance_m", "from_m", "to_m", "snr", "repeat"),
-    *("bound", "predicted", "sd", "median_m", "scale_bound", "scale_predicted", "scale_sd"),
+    *(
+        "bound",
+        "predicted",
+        "sd",
+        "median_m",
+        "error",
+        "scale_bound",
+        "scale_predicted",
+        "scale_sd",
+    ),
     *("status", "converged", "method", "ess", "rhat", "k_hat", "cpu_s", "version"),
 )
 
@@ -181,6 +192,7 @@ def row_of(number: int, version: str, seconds: float) -> Row:
         "predicted": foreseen.predicted,
         "sd": float(distances.std()),
         "median_m": summary.q50,
+        "error": math.log(summary.q50 / cell.distance) / float(distances.std()),
         "scale_bound": foreseen.scale_bound,
         "scale_predicted": foreseen.scale_predicted,
         "scale_sd": float(np.log(found.draws.range_m).mean(axis=1).std()),

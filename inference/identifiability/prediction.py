@@ -103,16 +103,44 @@ def predict(experiment: Experiment, whitener: Array | None = None) -> Prediction
     unit = np.where(moves[:, None], along, 0.0) / np.where(moves, length, 1.0)[:, None]
     shift = np.einsum("ni,nid->nd", unit, jacobian)
     across = jacobian - unit[:, :, None] * shift[:, None, :]
+    variance, response = np.full(n, np.inf), np.zeros((n, d))
+    variance[moves] = 1 / length[moves] ** 2
+    response[moves] = -shift[moves] / length[moves, None]
+    room = _room(experiment)
+    if math.isfinite(room):
+        # a scale that is known to the room which the support leaves tells of what moves with it
+        own = math.sqrt(variance[present].sum()) / present.sum()
+        extra.append(response[present].mean(axis=0)[None] / math.hypot(room, own))
     factor = np.empty((0, 0))
     if d > 0:
         triangle = linalg.qr(np.concatenate([across.reshape(-1, d), *extra]), mode="r")[0][:d]
         factor = np.asarray(linalg.solve_triangular(triangle, np.eye(d)))
-    variance, response = np.full(n, np.inf), np.zeros((n, d))
-    variance[moves] = 1 / length[moves] ** 2
-    response[moves] = -shift[moves] / length[moves, None]
     range_sd = np.sqrt(variance + np.linalg.norm(response @ factor, axis=1) ** 2)
     range_sd = np.where(present, _limited(range_sd, log_range_spread(p)), np.nan)
-    return Prediction(factor, range_sd, _scale_sd(experiment, variance, response, factor))
+    if not present.any():
+        return Prediction(factor, range_sd, math.nan)
+    own = float(variance[present].sum()) / present.sum() ** 2
+    shared = np.linalg.norm(response[present].mean(axis=0) @ factor)
+    scale = np.array([math.sqrt(own + shared**2)])
+    limit = min(room, log_range_spread(p))
+    return Prediction(factor, range_sd, float(_limited(scale, limit)[0]))
+
+
+def _room(experiment: Experiment) -> float:
+    """Return how far the ranges can move together inside the support of their prior.
+
+    The standard deviation of log r that a flat prior leaves to a common shift; inf for a prior
+    whose curvature says more, and where no frame has an object.
+    """
+    present = np.isfinite(experiment.log_r)
+    law = experiment.terms.ranges[0]
+    if not present.any() or law[3] > 0 or law[5] > 0:
+        return math.inf
+    low, high = float(law[6]), float(law[7])
+    if not low > 0:
+        return math.inf
+    room = math.log(high / low) - float(np.ptp(experiment.log_r[present]))
+    return room / math.sqrt(12) if room > 0 else math.inf
 
 
 def _spread_rows(along: Array, plus: Array, minus: Array, inverse: float) -> Array:
@@ -126,20 +154,3 @@ def _spread_rows(along: Array, plus: Array, minus: Array, inverse: float) -> Arr
     with np.errstate(divide="ignore"):
         own = 1 / (along[:, 0] ** 2 + along[:, 1] ** 2)
     return np.asarray(np.sqrt(np.sum(2 * w**2 / (w**2 + own) ** 2)) * rate[None])
-
-
-def _scale_sd(experiment: Experiment, variance: Array, response: Array, factor: Array) -> float:
-    """Return the spread of the mean of log r, which the ranges' support bounds."""
-    present = np.isfinite(experiment.log_r)
-    n = int(present.sum())
-    if n == 0:
-        return math.nan
-    shared = np.linalg.norm(response[present].mean(axis=0) @ factor)
-    sd = np.sqrt(variance[present].sum() / n / n + shared**2)
-    where = experiment.log_r[present]
-    low, high = experiment.terms.ranges[0, 6:8]
-    with np.errstate(divide="ignore"):
-        room = float(np.log(high) - np.log(low) - np.ptp(where))
-    limit = room / math.sqrt(12) if room > 0 else math.inf
-    limit = min(limit, log_range_spread(experiment.parameters))
-    return float(_limited(np.array([sd]), limit)[0])
