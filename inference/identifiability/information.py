@@ -39,6 +39,11 @@ class Information:
     own_variance : ndarray, shape (n,)
         Variance of log r_i with x known; inf where the readings do not depend on r_i, nan for a
         frame without object.
+    errors : ndarray, shape (m, k)
+        Derivatives along k independent standard normal errors that all frames share, projected as
+        ``jacobian`` is.
+    error_response : ndarray, shape (n, k)
+        d log r_i along them, as ``response``.
     """
 
     names: tuple[str, ...]
@@ -46,6 +51,8 @@ class Information:
     before: Array
     response: Array
     own_variance: Array
+    errors: Array
+    error_response: Array
 
     @functools.cached_property
     def _equilibrated(self) -> tuple[Array, Array, Array]:
@@ -88,23 +95,29 @@ class Information:
         """Least singular value that counts as non-zero, as a multiple of `resolution`."""
         return float(self._equilibrated[1][self.rank - 1]) / self.resolution if self.rank else 0.0
 
-    @functools.cached_property
-    def singular_values(self) -> Array:
-        """Singular values of the Jacobian, descending, those beyond the rank exactly 0, (d,)."""
-        if not self.names:
-            return np.empty(0)
-        columns = self._columns
-        # graded columns are scaled for the triangle only, which keeps their relative accuracy
-        triangle = _triangle(self.jacobian / columns) * columns
-        values = linalg.svdvals(triangle)
-        values = np.pad(values, (0, len(self.names) - values.size))
-        values[self.rank :] = 0.0
-        return values
+    def _with_errors(self, columns: Array) -> Array:
+        """Return the triangle of the shared errors and of given columns, the errors first."""
+        k = self.errors.shape[1]
+        prior = np.hstack([np.eye(k), np.zeros((k, columns.shape[1]))])
+        return _triangle(np.vstack([np.hstack([self.errors, columns]), prior]))
 
     @functools.cached_property
-    def _columns(self) -> Array:
+    def singular_values(self) -> Array:
+        """Singular values of the Jacobian, descending, those beyond the rank exactly 0, (d,).
+
+        Where frames share errors, those of what the errors leave.
+        """
+        d, k = len(self.names), self.errors.shape[1]
+        if d == 0:
+            return np.empty(0)
         columns = np.linalg.norm(self.jacobian, axis=0)
-        return np.where(columns > 0, columns, 1.0)
+        columns = np.where(columns > 0, columns, 1.0)
+        # graded columns are scaled for the triangle only, which keeps their relative accuracy
+        triangle = self._with_errors(self.jacobian / columns)[k:, k:] * columns
+        values = linalg.svdvals(triangle) if triangle.size else np.empty(0)
+        values = np.pad(values, (0, d - values.size))
+        values[self.rank :] = 0.0
+        return values
 
     @functools.cached_property
     def null_space(self) -> Array:
@@ -132,24 +145,33 @@ class Information:
         return np.asarray(direction / direction[index])
 
     @functools.cached_property
+    def _factors(self) -> tuple[Array, Array]:
+        """F of x, shape (d, k + rank), and of the shared errors, shape (k, k + rank)."""
+        columns, _, vectors = self._equilibrated
+        k = self.errors.shape[1]
+        told = vectors[:, : self.rank] / columns[:, None]
+        sizes = np.linalg.norm(self.jacobian @ told, axis=0)
+        told = told / np.where(sizes > 0, sizes, 1.0)
+        triangle = self._with_errors(self.jacobian @ told)
+        if triangle.size == 0:
+            return np.zeros((len(self.names), 0)), np.zeros((0, 0))
+        inverse = linalg.solve_triangular(triangle, np.eye(k + self.rank))
+        return told @ inverse[k:], np.asarray(inverse[:k])
+
+    @property
     def factor(self) -> Array:
         """F with F F^T the bound on the covariance inside the space that the readings tell."""
-        columns, _, vectors = self._equilibrated
-        told = vectors[:, : self.rank] / columns[:, None]
-        if self.rank == 0:
-            return np.empty((len(self.names), 0))
-        reduced = self.jacobian @ told
-        sizes = np.linalg.norm(reduced, axis=0)
-        _, values, right = linalg.svd(_triangle(reduced / sizes))
-        return np.asarray((told / sizes) @ right.T / values)
+        return self._factors[0]
 
-    def sd_of(self, functionals: Array) -> Array:
+    def sd_of(self, functionals: Array, of_errors: Array | None = None) -> Array:
         """Return the Cramer-Rao bound on the standard deviation of linear functions of x.
 
         Parameters
         ----------
         functionals : ndarray, shape (k, d)
             Coefficients, a row each.
+        of_errors : ndarray, shape (k, errors), optional
+            Coefficients of the errors that the frames share.
 
         Returns
         -------
@@ -164,7 +186,10 @@ class Information:
         # rounding turns the null space by its size over the gap
         least = values[self.rank - 1] if self.rank else 1.0
         told = part <= min(1e-12 + 10 * self.resolution / least, 0.1)
-        return np.where(told, np.linalg.norm(functionals @ self.factor, axis=1), np.inf)
+        product = functionals @ self._factors[0]
+        if of_errors is not None:
+            product = product + of_errors @ self._factors[1]
+        return np.where(told, np.linalg.norm(product, axis=1), np.inf)
 
     @functools.cached_property
     def sd(self) -> Array:
@@ -176,7 +201,8 @@ class Information:
         """Cramer-Rao bound of every log r, shape (n,); nan for a frame without object."""
         present = np.isfinite(self.response).all(axis=1) & ~np.isnan(self.own_variance)
         sd = np.full(self.own_variance.size, np.nan)
-        sd[present] = np.sqrt(self.own_variance[present] + self.sd_of(self.response[present]) ** 2)
+        shared = self.sd_of(self.response[present], self.error_response[present])
+        sd[present] = np.sqrt(self.own_variance[present] + shared**2)
         return sd
 
     @functools.cached_property
@@ -187,7 +213,10 @@ class Information:
         if n == 0:
             return float("nan")
         own = float(self.own_variance[present].sum()) / n / n
-        shared = self.sd_of(self.response[present].mean(axis=0)[None])[0]
+        mean, of_errors = (
+            part[present].mean(axis=0)[None] for part in (self.response, self.error_response)
+        )
+        shared = self.sd_of(mean, of_errors)[0]
         return float(np.sqrt(own + shared**2))
 
     def correlation(self) -> Array:
@@ -203,7 +232,9 @@ def _triangle(matrix: Array) -> Array:
     return np.asarray(linalg.qr(matrix[order], mode="r")[0][: matrix.shape[1]])
 
 
-def eliminate(names: tuple[str, ...], jacobian: Array, along_range: Array) -> Information:
+def eliminate(
+    names: tuple[str, ...], jacobian: Array, along_range: Array, errors: Array | None = None
+) -> Information:
     """Eliminate the range of every frame.
 
     Parameters
@@ -215,12 +246,18 @@ def eliminate(names: tuple[str, ...], jacobian: Array, along_range: Array) -> In
     along_range : ndarray, shape (n, 2)
         Whitened derivative along log r; zero where the readings do not depend on it, nan for a
         frame without object.
+    errors : ndarray, shape (n, 2, k), optional
+        Whitened derivatives along independent standard normal errors that all frames share.
 
     Returns
     -------
     Information
     """
     n, _, d = jacobian.shape
+    if errors is None:
+        errors = np.empty((n, 2, 0))
+    k = errors.shape[2]
+    both = np.concatenate([jacobian, errors], axis=2)
     empty = np.asarray(np.isnan(along_range).any(axis=1))
     length = np.linalg.norm(np.where(empty[:, None], 0.0, along_range), axis=1)
     moves = length > 0
@@ -228,14 +265,16 @@ def eliminate(names: tuple[str, ...], jacobian: Array, along_range: Array) -> In
     # both components of the projection are one number along the normal: no difference is left
     # of two vectors, only that of two products
     normal = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
-    across = np.einsum("ni,nid->nd", normal[moves], jacobian[moves])
+    across = np.einsum("ni,nid->nd", normal[moves], both[moves])
     sizes = np.linalg.norm(jacobian, axis=1)
-    whole = jacobian[~moves]
-    rows = np.concatenate([across, whole.reshape(2 * len(whole), d)])
+    whole = both[~moves]
+    rows = np.concatenate([across, whole.reshape(2 * len(whole), d + k)])
     before = np.concatenate([sizes[moves], np.repeat(sizes[~moves], 2, axis=0)])
-    response = np.zeros((n, d))
+    response = np.zeros((n, d + k))
     variance = np.full(n, np.inf)
-    response[moves] = -np.einsum("ni,nid->nd", unit[moves], jacobian[moves]) / length[moves, None]
+    response[moves] = -np.einsum("ni,nid->nd", unit[moves], both[moves]) / length[moves, None]
     variance[moves] = 1 / length[moves] ** 2
     response[empty], variance[empty] = np.nan, np.nan
-    return Information(names, rows, before, response, variance)
+    return Information(
+        names, rows[:, :d], before, response[:, :d], variance, rows[:, d:], response[:, d:]
+    )
