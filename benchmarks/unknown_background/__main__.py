@@ -28,17 +28,19 @@ def main() -> None:
     resume(TABLE, COLUMNS, numbers, work)
     rows = sorted(rows_of(TABLE), key=lambda row: int(row["set"]))
     draw(rows, FIGURE)
-    print(
-        "| case | R [m] | ranges [m] | SNR | bound | predicted | posterior | its error | converged |"
-    )
+    print("| case | R [m] | ranges [m] | SNR | bound | predicted | posterior | error | converged |")
     print("|---|---|---|---|---|---|---|---|---|")
     for row in rows:
-        numbers_of = [f"{100 * float(row[name]):.2g} %" for name in ("bound", "predicted", "sd")]
-        where = f"{row['from_m']}-{row['to_m']}"
-        print(
-            f"| {row['case']} | {row['distance_m']} | {where} | {float(row['snr']):.0e} | "
-            f"{' | '.join(numbers_of)} | {float(row['error']):+.1f} sd | {'yes' if row['converged'] == '1' else 'no'} |"
-        )
+        cells = [
+            row["case"],
+            row["distance_m"],
+            f"{row['from_m']}-{row['to_m']}",
+            f"{float(row['snr']):.0e}",
+            *(f"{100 * float(row[name]):.2g} %" for name in ("bound", "predicted", "sd")),
+            f"{float(row['error']):+.1f} sd",
+            "yes" if row["converged"] == "1" else "no",
+        ]
+        print(f"| {' | '.join(cells)} |")
 
 
 if __name__ == "__main__":
