@@ -26,6 +26,9 @@ def judge_draws(
     chosen: Array,
     log_r: Array,
     gain: Array | None = None,
+    *,
+    discrepancy: float | None = None,
+    common_range: bool = False,
 ) -> tuple[Identifiability, ...]:
     """Judge every unknown by its spread in the posterior, and say why.
 
@@ -43,6 +46,10 @@ def judge_draws(
         Draws of log r [log m]; nan for a frame without object.
     gain : ndarray, shape (frames,), optional
         Factor of each frame on the sensor's gain.
+    discrepancy : float, optional
+        Standard deviation of a smooth error of the object's log flux.
+    common_range : bool
+        Whether the object is known not to move.
 
     Returns
     -------
@@ -66,7 +73,15 @@ def judge_draws(
         still = _is_still(drawn)
         if still:
             here = np.where(present, here[present].mean(), np.nan)
-    experiment = Experiment(sensor, parameters, chosen[centre], here, gain)
+    experiment = Experiment(
+        sensor,
+        parameters,
+        chosen[centre],
+        here,
+        gain,
+        discrepancy=discrepancy,
+        common_range=common_range,
+    )
     return judge(experiment, Spread(sd, scale), predict(experiment), still)
 
 

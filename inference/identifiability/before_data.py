@@ -192,7 +192,15 @@ def identifiability(
             "computed for one amplitude and a range that changes; state radial motion"
         )
     log_r = _log_ranges(ranges_m, object_present)
-    experiment = Experiment(sensor, parameters, _reference(parameters, at), log_r)
+    z = _reference(parameters, at)
+    experiment = Experiment(
+        sensor,
+        parameters,
+        z,
+        log_r,
+        discrepancy=scene.discrepancy,
+        common_range=scene.motion == "static",
+    )
     _check_ranges(experiment, scene)
     if not experiment.finite:
         raise RefusedError(

@@ -14,6 +14,7 @@ from inference.identifiability.sensitivity import (
     sensitivity,
     whiteners,
 )
+from simulator.discrepancy import discrepancy_basis
 from simulator.parameters import Parameters, Terms
 from simulator.sensor import Sensor
 
@@ -40,6 +41,10 @@ class Experiment:
         Factor of each frame on the sensor's gain.
     known : tuple of str
         Unknowns that are supposed to be known after all.
+    discrepancy : float, optional
+        Standard deviation of a smooth error of the object's log flux along log r.
+    common_range : bool
+        Whether all frames have one unknown range: an object that is known not to move.
     """
 
     sensor: Sensor
@@ -48,6 +53,8 @@ class Experiment:
     log_r: Array
     gain: Array | None = None
     known: tuple[str, ...] = ()
+    discrepancy: float | None = None
+    common_range: bool = False
 
     @functools.cached_property
     def terms(self) -> Terms:
@@ -145,21 +152,47 @@ class Experiment:
     @functools.cached_property
     def finite(self) -> bool:
         """Whether readings, noise and derivatives are numbers that can be computed with."""
-        by_term, along = self.whitened()
+        by_term, along, by_error = self.whitened()
         along = along[np.isfinite(self.log_r)]
         units = self.in_si_units
         with np.errstate(over="ignore"):
             # sums of squares of all of them must not overflow either
-            sizes = [float(np.square(part).sum()) for part in (by_term, along, units)]
+            sizes = [float(np.square(part).sum()) for part in (by_term, along, by_error, units)]
         return bool(np.isfinite(sizes).all() and np.isfinite(self.z).all())
 
-    def whitened(self, whitener: Array | None = None) -> tuple[Array, Array]:
-        """Return whitened derivatives along ``names`` (n, 2, d) and along log r (n, 2).
+    @functools.cached_property
+    def by_error(self) -> Array:
+        """Derivatives of the readings along the coefficients of the flux's error, (n, 2, k).
+
+        The coefficients are independent and standard normal; there are none without discrepancy.
+        """
+        n = self.log_r.size
+        if self.discrepancy is None:
+            return np.empty((n, 2, 0))
+        low, high = (float(bound) for bound in self.terms.ranges[0, 6:8])
+        basis = discrepancy_basis(low, high)
+        present = np.isfinite(self.log_r)
+        derivatives = np.zeros((n, 2, basis.size))
+        functions = self.discrepancy * basis.values(self.log_r[present])
+        derivatives[present] = self.readings.signal[present][:, :, None] * functions[:, None, :]
+        return derivatives
+
+    def whitened(self, whitener: Array | None = None) -> tuple[Array, Array, Array]:
+        """Return whitened derivatives of the readings.
 
         Parameters
         ----------
         whitener : ndarray, shape (n, 2, 2), optional
             W with W^T W the inverse covariance of a frame's readings; left out: the sensor's.
+
+        Returns
+        -------
+        ndarray, shape (n, 2, d)
+            Along ``names``.
+        ndarray, shape (n, 2)
+            Along log r; nan for a frame without object.
+        ndarray, shape (n, 2, k)
+            Along the coefficients of the flux's error.
         """
         of = self.readings
         with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
@@ -168,7 +201,8 @@ class Experiment:
             by_term = np.einsum("nij,njk->nik", whitener, of.by_term)
             along = np.einsum("nij,nj->ni", whitener, of.by_range)
             along[np.isnan(self.log_r)] = np.nan
-            return by_term @ self.directions, along
+            by_error = np.einsum("nij,njk->nik", whitener, self.by_error)
+            return by_term @ self.directions, along, by_error
 
 
 def information(experiment: Experiment, whitener: Array | None = None) -> Information:
@@ -186,4 +220,6 @@ def information(experiment: Experiment, whitener: Array | None = None) -> Inform
     Information
         In the dimensionless coordinates of `Experiment.directions`.
     """
-    return eliminate(experiment.names, *experiment.whitened(whitener))
+    return eliminate(
+        experiment.names, *experiment.whitened(whitener), common_range=experiment.common_range
+    )

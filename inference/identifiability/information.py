@@ -44,6 +44,8 @@ class Information:
         ``jacobian`` is.
     error_response : ndarray, shape (n, k)
         d log r_i along them, as ``response``.
+    common_range : bool
+        Whether all frames have one range, which is eliminated once.
     """
 
     names: tuple[str, ...]
@@ -53,6 +55,7 @@ class Information:
     own_variance: Array
     errors: Array
     error_response: Array
+    common_range: bool = False
 
     @functools.cached_property
     def _equilibrated(self) -> tuple[Array, Array, Array]:
@@ -212,7 +215,8 @@ class Information:
         n = int(present.sum())
         if n == 0:
             return float("nan")
-        own = float(self.own_variance[present].sum()) / n / n
+        own = float(self.own_variance[present].sum()) / n
+        own /= 1 if self.common_range else n
         mean, of_errors = (
             part[present].mean(axis=0)[None] for part in (self.response, self.error_response)
         )
@@ -233,7 +237,12 @@ def _triangle(matrix: Array) -> Array:
 
 
 def eliminate(
-    names: tuple[str, ...], jacobian: Array, along_range: Array, errors: Array | None = None
+    names: tuple[str, ...],
+    jacobian: Array,
+    along_range: Array,
+    errors: Array | None = None,
+    *,
+    common_range: bool = False,
 ) -> Information:
     """Eliminate the range of every frame.
 
@@ -248,6 +257,8 @@ def eliminate(
         frame without object.
     errors : ndarray, shape (n, 2, k), optional
         Whitened derivatives along independent standard normal errors that all frames share.
+    common_range : bool
+        Whether all frames with an object have one range.
 
     Returns
     -------
@@ -259,22 +270,39 @@ def eliminate(
     k = errors.shape[2]
     both = np.concatenate([jacobian, errors], axis=2)
     empty = np.asarray(np.isnan(along_range).any(axis=1))
-    length = np.linalg.norm(np.where(empty[:, None], 0.0, along_range), axis=1)
+    along = np.where(empty[:, None], 0.0, along_range)
+    length = np.linalg.norm(along, axis=1)
     moves = length > 0
-    unit = np.where(moves[:, None], along_range, 1.0) / np.where(moves, length, 1.0)[:, None]
-    # both components of the projection are one number along the normal: no difference is left
-    # of two vectors, only that of two products
-    normal = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
-    across = np.einsum("ni,nid->nd", normal[moves], both[moves])
     sizes = np.linalg.norm(jacobian, axis=1)
     whole = both[~moves]
+    response, variance = np.zeros((n, d + k)), np.full(n, np.inf)
+    if common_range and moves.any():
+        direction = along / np.linalg.norm(along)
+        shift = np.einsum("ni,nid->d", direction, both)
+        across = (both - direction[:, :, None] * shift)[moves].reshape(-1, d + k)
+        # the difference of two vectors: rounding is that of the larger, over all frames
+        largest = np.linalg.norm(sizes[moves], axis=0) / np.sqrt(2 * moves.sum())
+        before = np.maximum(np.repeat(sizes[moves], 2, axis=0), largest)
+        response[:], variance[:] = -shift / np.linalg.norm(along), 1 / np.square(length).sum()
+    else:
+        unit = along / np.where(moves, length, 1.0)[:, None]
+        # both components of the projection are one number along the normal: no difference is left
+        # of two vectors, only that of two products
+        normal = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+        across = np.einsum("ni,nid->nd", normal[moves], both[moves])
+        before = sizes[moves]
+        response[moves] = -np.einsum("ni,nid->nd", unit, both)[moves] / length[moves, None]
+        variance[moves] = 1 / length[moves] ** 2
     rows = np.concatenate([across, whole.reshape(2 * len(whole), d + k)])
-    before = np.concatenate([sizes[moves], np.repeat(sizes[~moves], 2, axis=0)])
-    response = np.zeros((n, d + k))
-    variance = np.full(n, np.inf)
-    response[moves] = -np.einsum("ni,nid->nd", unit[moves], both[moves]) / length[moves, None]
-    variance[moves] = 1 / length[moves] ** 2
+    before = np.concatenate([before, np.repeat(sizes[~moves], 2, axis=0)])
     response[empty], variance[empty] = np.nan, np.nan
     return Information(
-        names, rows[:, :d], before, response[:, :d], variance, rows[:, d:], response[:, d:]
+        names,
+        rows[:, :d],
+        before,
+        response[:, :d],
+        variance,
+        rows[:, d:],
+        response[:, d:],
+        common_range,
     )

@@ -27,7 +27,7 @@ class Prediction:
 
     Attributes
     ----------
-    factor : ndarray, shape (d, d)
+    factor : ndarray, shape (d, k)
         F with F F^T the covariance of z, in which every prior is standard normal.
     range_sd : ndarray, shape (n,)
         Of log r of every frame; nan for a frame without object.
@@ -85,45 +85,59 @@ def predict(experiment: Experiment, whitener: Array | None = None) -> Prediction
     with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
         if whitener is None:
             whitener = whiteners(experiment.sensor, of)
-        jacobian = np.zeros((n, 3, d))
-        jacobian[:, :2] = np.einsum("nij,njk->nik", whitener, of.by_term) @ change
+        k = experiment.by_error.shape[2]
+        jacobian = np.zeros((n, 3, d + k))
+        jacobian[:, :2, :d] = np.einsum("nij,njk->nik", whitener, of.by_term) @ change
+        jacobian[:, :2, d:] = np.einsum("nij,njk->nik", whitener, experiment.by_error)
         along = np.zeros((n, 3))
         along[:, :2] = np.einsum("nij,nj->ni", whitener, of.by_range)
     present = np.isfinite(experiment.log_r)
     law = experiment.terms.ranges[0]
     r = np.exp(experiment.log_r[present])
     along[present, 2] = np.sqrt(law[5] ** 2 + (r * law[3]) ** 2)
-    extra = [np.eye(d)]
+    extra = [np.eye(d + k)]
     if isinstance(p.range_prior, Stroke):
         centre = (plus.ranges[:, 4] - minus.ranges[:, 4]) / (2 * _DIFFERENCE)
-        jacobian[present, 2] = -centre * law[5]
-        extra.append(_spread_rows(along[present], plus.ranges, minus.ranges, law[5]))
+        jacobian[present, 2, :d] = -centre * law[5]
+        spread = _spread_row(along[present], plus.ranges, minus.ranges, law[5])
+        extra.append(np.append(spread, np.zeros(k))[None])
+    if experiment.common_range and present.any():
+        # one range, one prior of it
+        along[np.flatnonzero(present)[1:], 2] = 0.0
+        jacobian[np.flatnonzero(present)[1:], 2] = 0.0
+    along[~present] = 0.0
     length = np.linalg.norm(along, axis=1)
+    if experiment.common_range:
+        length = np.full(n, np.linalg.norm(length))
     moves = present & (length > 0)
-    unit = np.where(moves[:, None], along, 0.0) / np.where(moves, length, 1.0)[:, None]
+    unit = along / np.where(length > 0, length, 1.0)[:, None]
     shift = np.einsum("ni,nid->nd", unit, jacobian)
+    if experiment.common_range:
+        shift = np.broadcast_to(shift.sum(axis=0), shift.shape)
     across = jacobian - unit[:, :, None] * shift[:, None, :]
-    variance, response = np.full(n, np.inf), np.zeros((n, d))
+    variance, response = np.full(n, np.inf), np.zeros((n, d + k))
     variance[moves] = 1 / length[moves] ** 2
     response[moves] = -shift[moves] / length[moves, None]
+    independent = 1 if experiment.common_range else int(present.sum())
     room = _room(experiment)
     if math.isfinite(room):
         # a scale that is known to the room which the support leaves tells of what moves with it
-        own = math.sqrt(variance[present].sum()) / present.sum()
+        own = math.sqrt(variance[present].mean() / independent)
         extra.append(response[present].mean(axis=0)[None] / math.hypot(room, own))
     factor = np.empty((0, 0))
-    if d > 0:
-        triangle = linalg.qr(np.concatenate([across.reshape(-1, d), *extra]), mode="r")[0][:d]
-        factor = np.asarray(linalg.solve_triangular(triangle, np.eye(d)))
+    if d + k > 0:
+        rows = np.concatenate([across.reshape(-1, d + k), *extra])
+        triangle = linalg.qr(rows, mode="r")[0][: d + k]
+        factor = np.asarray(linalg.solve_triangular(triangle, np.eye(d + k)))
     range_sd = np.sqrt(variance + np.linalg.norm(response @ factor, axis=1) ** 2)
     range_sd = np.where(present, _limited(range_sd, log_range_spread(p)), np.nan)
     if not present.any():
-        return Prediction(factor, range_sd, math.nan)
-    own = float(variance[present].sum()) / present.sum() ** 2
+        return Prediction(factor[:d], range_sd, math.nan)
+    own = float(variance[present].mean()) / independent
     shared = np.linalg.norm(response[present].mean(axis=0) @ factor)
     scale = np.array([math.sqrt(own + shared**2)])
     limit = min(room, log_range_spread(p))
-    return Prediction(factor, range_sd, float(_limited(scale, limit)[0]))
+    return Prediction(factor[:d], range_sd, float(_limited(scale, limit)[0]))
 
 
 def _room(experiment: Experiment) -> float:
@@ -143,7 +157,7 @@ def _room(experiment: Experiment) -> float:
     return room / math.sqrt(12) if room > 0 else math.inf
 
 
-def _spread_rows(along: Array, plus: Array, minus: Array, inverse: float) -> Array:
+def _spread_row(along: Array, plus: Array, minus: Array, inverse: float) -> Array:
     """Information of independent ranges on the spread w of their log-normal prior.
 
     A log range read with variance s^2 is normal with variance v = w^2 + s^2, whose information on
@@ -153,4 +167,4 @@ def _spread_rows(along: Array, plus: Array, minus: Array, inverse: float) -> Arr
     w = 1 / inverse
     with np.errstate(divide="ignore"):
         own = 1 / (along[:, 0] ** 2 + along[:, 1] ** 2)
-    return np.asarray(np.sqrt(np.sum(2 * w**2 / (w**2 + own) ** 2)) * rate[None])
+    return np.asarray(np.sqrt(np.sum(2 * w**2 / (w**2 + own) ** 2)) * rate)

@@ -84,7 +84,9 @@ class Diagnosis:
         wide = max(span(log_r), math.log(4.0))
         many = np.append(np.linspace(middle - wide / 2, middle + wide / 2, 2 * d + 2), empty)
         ranks = [
-            information(dataclasses.replace(self.experiment, log_r=where, gain=None)).rank
+            information(
+                dataclasses.replace(self.experiment, log_r=where, gain=None, common_range=False)
+            ).rank
             for where in (many, empty)
             if where.size
         ]
@@ -148,6 +150,14 @@ class Diagnosis:
             return f"{text}: at these ranges the flux falls as r^-4 and tells c0 c2 alone"
         if law == 2 and parameter in ("object.c0", "object.c1"):
             return f"{text}: at these ranges the flux falls as r^-2, whatever c0 and c1"
+        if self.experiment.discrepancy is not None:
+            exact = dataclasses.replace(self.experiment, discrepancy=None)
+            without = Diagnosis(exact, self.still).bound(parameter)
+            if _HELP * without < sd:
+                return (
+                    f"{text}: the error of the object's flux hides it, without which they would "
+                    f"tell it to {_relative(parameter, without)}"
+                )
         name, value = self._look_alike(parameter)
         if self._is_far_background(parameter, name if abs(value) > _ALIKE else ""):
             return f"{text}: crosstalk and a far background look alike"

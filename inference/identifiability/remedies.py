@@ -77,7 +77,7 @@ def _with_frames(experiment: Experiment, log_r: Array) -> Experiment:
     gain = experiment.gain
     if gain is not None:
         gain = np.full(log_r.size, float(np.median(gain)))
-    return dataclasses.replace(experiment, log_r=log_r, gain=gain)
+    return dataclasses.replace(experiment, log_r=log_r, gain=gain, common_range=False)
 
 
 def _emptied(experiment: Experiment) -> Experiment:

@@ -1,5 +1,6 @@
 """Rank, bounds and singular values against 50 digits, by counting, and by Monte Carlo."""
 
+import dataclasses
 import math
 
 import mpmath as mp
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import stats
 
-from inference.identifiability.experiment import Experiment
+from inference.identifiability.experiment import Experiment, information
 from inference.identifiability.information import eliminate
 from tests.identifiability.precise import DIGITS, precise_jacobian, projected
 from tests.identifiability.published import (
@@ -134,7 +135,7 @@ def test_companions_leave_the_readings_as_they_are() -> None:
 def test_units_of_readings_do_not_matter(exponent: int, system: System) -> None:
     factor = 10.0**exponent
     plain = system.information()
-    jacobian, along = system.experiment().whitened(
+    jacobian, along, _ = system.experiment().whitened(
         np.einsum("ni,ij->nij", 1 / system.sds() / factor, np.eye(2))
     )
     scaled = eliminate(plain.names, jacobian, along)
@@ -164,7 +165,7 @@ def test_bound_is_attained() -> None:
         z = p.standard(values[None])[0]
         return Experiment(SENSOR, p, z, experiment.log_r + x[d:]).readings.mean
 
-    jacobian, along = experiment.whitened(np.einsum("ni,ij->nij", 1 / sds, np.eye(2)))
+    jacobian, along, _ = experiment.whitened(np.einsum("ni,ij->nij", 1 / sds, np.eye(2)))
     every = np.concatenate([jacobian, np.einsum("ni,nm->nim", along, np.eye(40))], axis=2)
     solve = np.linalg.pinv(every.reshape(80, -1))
     rng = np.random.default_rng(4)
@@ -182,3 +183,59 @@ def test_bound_is_attained() -> None:
     square = float(np.sum(np.square(np.array(errors)))) / bound**2
     low, high = stats.chi2.ppf(0.5e-6, trials), stats.chi2.isf(0.5e-6, trials)
     assert 0.95**2 * low < square < 1.05**2 * high
+
+
+def test_errors_that_all_frames_share() -> None:
+    """Against generalised least squares over parameters and ranges: errors in the covariance."""
+    system = System((*OBJECT, *CROSSTALK), None, "A", crosstalk=True, frames=15, gone=2)
+    rng = np.random.default_rng(6)
+    whitener = np.einsum("ni,ij->nij", 1 / system.sds(), np.eye(2))
+    jacobian, along, _ = system.experiment().whitened(whitener)
+    errors = 3.0 * rng.standard_normal((15, 2, 4)) * np.linalg.norm(along, axis=1)[:, None, None]
+    errors[13:] = rng.standard_normal((2, 2, 4))  # frames without the object have them too
+    found = eliminate(system.unknown, jacobian, along, errors)
+    ranges = np.zeros((15, 2, 13))
+    for i in range(13):
+        ranges[i, :, i] = along[i]
+    every = np.concatenate([jacobian, ranges], axis=2).reshape(30, -1)
+    shared = errors.reshape(30, 4)
+    root = np.linalg.cholesky(np.eye(30) + shared @ shared.T)
+    inverse = np.linalg.pinv(np.linalg.solve(root, every))
+    covariance = inverse @ inverse.T
+    sd = np.sqrt(np.diag(covariance))
+    # rounding of the reference: its condition number times eps
+    assert found.sd == pytest.approx(sd[:5], rel=1e-6)
+    assert found.range_sd[:13] == pytest.approx(sd[5:], rel=1e-6)
+    assert np.isnan(found.range_sd[13:]).all()
+    mean = np.concatenate([np.zeros(5), np.full(13, 1 / 13)])
+    assert found.scale_sd == pytest.approx(math.sqrt(mean @ covariance @ mean), rel=1e-6)
+    reduced = np.linalg.inv(covariance[:5, :5])
+    values = np.sqrt(np.linalg.eigvalsh(reduced)[::-1])
+    assert found.singular_values == pytest.approx(values, rel=1e-4)
+    assert found.rank == 5
+
+
+def test_one_range_for_all_frames() -> None:
+    """Against least squares over the parameters and one range; frames of several gains."""
+    system = System((*CROSSTALK, "object.c2"), None, "A", crosstalk=True, frames=12, gone=2)
+    still = dataclasses.replace(
+        system.experiment(np.append(np.zeros(10), [np.nan, np.nan])),
+        gain=np.linspace(1.0, 3.0, 12),
+        common_range=True,
+    )
+    jacobian, along, _ = still.whitened()
+    found = information(still)
+    assert found.rank == 3
+    every = np.concatenate([jacobian, np.nan_to_num(along)[:, :, None]], axis=2)
+    inverse = np.linalg.pinv(every.reshape(24, -1))
+    sd = np.linalg.norm(inverse, axis=1)
+    assert found.sd == pytest.approx(sd[:3], rel=1e-9)
+    assert found.range_sd[:10] == pytest.approx(np.full(10, sd[3]), rel=1e-9)
+    assert found.scale_sd == pytest.approx(sd[3], rel=1e-9)
+    # of one gain, and without the empty frames, all frames are one, and tell one number
+    one = dataclasses.replace(still, gain=None, log_r=np.zeros(10))
+    assert information(one).rank == 1
+    apart = dataclasses.replace(one, common_range=False)
+    assert information(apart).singular_values[0] == pytest.approx(
+        information(one).singular_values[0], rel=1e-9
+    )

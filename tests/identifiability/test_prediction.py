@@ -101,3 +101,28 @@ def test_spread_of_a_stroke_known_exactly() -> None:
         j = names.index(name)
         own = sd / change[j]  # in z
         assert found.sd[j] == pytest.approx(own / math.sqrt(1 + own**2), rel=1e-3)
+
+
+def test_error_of_the_flux() -> None:
+    """A smooth error of the flux widens all bounds, more the larger it is; a vanishing one none."""
+    scene = {"object": {"c0": 0.0769, "c1": -0.123, "c2": 0.0957}, "crosstalk": UNKNOWN_CROSSTALK}
+    ranges = np.geomspace(0.2, 0.4, 24).tolist()
+    sensor = sensor_of("pulsed")
+    exact = identifiability(sensor, parse_scene(scene), ranges)
+    before = exact.information.range_sd
+    for size, least in ((1e-9, 1.0), (1e-3, 1.0), (0.02, 5.0), (0.07, 20.0)):
+        found = identifiability(sensor, parse_scene(scene | {"discrepancy": size}), ranges)
+        wider = found.information.range_sd / before
+        assert (wider >= least * (1 - 1e-6)).all() or np.median(wider) > least
+        assert found.information.rank == exact.information.rank
+        assert found.prediction.range_sd == pytest.approx(found.information.range_sd, rel=0.2)
+        before_now = found.information.scale_sd
+        if size == 1e-9:
+            assert wider == pytest.approx(np.ones(24), rel=1e-6)
+            assert before_now == pytest.approx(exact.information.scale_sd, rel=1e-6)
+    # with the noise gone, what is left of the bound is the error's
+    quiet = identifiability(
+        sensor_of("pulsed", 1e7), parse_scene(scene | {"discrepancy": 0.07}), ranges
+    )
+    assert quiet.information.scale_sd == pytest.approx(found.information.scale_sd, rel=0.5)
+    assert quiet.information.scale_sd > 1e3 * 1e-4 * exact.information.scale_sd
