@@ -22,6 +22,10 @@ __all__ = ["Foresight", "identifiability"]
 
 Array = NDArray[np.float64]
 
+_JUST_ENOUGH = (
+    "; the distinct ranges are just as many as the unknowns need, and such systems can have "
+    "several exact solutions: one more would tell them apart"
+)
 _DIFFERENCE = 1e-5  # of z, in which every prior has unit scale
 
 
@@ -161,7 +165,7 @@ def identifiability(
     sensor : Sensor
         The sensor, with its noise.
     scene : Scene
-        What is known and what is not.
+        What is known and what is not; optional terms are taken to stay.
     ranges_m : sequence of float
         Range of the object in every frame [m].
     object_present : sequence of bool, optional
@@ -212,11 +216,14 @@ def identifiability(
     still = bool(present.any()) and float(np.ptp(log_r[present])) < 1e-9
     spread = Spread(prediction.sd, prediction.scale_sd)
     diagnosis = Diagnosis(experiment, still)
+    rows = judge(experiment, spread, prediction, still)
+    if 0 < diagnosis.distinct == diagnosis.needed:
+        rows = tuple(dataclasses.replace(row, reason=row.reason + _JUST_ENOUGH) for row in rows)
     return Foresight(
         experiment,
         diagnosis.information,
         prediction,
         diagnosis.needed,
         diagnosis.distinct,
-        judge(experiment, spread, prediction, still),
+        rows,
     )

@@ -70,6 +70,16 @@ def test_too_few_distinct_ranges() -> None:
     )
 
 
+def test_just_as_many_ranges_as_needed() -> None:
+    """Published: five frames of unknown distance and object have a second exact solution."""
+    scene = {"background": BACKGROUND | {"shadow": "object"}}
+    for frames, told in ((5, True), (6, False)):
+        found = foresee(scene, np.linspace(0.2, 2.0, frames).tolist())
+        assert (found.information.rank, found.needed) == (5, 5)
+        for row in found.identifiability:
+            assert ("several exact solutions: one more would" in row.reason) == told
+
+
 def test_frames_without_the_object_fix_the_background() -> None:
     """The figure in the reason is that of the experiment with the frames added."""
     scene = {"background": BACKGROUND}
