@@ -53,6 +53,10 @@ def identifiability_of(request: IdentifiabilityRequest) -> dict[str, Any]:
         "unknowns": len(information.names),
         "singular_values": information.singular_values.tolist(),
         "resolution": information.resolution,
+        "directions": [
+            {"cramer_rao_sd": _number(sd), "parameters": weights}
+            for sd, weights in information.directions()
+        ],
         "distinct_ranges": found.distinct,
         "needed_ranges": found.needed,
         "parameters": {

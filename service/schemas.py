@@ -317,6 +317,11 @@ class _RangeBounds(pydantic.BaseModel):
     scale_posterior_sd: float | None
 
 
+class _Direction(pydantic.BaseModel):
+    cramer_rao_sd: float | None
+    parameters: dict[str, float]
+
+
 class IdentifiabilityResponse(pydantic.BaseModel):
     """Answer of ``POST /v1/identifiability``.
 
@@ -332,6 +337,9 @@ class IdentifiabilityResponse(pydantic.BaseModel):
     resolution : float
         Singular value, relative to a Jacobian scaled to unit rows and columns, below which rounding
         does not tell it from zero.
+    directions : list
+        Directions along the same coordinates that the readings do not tell (null), then the worst
+        of the others with its bound: weights of the unknowns that make each up.
     distinct_ranges, needed_ranges : int
         Distinct ranges that there are, and that the unknowns need at least.
     parameters : dict
@@ -349,6 +357,7 @@ class IdentifiabilityResponse(pydantic.BaseModel):
     unknowns: int
     singular_values: list[float]
     resolution: float
+    directions: list[_Direction]
     distinct_ranges: int
     needed_ranges: int
     parameters: dict[str, _Bound]

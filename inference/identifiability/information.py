@@ -194,6 +194,27 @@ class Information:
             product = product + of_errors @ self._factors[1]
         return np.where(told, np.linalg.norm(product, axis=1), np.inf)
 
+    def directions(self) -> list[tuple[float, dict[str, float]]]:
+        """Return the directions of x that the readings tell worst, and their bounds.
+
+        Returns
+        -------
+        list of (float, dict)
+            A basis of those that they do not tell at all (inf), then the worst of the others: the
+            weights, normalised, of the unknowns that make it up; those below 1 % are left out.
+        """
+        found = [(np.inf, vector) for vector in self.null_space.T]
+        if self.rank > 0:
+            vectors, sizes, _ = linalg.svd(self.factor, full_matrices=False)
+            found.append((float(sizes[0]), vectors[:, 0]))
+        named = []
+        for sd, vector in found:
+            # the sign is free: the largest weight is positive
+            signed = vector * np.sign(vector[np.argmax(np.abs(vector))])
+            weights = zip(self.names, signed.tolist(), strict=True)
+            named.append((sd, {name: weight for name, weight in weights if abs(weight) >= 0.01}))
+        return named
+
     @functools.cached_property
     def sd(self) -> Array:
         """Cramer-Rao bound of every unknown, shape (d,); inf where it is not identifiable."""

@@ -117,6 +117,23 @@ def test_nothing_unknown_and_no_frame_that_tells() -> None:
     assert math.isinf(dark.scale_sd)
 
 
+def test_directions() -> None:
+    """Published: the weak direction of a known distance and a free shadow is c0 with c0'."""
+    (worst,) = System((*OBJECT, *SHADOW), 3.0, "P").information().directions()
+    found = System((*OBJECT, *SHADOW), 3.0, "P").information()
+    assert worst[0] == pytest.approx(1 / found.singular_values[-1], rel=1e-9)
+    assert {"object.c0", "background.shadow.c0", "background.shadow.c1"} <= worst[1].keys()
+    few = System(B, 3.0, "P", frames=4).information()
+    open_ones = few.directions()
+    assert [sd for sd, _ in open_ones[:3]] == [math.inf] * 3
+    assert math.isfinite(open_ones[3][0])
+    size = np.linalg.norm(few.before)
+    for _, weights in open_ones[:3]:
+        vector = np.array([weights.get(name, 0.0) for name in few.names])
+        # weights below 1 % are left out
+        assert np.linalg.norm(few.jacobian @ vector) < 0.03 * size
+
+
 def test_companions_leave_the_readings_as_they_are() -> None:
     found = System(B, 3.0, "P", frames=4).information()
     size = np.linalg.norm(found.before)

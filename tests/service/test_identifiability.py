@@ -73,6 +73,9 @@ async def test_what_is_not_identifiable_is_null(
     found = (await client.post("/v1/identifiability", json=body)).json()
     assert found["rank"] == 3  # one number of seven frames, two of the empty one
     assert found["singular_values"][3:] == [0.0, 0.0]
+    assert [d["cramer_rao_sd"] is None for d in found["directions"]] == [True, True, False]
+    for direction in found["directions"][:2]:
+        assert set(direction["parameters"]) <= {"object.c0", "object.c1", "object.c2"}
     assert found["parameters"]["object.c0"]["cramer_rao_sd"] is None
     assert found["parameters"]["background.distance_m"]["cramer_rao_sd"] is not None
     rows = {row["parameter"]: row for row in found["identifiability"]}
