@@ -82,7 +82,8 @@ def judge_draws(
         discrepancy=discrepancy,
         common_range=common_range,
     )
-    return judge(experiment, Spread(sd, scale), predict(experiment), still)
+    prediction = predict(experiment) if experiment.finite else None
+    return judge(experiment, Spread(sd, scale), prediction, still)
 
 
 def _is_still(drawn: Array) -> bool:

@@ -49,7 +49,7 @@ def _headline(parameter: str, status: str, spread: float) -> str:
 
 
 def judge(
-    experiment: Experiment, spread: Spread, prediction: Prediction, still: bool
+    experiment: Experiment, spread: Spread, prediction: Prediction | None, still: bool
 ) -> tuple[Identifiability, ...]:
     """Judge every unknown and the common scale of the ranges.
 
@@ -59,8 +59,9 @@ def judge(
         Where the reasons are computed.
     spread : Spread
         Of the posterior, or as it is predicted.
-    prediction : Prediction
-        At the experiment, to tell a curved or divided posterior by.
+    prediction : Prediction or None
+        At the experiment, to tell a curved or divided posterior by; None where its derivatives
+        are beyond what a number can hold, and no cause can be computed.
     still : bool
         Whether the ranges of all frames are one and the same, as far as can be told.
 
@@ -72,16 +73,23 @@ def judge(
     diagnosis = Diagnosis(experiment, still)
     names = experiment.parameters.names
     wide = log_range_spread(experiment.parameters)
+    foreseen = np.full(len(names) + 1, np.nan)
+    if prediction is not None:
+        foreseen = np.append(prediction.sd, prediction.scale_sd)
     rows = []
-    for name, value, foreseen, unit in [
-        *zip(names, spread.parameters, prediction.sd, np.ones(len(names)), strict=True),
-        ("range_m", spread.scale, prediction.scale_sd, wide),
-    ]:
-        status = status_of(name, float(value))
-        text = _headline(name, status, float(value))
-        if status != "identified":
-            text += ": " + _cause(diagnosis, name, float(value), float(foreseen))
-        contraction = 1 - float(value / unit) ** 2 if math.isfinite(value) else 0.0
+    for (name, value, unit), expected in zip(
+        [
+            *((name, float(sd), 1.0) for name, sd in zip(names, spread.parameters, strict=True)),
+            ("range_m", spread.scale, wide),
+        ],
+        foreseen.tolist(),
+        strict=True,
+    ):
+        status = status_of(name, value)
+        text = _headline(name, status, value)
+        if status != "identified" and prediction is not None:
+            text += ": " + _cause(diagnosis, name, value, expected)
+        contraction = 1 - (value / unit) ** 2 if math.isfinite(value) else 0.0
         rows.append(Identifiability(name, status, contraction, text))
     return tuple(rows)
 

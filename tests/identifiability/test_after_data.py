@@ -63,6 +63,13 @@ def test_ranges_that_scatter_by_their_noise_alone_do_not_move(shared: float) -> 
     assert "the object must move" not in rows["object.c0"].reason
 
 
+def test_what_overflows_has_a_status_all_the_same() -> None:
+    rng = np.random.default_rng(5)
+    z = rng.standard_normal((100, 5))
+    rows = judged(z, np.full((100, 3), -600.0) + 0.01 * rng.standard_normal((100, 3)))
+    assert rows["object.c1"].reason == "the answer is little more than the prior"
+
+
 def test_frames_without_object_and_nothing_unknown() -> None:
     rng = np.random.default_rng(4)
     log_r = np.full((100, 4), np.nan)
