@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from inference.posterior.collapsed import CollapsedDensity
+from inference.posterior.discrepant import DiscrepantDensity
 from inference.posterior.job import Job
 from inference.posterior.profile import best_ranges
 from inference.posterior.ranges import replicate
@@ -38,6 +39,13 @@ class FitResiduals:
     log_r: Array
 
 
+def _without_flux_error(density: CollapsedDensity) -> CollapsedDensity:
+    if not isinstance(density, DiscrepantDensity):
+        return density
+    fields = {f.name: getattr(density, f.name) for f in dataclasses.fields(CollapsedDensity)}
+    return CollapsedDensity(**fields)
+
+
 def _stacked(density: CollapsedDensity, readings: Array) -> CollapsedDensity:
     """Return the density of many sets of frames, one behind the other."""
     sets, n, _ = readings.shape
@@ -55,7 +63,8 @@ def fit_residuals(
 
     Replicates are made at the parameters z and the best ranges for them. Frames and replicates
     alike get their best ranges, and z moves by one Gauss-Newton step towards each of them, held by
-    the prior's unit scale: what parameters can follow is no misfit.
+    the prior's unit scale: what parameters can follow is no misfit, nor is an error of the flux
+    that the scene allows for.
 
     Parameters
     ----------
@@ -75,13 +84,14 @@ def fit_residuals(
     FitResiduals
     """
     n, d = len(density.frames), z.size
-    seen = best_ranges(density, z[None])[0, :, 0]
+    plain = _without_flux_error(density)
+    seen = best_ranges(plain, z[None])[0, :, 0]
     many = np.broadcast_to(z, (replicates, d))
     anew = replicate(density, many, np.broadcast_to(seen, (replicates, n)).copy(), rng)
     readings = np.concatenate([density.frames[None, :, :2], anew])
     if isinstance(density, StaticDensity):
         return _of_one_range(job, density, z, seen, readings)
-    stacked = _stacked(density, readings)
+    stacked = _stacked(plain, readings)
     best = best_ranges(stacked, z[None])[0, :, 0]
     at = whitened(job.sensor, density.parameters, stacked.frames, z, best)
     sets = replicates + 1
@@ -90,6 +100,11 @@ def fit_residuals(
     present = np.isfinite(seen)
     # rows of the frames themselves stand for those of the replicates: only noise lies between
     own = at.jacobian[:n]
+    if isinstance(density, DiscrepantDensity):
+        # the error's coefficients, whose prior has unit scale too, are fitted like parameters
+        functions = density.functions(seen)[0]
+        own = np.concatenate([own, at.signal[:n, :, None] * functions[:, None, :]], axis=2)
+        d = own.shape[2]
     rows = np.concatenate(
         [
             np.einsum("ni,nid->nd", at.across[:n], own)[present],

@@ -29,6 +29,8 @@ class Whitened:
         W (y - m): standard normal variates at the true parameters and ranges.
     along : ndarray, shape (n, 2)
         W dm / d log r; zero for a frame without object.
+    signal : ndarray, shape (n, 2)
+        W times the object's part of m; zero for a frame without object.
     jacobian : ndarray, shape (n, 2, d)
         W dm / dz.
     """
@@ -36,6 +38,7 @@ class Whitened:
     whitener: Array
     residual: Array
     along: Array
+    signal: Array
     jacobian: Array
 
     @property
@@ -87,5 +90,6 @@ def whitened(
         whitener,
         np.einsum("nij,nj->ni", whitener, frames[:, :2] - at.mean),
         np.einsum("nij,nj->ni", whitener, at.by_range),
+        np.einsum("nij,nj->ni", whitener, at.signal),
         np.einsum("nij,njt,td->nid", whitener, at.by_term, change),
     )

@@ -160,3 +160,25 @@ def test_one_range_for_all_frames() -> None:
     assert fit.degrees_of_freedom == pytest.approx(23, abs=1.2)
     moved = data(sensor, frames=12, span=(0.7, 0.71)).frames
     assert checked(sensor, scene, moved).misfit
+
+
+def test_an_error_that_the_scene_allows_is_no_misfit() -> None:
+    sensor = sensor_of("pulsed")
+    frames = data(sensor, frames=20).frames
+    readings = wobble(0.02)(frames.readings, np.geomspace(0.1, 2.0, 20))
+    job = prepare(
+        sensor,
+        parse_scene({"object": OBJECT, "discrepancy": 0.05}),
+        dataclasses.replace(frames, readings=readings),
+        SamplerSettings(seed=1),
+    )
+    rng = np.random.default_rng(221)
+    fit = predictive_check(job, job.density(), np.empty((5, 0)), rng)
+    assert not fit.misfit
+    # the error takes some of twenty
+    assert 5 < fit.degrees_of_freedom < 20
+    noisy = dataclasses.replace(frames, readings=one_off(readings, readings))
+    job = dataclasses.replace(job, frames=noisy)
+    spoilt = predictive_check(job, job.density(), np.empty((5, 0)), rng)
+    assert spoilt.misfit
+    assert 7 in spoilt.outliers
