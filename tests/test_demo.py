@@ -62,7 +62,7 @@ def test_estimates_and_posteriors_as_answers() -> None:
             ],
         },
         "verdict": {"converged": False, "reasons": ["too few steps"]},
-        "fit": {"misfit": True},
+        "fit": {"misfit": True, "reasons": ["the worst frame"]},
         "identifiability": [{"parameter": "range_m", "status": "not_identified"}],
         "runtime": {"wall_s": 1.0},
     }
@@ -70,7 +70,7 @@ def test_estimates_and_posteriors_as_answers() -> None:
     assert [point.status for point in answer.points] == ["ambiguous", "near fold", "none"]
     assert math.isnan(answer.points[2].low_m)
     assert answer.misfit
-    for word in ("too few steps", "MISFIT", "range_m is not identified"):
+    for word in ("too few steps", "MISFIT", "the worst frame", "range_m is not identified"):
         assert word in answer.remark
 
 

@@ -195,7 +195,7 @@ def row_of(number: int, version: str, seconds: float) -> Row:
         "error": math.log(summary.q50 / cell.distance) / float(distances.std()),
         "scale_bound": foreseen.scale_bound,
         "scale_predicted": foreseen.scale_predicted,
-        "scale_sd": float(np.log(found.draws.range_m).mean(axis=1).std()),
+        "scale_sd": float(np.log(found.draws.range_m).mean(axis=-1).std()),
         "status": status,
         "converged": int(found.verdict.converged),
         "method": found.method,

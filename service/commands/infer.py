@@ -73,6 +73,8 @@ def _format_of(path: Path) -> str:
     from service.draws_formats import FORMATS
     from simulator.errors import InvalidInputError, Problem
 
+    if not path.parent.is_dir():
+        raise InvalidInputError(Problem(f"--draws {path}", "there is no such folder"))
     for form in FORMATS:
         if path.suffix == form.suffix:
             return form.media_type

@@ -94,7 +94,7 @@ def of_posterior(name: str, truth_m: Sequence[float], posterior: dict[str, Any])
     verdict, fit = posterior["verdict"], posterior["fit"]
     words = ["converged" if verdict["converged"] else "; ".join(verdict["reasons"])]
     if fit["misfit"]:
-        words.append("MISFIT: the model cannot make such readings, do not trust the intervals")
+        words.append("MISFIT, do not trust the intervals: " + "; ".join(fit["reasons"]))
     words += [
         f"{row['parameter']} is {row['status'].replace('_', ' ')}"
         for row in posterior["identifiability"]

@@ -123,6 +123,7 @@ def test_errors_name_file_and_field(
         ),
         (("infer", frames, "--scene", scene, "--ensembles", "0"), "sampler#/ensembles: "),
         (("infer", frames, "--scene", scene, "--draws", "draws.csv"), "--draws draws.csv: "),
+        (("infer", frames, "--scene", scene, "--draws", "no/d.nc"), "--draws no/d.nc: there is no"),
         (
             ("infer", bad(tmp_path, "f.csv", "w1\n1\n"), "--scene", scene),
             "f.csv#/w2: is missing",
