@@ -32,7 +32,7 @@ def prior_of(x: Array, X: Array, row: int, gain: float, log_weight: float, curve
     """Return what a hypothesis says of the next frame, as a density of u and the rest given u."""
     n, m = x.shape[1], X.shape[2]
     variance = 0.0
-    for j in range(m):
+    for j in range(n):
         variance += X[row, 0, j] * X[row, 0, j]
     precision = 1.0 / max(variance, 1e-300)
     log_scale = log_weight + 0.5 * (math.log(precision) - _LOG_2PI)
@@ -42,23 +42,23 @@ def prior_of(x: Array, X: Array, row: int, gain: float, log_weight: float, curve
     root = (0.0, 0.0, 0.0)
     if n > 2:
         offset1, offset2 = offset1 + x[row, 2], offset2 + x[row, 3]
-    if m > 2 and not curve.by_rate:
+        for j in range(n):
+            slope1 += X[row, 2, j] * X[row, 0, j] * precision
+            slope2 += X[row, 3, j] * X[row, 0, j] * precision
+        for j in range(n):
+            own = X[row, 0, j]
+            root = add_factor(root, X[row, 2, j] - slope1 * own, X[row, 3, j] - slope2 * own)
+    if m > n:
+        # the filter runs at the centre of the globals: what they do to the readings beyond what
+        # they have already done to the range is noise to it
         i, t = cell_of(centre, curve)
-        for both in range(2):
-            for j in range(m):
-                f1, f2 = 0.0, 0.0
-                if n > 2:
-                    f1, f2 = X[row, 2, j], X[row, 3, j]
-                if j >= n:
-                    g1, g2 = column_at(i, t, j - n, curve)
-                    f1, f2 = f1 + gain * g1, f2 + gain * g2
-                own = X[row, 0, j]
-                if both == 0:
-                    slope1 += f1 * own * precision
-                    slope2 += f2 * own * precision
-                else:
-                    f1, f2 = f1 - slope1 * own, f2 - slope2 * own
-                    root = add_factor(root, f1, f2)
+        _, _, d1, d2 = mean_at(centre, curve)
+        for j in range(n, m):
+            f1, f2 = column_at(i, t, j - n, curve)
+            f1, f2 = gain * (f1 + d1 * X[row, 0, j]), gain * (f2 + d2 * X[row, 0, j])
+            if n > 2:
+                f1, f2 = f1 + X[row, 2, j], f2 + X[row, 3, j]
+            root = add_factor(root, f1, f2)
     rate_slope, rate_sd = 0.0, 0.0
     if curve.by_rate:
         for j in range(m):
@@ -221,18 +221,18 @@ def learn(
         e2 = second - m2 - d2 * (x[row, 0] - u)
     surprise = update(x, X, row, e1, e2, slopes, noise, columns, work, factors)
     variance = 0.0
-    for j in range(m):
+    for j in range(n):
         variance += X[row, 0, j] * X[row, 0, j]
     if variance > 0.0 and choices[choice, 2] > 0.0:
         stretch = choices[choice, 2] / math.sqrt(variance) - 1.0
         shift = choices[choice, 1] - x[row, 0]
         for i in range(n - 1, -1, -1):
             slope = 0.0
-            for j in range(m):
+            for j in range(n):
                 slope += X[row, i, j] * X[row, 0, j]
             slope /= variance
             x[row, i] += slope * shift
-            for j in range(m):
+            for j in range(n):
                 X[row, i, j] += slope * stretch * X[row, 0, j]
     return surprise + 1.0 if prior.born else surprise
 

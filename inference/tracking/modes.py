@@ -263,9 +263,9 @@ def _integrate(
     Three Gauss-Hermite nodes where the peak is near a Gaussian, which is exact to the fifth power
     of the distance.
 
-    Where globals or crosstalk are uncertain only the mode is taken. What they do to the readings is
-    linear here, and the curve is not: integrated over a wide prediction, the difference would pass
-    for knowledge of the range, a little in every frame.
+    Where u is wide because globals or crosstalk are uncertain, only the mode is taken. What they do
+    to the readings is linear here, and the curve is not: integrated over a wide density, the
+    difference would pass for knowledge of the range, a little in every frame.
     """
     if linear:
         top = log_density(u, first, second, prior, spread, curve)

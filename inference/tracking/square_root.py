@@ -3,8 +3,8 @@
 A hypothesis holds the mean x of (u, du/dt) and, where crosstalk drifts, of two crosstalk readings;
 n is 2 or 4. Its error is X w with w standard normal: the first n columns of X are its own, lower
 triangular; the last p belong to the globals, which all frames share. Globals are "considered" as in
-the Schmidt-Kalman filter: they widen the gain and the covariance, but no frame makes them better
-known, so that what they do to the range never averages down.
+the Schmidt-Kalman filter: no frame makes them better known, so that what they do to the range never
+averages down; the state learns from a frame as much as it can beside them.
 """
 
 import math

@@ -337,8 +337,13 @@ def _first_state(
     x, X = np.zeros((rows, n)), np.zeros((rows, n, n + directions))
     if crosstalk is not None:
         x[0, 2:] = crosstalk
-        X[0, 2:, n:] = crosstalk_columns
         values = scene.crosstalk_values
+        # of its own, so that it can be learnt: its correlation with other globals is left out
+        if directions > 1:
+            upper = np.asarray(np.linalg.qr(crosstalk_columns.T, mode="r"))
+            X[0, 2:, 2:4] = upper.T
+        elif directions == 1:
+            X[0, 2:, 2] = crosstalk_columns[:, 0]
         if directions == 0 and values is not None:
             for k, value in enumerate(values):
                 if not isinstance(value, float | int):

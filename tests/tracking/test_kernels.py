@@ -75,7 +75,7 @@ def _random(rng: np.random.Generator, n: int, p: int, rows: int = 4):  # type: i
 
 
 @pytest.mark.parametrize(("n", "p"), [(2, 0), (4, 0), (2, 3), (4, 3)])
-def test_steps_are_those_of_a_schmidt_kalman_filter(n: int, p: int) -> None:
+def test_steps_are_those_of_a_filter_that_considers_the_globals(n: int, p: int) -> None:
     rng = np.random.default_rng(n + p)
     x, X = _random(rng, n, p)
     work, factors = np.zeros((n, 4 * n + n + p + 4)), np.zeros((4, n + p))
