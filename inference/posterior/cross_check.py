@@ -168,13 +168,15 @@ class _Frame:
     """Principal axes of draws, with unit spread along each: a thin posterior fills its box."""
 
     centre: Array
-    axes: Array
+    spread: Array
+    extent: Array
+    turn: Array
 
     def white(self, z: Array) -> Array:
-        return np.asarray(np.linalg.solve(self.axes.T, (z - self.centre)[..., None])[..., 0])
+        return np.asarray(((z - self.centre) / self.spread) @ self.turn.T / self.extent)
 
     def natural(self, y: Array) -> Array:
-        return np.asarray(self.centre + y @ self.axes)
+        return np.asarray(self.centre + ((y * self.extent) @ self.turn) * self.spread)
 
 
 def _principal_frame(chains: Chains) -> _Frame | None:
@@ -186,7 +188,7 @@ def _principal_frame(chains: Chains) -> _Frame | None:
     _, values, vectors = linalg.svd((flat - centre) / spread, full_matrices=False)
     if not values.min() > _THINNEST * values.max():
         return None
-    return _Frame(centre, vectors * (values / math.sqrt(len(flat)))[:, None] * spread)
+    return _Frame(centre, spread, values / math.sqrt(len(flat)), vectors)
 
 
 def _surroundings(density: LogDensity, chains: Chains, optima: Mixture) -> Array:

@@ -7,7 +7,6 @@ that holds here.
 """
 
 import dataclasses
-import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -72,7 +71,7 @@ def lattice_moments(
         if most < 0:
             return None
         axes = [low[j] + spacing * np.arange(counts[j]) for j in range(low.size)]
-        lattice = np.array(list(itertools.product(*axes)))
+        lattice = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, low.size)
         values = log_density(np.concatenate([lattice, lattice + 0.5 * spacing])).reshape(2, -1)
         if not np.isfinite(values.max()):
             return None
