@@ -39,9 +39,9 @@ from tests.posterior.surrogate import (
 )
 
 TARGET_ESS = 400
-TAU = 3.0
+TAU = 2.0
 LOOKS = 20
-CHUNK = 60  # steps, 20 autocorrelation times
+CHUNK = 40  # steps, 20 autocorrelation times
 POINTS = 15_000
 WALKERS = 8  # in the many runs: fewer than real ones have make every gate's task harder
 # a gate and the words that only its reasons hold
@@ -59,10 +59,11 @@ GATES = {
     "false branch": "false branch",
     "mode weights": "of the draws and",
     "quadrature": "quadrature",
-    "importance sampling": "importance sampling by",
-    "importance: moments": "from importance",
+    "importance sampling": "from importance",
     "prior": "widen its prior",
 }
+
+HALF = ("mode weights", "quadrature", "importance sampling")  # asked in every second run
 
 
 def _gate(reason):  # type: ignore[no-untyped-def]
@@ -75,14 +76,15 @@ def _band(count, runs):  # type: ignore[no-untyped-def]
     return f"{count:>6}{count / runs:>11.1e}   [{low:.1e}, {high:.1e}]"
 
 
-def _density_gates(law, chains, rng):  # type: ignore[no-untyped-def]
+def _density_gates(law, chains, rng, both=True):  # type: ignore[no-untyped-def]
     density, optima = target(law), optima_of(law)
     weighted = draw_weighted(cheap(density), optima, rng, 2000)
     found = [false_branch(density, chains, optima)]
-    found.append(moments_disagree(density, chains, optima, weighted, POINTS))
-    # importance sampling speaks first about modes: ask quadrature by itself as well
-    untrusted = dataclasses.replace(weighted, k_hat=1.0)
-    found.append(moments_disagree(density, chains, optima, untrusted, POINTS))
+    if both or rng.random() < 0.5:
+        found.append(moments_disagree(density, chains, optima, weighted, 0))
+    if both or len(found) == 1:
+        untrusted = dataclasses.replace(weighted, k_hat=1.0)  # quadrature by itself
+        found.append(moments_disagree(density, chains, optima, untrusted, POINTS))
     return [reason for reason in found if reason is not None]
 
 
@@ -92,14 +94,18 @@ def single_looks(runs, seed):  # type: ignore[no-untyped-def]
         rng = np.random.default_rng([seed, run])
         law = LAWS[run % len(LAWS)]
         chains = surrogate(rng, int(100 * TAU), TAU, law, walkers=WALKERS)
-        reasons = [*judge(chains, TARGET_ESS).reasons, *_density_gates(law, chains, rng)]
+        gates = _density_gates(law, chains, rng, both=False)
+        reasons = [*judge(chains, TARGET_ESS).reasons, *gates]
         alarms.update({_gate(reason) for reason in reasons})
         failed += bool(reasons)
+        if (run + 1) % 1000 == 0 or run + 1 == runs:
+            print(f"  {run + 1} runs, alarms so far: {dict(alarms)}", flush=True)
     print(f"\nhealthy surrogate runs, one look each: {runs}")
     print(f"{'gate':<26}{'alarms':>6}{'rate':>11}   95 % interval")
     for gate in GATES:
-        if gate not in ("prior", "importance sampling"):
-            print(f"{gate:<26}{_band(alarms[gate], runs)}")
+        if gate != "prior":
+            half = runs // 2 if gate in HALF else runs
+            print(f"{gate:<26}{_band(alarms[gate], half)}")
     print(f"{'any':<26}{_band(failed, runs)}", flush=True)
 
 

@@ -19,7 +19,7 @@ from inference.posterior.verdict import Chains, chains_of
 
 Array = NDArray[np.float64]
 
-ACCEPTANCE = 0.5
+ACCEPTANCE = 2 / 3
 INFLATION = 1.2  # of the variance of an ensemble's mean, against independent walkers
 NAMES = ("a", "b", "c")
 LAWS = ("normal", "student", "bimodal")
@@ -53,7 +53,7 @@ def surrogate(
     steps : int
         Kept steps.
     tau : float
-        Integrated autocorrelation time of a walker, at least 3.
+        Integrated autocorrelation time of a walker, at least 2.
     law : str
         Of LAWS.
     ensembles, walkers : int
