@@ -44,8 +44,9 @@ from inference.posterior.diagnostics import effective_sample_size, split_r_hat
 from inference.posterior.importance import draw_weighted
 from inference.posterior.integrand import log_integrand
 from inference.posterior.job import chains
+from inference.posterior.local_mixture import adapted
 from inference.posterior.profile import best_ranges
-from inference.posterior.proposal import adapted, mixture_of
+from inference.posterior.proposal import mixture_of
 from inference.posterior.rows import background_of, crosstalk_of, law_of
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.start import find_optima
@@ -305,7 +306,7 @@ def nuts(job, density, optima, cap):  # type: ignore[no-untyped-def]
 
 
 def nested(job, density, cap):  # type: ignore[no-untyped-def]
-    """Run dynesty with its defaults from the prior."""
+    """Run dynesty from the prior."""
     from dynesty import NestedSampler
 
     d = len(density.parameters)
@@ -314,7 +315,12 @@ def nested(job, density, cap):  # type: ignore[no-untyped-def]
         return max(float(density(z[None])[0] + 0.5 * z @ z), -1e300)
 
     sampler = NestedSampler(
-        log_likelihood, special.ndtri, d, nlive=500, rstate=np.random.default_rng(job.seed)
+        log_likelihood,
+        special.ndtri,
+        d,
+        nlive=500,
+        sample="rwalk",  # uniform sampling, the default, gets stuck where a posterior is thin
+        rstate=np.random.default_rng(job.seed),
     )
     begin = time.process_time()
     remaining, finished = math.inf, True
@@ -331,8 +337,9 @@ def nested(job, density, cap):  # type: ignore[no-untyped-def]
     weights = np.exp(results.logwt - special.logsumexp(results.logwt))
     ess = 1 / np.sum(weights**2)
     note = f"{int(np.sum(results.ncall))} calls"
-    if not finished:
+    if not finished:  # the weights of a run that has not arrived say nothing of the posterior
         note += f", stopped with {remaining:.3g} nats of evidence to go"
+        return Outcome(seconds, False, ess, math.nan, np.empty((0, d)), np.empty(0), note)
     return Outcome(
         seconds, finished and ess >= TARGET_ESS, ess, math.nan, results.samples, weights, note
     )
@@ -340,8 +347,8 @@ def nested(job, density, cap):  # type: ignore[no-untyped-def]
 
 def _reference(job, density, optima, cap):  # type: ignore[no-untyped-def]
     """Mean and sd of every z, and what they rest on."""
-    long = job.settings.model_copy(update={"target_ess": 4000, "seed": job.seed + 1000})
-    outcome, _ = ours(dataclasses.replace(job, settings=long), 2 * cap)
+    long = job.settings.model_copy(update={"target_ess": 2000, "seed": job.seed + 1000})
+    outcome, _ = ours(dataclasses.replace(job, settings=long), cap)
     rng = np.random.default_rng(job.seed + 2000)
     pilot = outcome.z[rng.integers(0, len(outcome.z), 20_000)]
     weighted = draw_weighted(density, adapted(mixture_of(optima), pilot, rng), rng, 30_000)
@@ -398,6 +405,7 @@ def _versions():  # type: ignore[no-untyped-def]
 
 def measure(name, cap, seed, samplers):  # type: ignore[no-untyped-def]
     """One scene, all samplers: a section of the document."""
+    load = os.getloadavg()[0]
     job, density, truth = _problem(name, seed)
     names = density.parameters.names
     ours(job, 1.0)  # compiles
@@ -407,7 +415,8 @@ def measure(name, cap, seed, samplers):  # type: ignore[no-untyped-def]
         f"## {name}",
         "",
         f"{len(names)} unknowns ({', '.join(f'`{n}`' for n in names)}) and {FRAMES} ranges. "
-        f"Reference: {basis}.",
+        f"Reference: {basis}. At most {cap:g} s each, seed {seed}, load {load:.1f}; "
+        f"Python {platform.python_version()}, {_versions()}.",
         "",
         "| sampler | processor s | reached | ESS | R-hat | wrong | |",
         "|---|---|---|---|---|---|---|",
@@ -427,26 +436,33 @@ def measure(name, cap, seed, samplers):  # type: ignore[no-untyped-def]
     return "\n".join([*lines, ""])
 
 
-HEAD = """# Samplers compared
+HEAD = f"""# Samplers compared
 
-Written by `python -m benchmarks.samplers`: one process, one core, one run, {frames} frames
-log-uniform in 0.1-2 m, pulsed, signal-to-noise 1000 at 1 m, seed {seed}, at most {cap:g} s of
-processor time each. {versions};
-Python {python}. The machine has two cores and had a load of
-{load:.1f} at the start: processor time does not count waiting, but shared caches make every row
-slower than on an idle machine.
+Written by `python -m benchmarks.samplers`, which runs all samplers of a scene one after the other
+in one process on one core. {FRAMES} frames log-uniform in 0.1-2 m, pulsed, signal-to-noise 1000 at
+1 m. Processor time does not count waiting, but other work on the two cores (their load is stated)
+shares the caches and makes every row slower than on an idle machine.
 
-*Ours* stops at its own verdict, the others at an effective sample size of 400 and R-hat of 1.01 for
-every global parameter, nested sampling at 0.05 nats of evidence left. *Reached* says whether they
-got there. *Wrong* compares with the reference: a mean off by more than 0.2 standard deviations, a
-standard deviation off by more than 10 %, a truth outside all but 1e-3 of the draws which the
-reference does not exclude. Plain emcee and NUTS are given the best optimum and its shape.
+*Ours* stops at its own verdict, the others at an effective sample size of {TARGET_ESS} and R-hat of
+{TARGET_R_HAT} for every global parameter, nested sampling at 0.05 nats of evidence left. *Reached*
+says whether they got there. *Wrong* compares with the reference: a mean off by more than 0.2
+standard deviations, a standard deviation off by more than 10 %, a truth outside all but 1e-3 of the
+draws which the reference does not exclude. Plain emcee and NUTS are given the best optimum and its
+shape; ours and nested sampling start from the prior.
 """
+
+
+def _write(path, name, section):  # type: ignore[no-untyped-def]
+    """Put a scene's section into the document; those of other scenes stay."""
+    old = path.read_text().split("\n## ")[1:] if path.exists() else []
+    sections = {part.partition("\n")[0]: "## " + part.rstrip("\n") + "\n" for part in old}
+    sections[name] = section
+    path.write_text("\n".join([HEAD, *(sections[key] for key in SCENES if key in sections)]))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cap", type=float, default=120.0)
+    parser.add_argument("--cap", type=float, default=120.0, help="processor seconds each")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scenes", default=",".join(SCENES))
     parser.add_argument("--samplers", default="ours,plain emcee,NUTS,nested")
@@ -458,20 +474,10 @@ def main() -> None:
             f"the peers {', '.join(missing)} are not installed; "
             "pip install numpyro==0.22.0 jax==0.10.2 dynesty==3.1.0"
         )
-    head = HEAD.format(
-        frames=FRAMES,
-        seed=wanted.seed,
-        cap=wanted.cap,
-        versions=_versions(),
-        python=platform.python_version(),
-        load=os.getloadavg()[0],
-    )
-    print(head)
-    sections = [head]
     for name in wanted.scenes.split(","):
-        sections.append(measure(name, wanted.cap, wanted.seed, wanted.samplers.split(",")))
+        section = measure(name, wanted.cap, wanted.seed, wanted.samplers.split(","))
         if wanted.output:
-            wanted.output.write_text("\n".join(sections))
+            _write(wanted.output, name, section)
 
 
 if __name__ == "__main__":
