@@ -12,224 +12,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.collapsed import empty_frame_log_likelihood
-from inference.posterior.flux_error import add_mode, add_row, expand
+from inference.posterior.discrepancy_climb import best_positions, climb_jointly
+from inference.posterior.flux_error import add_mode
 from inference.posterior.frame_integral import (
     find_modes,
     frame_log_likelihood,
     integration_bounds,
     tabulate,
 )
-from inference.posterior.integrand import (
-    Pair,
-    Triple,
-    WarpedArguments,
-    log_integrand,
-    log_top,
-    slope_and_curvature,
-)
+from inference.posterior.integrand import Pair, WarpedArguments
 from inference.posterior.rows import background_of, crosstalk_of, law_of
+from inference.posterior.triangular import solve_factor, update_factor
 from inference.posterior.warp import fill_curve
 from simulator.compiled import compiled
 
-__all__ = ["best_under_flux_error", "integrate_flux_error"]
+__all__ = ["integrate_flux_error"]
 
 Array = NDArray[np.float64]
 
-_CLIMBS = 15
-_FOLLOWING = 4  # steps of a range after one of the curve
-_NEAR = 1e-2  # nats that a climb may leave to Newton's method
 _ROUNDS = 8
+_SMALL = 1e-2  # nats; the slope of wide modes is not exact
 _DONE = 1e-3  # nats below the maximum at which the expansion is good
 _LONGEST = 1.0  # of a step, in log flux
 _FEW = 1e-5  # weight of a mode that is not looked at
-
-
-@compiled
-def update_factor(factor: Array, rows: Array, count: int) -> None:
-    """Update an upper triangular R to that of R^T R + rows rows^T by Householder reflections.
-
-    Parameters
-    ----------
-    factor : ndarray, shape (k, k)
-        R, overwritten.
-    rows : ndarray, shape (k, at least count)
-        One column a row of the least squares problem; overwritten.
-    count : int
-        Columns in use.
-    """
-    size = factor.shape[0]
-    for k in range(size):
-        square = 0.0
-        for i in range(count):
-            square += rows[k, i] * rows[k, i]
-        if square == 0.0:
-            continue
-        norm = math.sqrt(factor[k, k] * factor[k, k] + square)
-        head = factor[k, k] + math.copysign(norm, factor[k, k])
-        beta = 2.0 / (head * head + square)
-        for j in range(k + 1, size):
-            dot = head * factor[k, j]
-            for i in range(count):
-                dot += rows[k, i] * rows[j, i]
-            dot *= beta
-            factor[k, j] -= dot * head
-            for i in range(count):
-                rows[j, i] -= dot * rows[k, i]
-        factor[k, k] = -math.copysign(norm, factor[k, k])
-
-
-@compiled
-def solve_factor(factor: Array, vector: Array) -> float:
-    """Overwrite v by (R^T R)^-1 v; return half of v^T (R^T R)^-1 v."""
-    size = vector.size
-    half = 0.0
-    for k in range(size):
-        total = vector[k]
-        for j in range(k):
-            total -= factor[j, k] * vector[j]
-        vector[k] = total / factor[k, k]
-        half += 0.5 * vector[k] * vector[k]
-    for k in range(size - 1, -1, -1):
-        total = vector[k]
-        for j in range(k + 1, size):
-            total -= factor[k, j] * vector[j]
-        vector[k] = total / factor[k, k]
-    return half
-
-
-@compiled
-def _cholesky(matrix: Array) -> bool:
-    """Overwrite the upper triangle by R with R^T R = matrix; False where rounding spoils it."""
-    size = matrix.shape[0]
-    for k in range(size):
-        for i in range(k):
-            for j in range(k, size):
-                matrix[k, j] -= matrix[i, k] * matrix[i, j]
-        if not matrix[k, k] > 0.0:
-            return False
-        root = math.sqrt(matrix[k, k])
-        for j in range(k, size):
-            matrix[k, j] /= root
-    return True
-
-
-@compiled
-def _best_positions(
-    positions: Array,
-    frames: Array,
-    present: NDArray[np.bool_] | None,
-    bounds: Pair,
-    strongest: float,
-    scene: WarpedArguments,
-) -> None:
-    """Fill log r of every frame's best mode under the scene's curve; nan without an object."""
-    shape, crosstalk, background, law, r0, wave, read, shot, _, delta = scene
-    table = tabulate(
-        bounds, shape, crosstalk, background, law, r0, wave, read, shot, strongest, delta
-    )
-    work = np.empty(table.shape[1])
-    modes = np.empty((work.size // 2 + 1, 6))
-    for j in range(positions.size):
-        positions[j] = math.nan
-        if present is not None and not present[j]:
-            continue
-        frame = (frames[j, 0], frames[j, 1], frames[j, 2])
-        count = find_modes(modes, work, table, frame, scene)
-        best = -math.inf
-        for m in range(count):
-            if modes[m, 1] > best:
-                best, positions[j] = modes[m, 1], modes[m, 0]
-
-
-@compiled
-def _follow(u: float, frame: Triple, bounds: Pair, scene: WarpedArguments) -> float:
-    """Let a range follow a change of the curve, by Gauss-Newton steps."""
-    for _ in range(_FOLLOWING):
-        slope, bend = slope_and_curvature(u, frame, *scene)
-        if not bend > 0.0 or slope * slope < 1e-2 * bend:
-            break
-        u = min(max(u + min(max(slope / bend, -0.5), 0.5), bounds[0]), bounds[1])
-    return u
-
-
-@compiled
-def _climb(
-    coefficients: Array,
-    positions: Array,
-    frames: Array,
-    bounds: Pair,
-    basis: Array,
-    scene: WarpedArguments,
-) -> float:
-    """Climb to the joint maximum over coefficients and ranges; return its log density."""
-    delta = scene[9]
-    n, size = frames.shape[0], coefficients.size
-    phi = np.empty((n, size))
-    terms = np.empty((n, 3))
-    precision = np.empty((size, size))
-    step = np.empty(size)
-    moves = np.zeros(n)
-    best, trial, at = -math.inf, coefficients.copy(), positions.copy()
-    for _ in range(_CLIMBS):
-        fill_curve(delta[0], basis, trial)
-        value = 0.0
-        precision[:] = 0.0
-        for k in range(size):
-            value -= 0.5 * trial[k] * trial[k]
-            precision[k, k] = 1.0
-            step[k] = -trial[k]
-        for j in range(n):
-            if not math.isfinite(at[j]):
-                continue
-            frame = (frames[j, 0], frames[j, 1], frames[j, 2])
-            at[j] = _follow(at[j], frame, bounds, scene)
-            density, along, bend, flux, mixed, stiff, free = expand(at[j], frame, *scene)
-            value += density
-            # at an end of the support, or where nothing bends, the range cannot follow
-            stuck = (at[j] <= bounds[0] and along < 0.0) or (at[j] >= bounds[1] and along > 0.0)
-            if stuck or not bend > 0.0:
-                along, bend, mixed, free = 0.0, 1.0, 0.0, stiff
-            terms[j, 0], terms[j, 1], terms[j, 2] = along, bend, mixed
-            phi[j, :] = 0.0
-            add_row(phi[j], basis, at[j], delta, 1.0)
-            slope = flux - mixed * along / bend
-            for k in range(size):
-                step[k] += slope * phi[j, k]
-                scaled = free * phi[j, k]
-                for i in range(k, size):
-                    precision[k, i] += scaled * phi[j, i]
-        if not value > best:
-            for k in range(size):
-                trial[k] = coefficients[k] + 0.3 * (trial[k] - coefficients[k])
-            for j in range(n):
-                at[j] = positions[j] + 0.3 * (at[j] - positions[j])
-            continue
-        best = value
-        coefficients[:] = trial
-        positions[:] = at
-        if not _cholesky(precision):
-            break
-        gain = solve_factor(precision, step)
-        if gain < _NEAR:
-            coefficients += step
-            break
-        longest = 0.0
-        for j in range(n):
-            if not math.isfinite(at[j]):
-                continue
-            change = 0.0
-            for k in range(size):
-                change += phi[j, k] * step[k]
-            longest = max(longest, abs(change))
-            moves[j] = change
-        short = min(1.0, _LONGEST / longest) if longest > 0.0 else 1.0
-        for k in range(size):
-            trial[k] = coefficients[k] + short * step[k]
-        for j in range(n):
-            if math.isfinite(at[j]):
-                move = (terms[j, 0] - terms[j, 2] * short * moves[j]) / terms[j, 1]
-                at[j] = min(max(at[j] + min(max(move, -0.5), 0.5), bounds[0]), bounds[1])
-    return best
 
 
 @compiled
@@ -336,7 +141,7 @@ def _newton(
         if not value > best - 1e-9 * (1.0 + abs(best)):
             if best == -math.inf:
                 return -math.inf
-            if gain < _NEAR:  # the slope of wide modes is not exact
+            if gain < _SMALL:
                 break
             last *= 0.3
             trial[:] = coefficients + last
@@ -416,8 +221,8 @@ def integrate_flux_error(
             continue
         scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative, delta)
         fill_curve(knots, basis, centre)
-        _best_positions(positions, frames, present, bounds, strongest, scene)
-        _climb(centre, positions, frames, bounds, basis, scene)
+        best_positions(positions, frames, present, bounds, strongest, scene)
+        climb_jointly(centre, positions, frames, bounds, basis, scene)
         total = _newton(out[i], centre, factor, frames, present, bounds, strongest, basis, scene)
         if not math.isfinite(total):
             out[i, :] = -math.inf
@@ -425,74 +230,3 @@ def integrate_flux_error(
         share = (total - out[i].sum()) / n
         for j in range(n):
             out[i, j] += share
-
-
-@compiled
-def best_under_flux_error(
-    out: Array,
-    centres: Array,
-    shapes: Array,
-    crosstalks: Array | None,
-    backgrounds: Array | None,
-    laws: Array,
-    frames: Array,
-    present: NDArray[np.bool_] | None,
-    r0: float,
-    wave: Pair | None,
-    read: Pair,
-    shot: float | None,
-    relative: float | None,
-    basis: Array,
-    grid: Pair,
-) -> None:
-    """Fill the joint maximum over coefficients and ranges of every parameter vector.
-
-    Parameters
-    ----------
-    out : ndarray, shape (n, frames, 3)
-        Filled with log r, the frame's share of the joint log density, and the standard deviation of
-        log r; nan, log likelihood and nan for a frame without object.
-    centres : ndarray, shape (n, functions)
-        Filled with the coefficients.
-    shapes, crosstalks, backgrounds, laws, frames, present, r0, wave, read, shot, relative, basis, \
-grid
-        As for `integrate_flux_error`.
-    """
-    strongest = frames[:, 2].max()
-    n = frames.shape[0]
-    knots = np.empty((basis.shape[0], 2))
-    delta = (knots, grid[0], grid[1])
-    positions = np.empty(n)
-    for i in range(shapes.shape[0]):
-        shape = (shapes[i, 0], shapes[i, 1], shapes[i, 2])
-        crosstalk = crosstalk_of(crosstalks, i)
-        background = background_of(backgrounds, i)
-        law = law_of(laws, i)
-        bounds = integration_bounds(law)
-        centre = centres[i]
-        centre[:] = 0.0
-        out[i, :, 0], out[i, :, 1], out[i, :, 2] = math.nan, -math.inf, math.nan
-        if not bounds[1] > bounds[0] or not math.isfinite(law[0]):
-            continue
-        scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative, delta)
-        fill_curve(knots, basis, centre)
-        _best_positions(positions, frames, present, bounds, strongest, scene)
-        _climb(centre, positions, frames, bounds, basis, scene)
-        fill_curve(knots, basis, centre)
-        prior = 0.0
-        for k in range(centre.size):
-            prior -= 0.5 * centre[k] * centre[k]
-        for j in range(n):
-            frame = (frames[j, 0], frames[j, 1], frames[j, 2])
-            if present is not None and not present[j]:
-                out[i, j, 1] = prior / n + empty_frame_log_likelihood(
-                    frame, crosstalk, background, r0, wave, read, shot
-                )
-                continue
-            if not math.isfinite(positions[j]):
-                continue
-            u = _follow(positions[j], frame, bounds, scene)
-            bend = slope_and_curvature(u, frame, *scene)[1]
-            out[i, j, 0] = u
-            out[i, j, 1] = prior / n + log_integrand(u, frame, *scene) + log_top(read)
-            out[i, j, 2] = 1.0 / math.sqrt(bend) if bend > 0.0 else math.inf

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.collapsed import CollapsedDensity
-from inference.posterior.discrepancy_integral import best_under_flux_error, integrate_flux_error
+from inference.posterior.discrepancy_climb import best_under_flux_error
+from inference.posterior.discrepancy_integral import integrate_flux_error
 from inference.posterior.integrand import Pair
 from simulator.discrepancy import DiscrepancyBasis, discrepancy_basis
 from simulator.parameters import Parameters, Terms

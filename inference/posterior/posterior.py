@@ -200,7 +200,7 @@ class Fit:
     p_value : float
         Of all checks together.
     misfit : bool
-        Whether it is below 1e-3.
+        Whether it is below 1e-3, or the frames demand a larger discrepancy than was stated.
     reasons : tuple of str
         What misfits, in plain words.
     chi_square, degrees_of_freedom : float

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from inference.identifiability.after_data import judge_draws
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.cross_check import cross_check
+from inference.posterior.discrepancy_check import judge_fit, judge_scale, larger_discrepancy
+from inference.posterior.discrepant import DiscrepantDensity
 from inference.posterior.draws import draws_of
 from inference.posterior.folds import near_fold
 from inference.posterior.job import Checkpoint, Job
@@ -98,6 +100,19 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
     conflicts = prior_conflicts(density, z, log_r)
     verdict = Verdict(verdict.converged and not conflicts, (*verdict.reasons, *conflicts))
     fit = predictive_check(job, density, chosen, rng)
+    judged = judge_draws(
+        job.sensor,
+        parameters,
+        z,
+        chosen,
+        log_r,
+        density.frames[:, 2],
+        discrepancy=job.scene.discrepancy,
+        common_range=job.scene.motion == "static",
+    )
+    if isinstance(density, DiscrepantDensity):
+        larger = larger_discrepancy(density, chosen, log_r)
+        fit, judged = judge_fit(fit, larger), judge_scale(judged, larger)
     folds = near_fold(job, density, chosen, log_r)
     importance_ess = None if sample.weighted is None else sample.weighted.ess
     return Posterior(
@@ -107,16 +122,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
         _parameters(density, sample),
         joint_modes(density, checkpoint.optima, sample),
         range_summary(draws, folds, importance_ess),
-        judge_draws(
-            job.sensor,
-            parameters,
-            z,
-            chosen,
-            log_r,
-            density.frames[:, 2],
-            discrepancy=job.scene.discrepancy,
-            common_range=job.scene.motion == "static",
-        ),
+        judged,
         fit,
         _left_out(stated, selection),
         Runtime(wall_s, cpu_s, checkpoint.calls, k_hat),

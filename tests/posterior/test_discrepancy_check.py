@@ -1,0 +1,101 @@
+"""What an answer owes to the stated size of the discrepancy."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from inference.identifiability.status import Identifiability
+from inference.posterior.collapsed import collapsed_density
+from inference.posterior.discrepancy_check import (
+    LargerDiscrepancy,
+    judge_fit,
+    judge_scale,
+    larger_discrepancy,
+)
+from inference.posterior.discrepant import DiscrepantDensity, with_discrepancy
+from inference.posterior.posterior import Fit
+from inference.posterior.ranges import draw_ranges
+from simulator.scene import parse_scene
+from tests.posterior.scenes import OBJECT, data, sensor_of
+
+GOOD = Fit(0.5, False, (), 10.0, 10.0, (), ())
+ROWS = (
+    Identifiability("object.c2", "weak", 0.5, "a reason"),
+    Identifiability("range_m", "identified", 0.99, "a reason"),
+)
+
+
+def amplitude_density(stated: float, true: float, seed: int) -> DiscrepantDensity:
+    """Return a density whose only unknown is c2."""
+    scene: dict[str, Any] = {
+        "object": {
+            "c0": OBJECT["c0"],
+            "c1": OBJECT["c1"],
+            "c2": {"prior": "lognormal", "median": OBJECT["c2"], "sigma": 0.3},
+        },
+        "crosstalk": [0.002, 0.01],
+        "range_m": {"prior": "loguniform", "low": 0.3, "high": 1.5},
+    }
+    sensor = sensor_of("pulsed", 1000.0)
+    truth = {"crosstalk": [0.002, 0.01], "discrepancy": true}
+    frames = data(sensor, truth, 10, seed=seed, span=(0.4, 1.2)).frames
+    return with_discrepancy(collapsed_density(sensor, parse_scene(scene), frames), stated)
+
+
+def draws_of(density: DiscrepantDensity, seed: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Draw the one unknown by quadrature."""
+    grid = np.linspace(-4, 4, 401)
+    value = density(grid[:, None])
+    total = np.cumsum(np.exp(value - value.max()))
+    uniform = np.random.default_rng(seed).random(400)
+    return np.asarray(np.interp(uniform, total / total[-1], grid))[:, None]
+
+
+def test_the_bayes_factor_is_the_ratio_of_both_integrals() -> None:
+    density = amplitude_density(stated=0.05, true=0.05, seed=1)
+    larger = with_discrepancy(density, 0.1)
+    grid = np.linspace(-6, 6, 601)[:, None]
+    wanted = np.exp(larger(grid) - density(grid).max()).sum()
+    wanted /= np.exp(density(grid) - density(grid).max()).sum()
+    z = draws_of(density, 1)
+    found = larger_discrepancy(density, z, draw_ranges(density, z, np.random.default_rng(1)))
+    gain = np.exp(larger.log_likelihood(z) - density.log_likelihood(z))
+    error = gain.std() / math.sqrt(len(z))
+    assert found.bayes_factor == pytest.approx(wanted, abs=5 * error + 0.02 * wanted)
+
+
+def test_an_error_of_the_stated_size_is_no_misfit() -> None:
+    """False alarms: at most 1e-3 each (Markov), ten sets."""
+    for seed in range(10):
+        density = amplitude_density(stated=0.05, true=0.05, seed=seed)
+        z = draws_of(density, seed)
+        found = larger_discrepancy(density, z, draw_ranges(density, z, np.random.default_rng(1)))
+        assert not judge_fit(GOOD, found).misfit
+
+
+def test_an_error_far_above_the_stated_size_is_a_misfit() -> None:
+    density = amplitude_density(stated=0.01, true=0.3, seed=3)
+    z = draws_of(density, 3)
+    found = larger_discrepancy(density, z, draw_ranges(density, z, np.random.default_rng(1)))
+    assert judge_fit(GOOD, found).misfit
+
+
+def test_a_scale_that_moves_with_the_size_is_not_identified() -> None:
+    moved = judge_scale(ROWS, LargerDiscrepancy(bayes_factor=2.0, shift=-0.1, sd=0.05))
+    assert moved[0] == ROWS[0]
+    assert moved[1].status == "not_identified"
+    assert "-10 %" in moved[1].reason
+    assert judge_scale(ROWS, LargerDiscrepancy(2.0, 0.04, 0.05)) == ROWS
+    # nothing is known of a scale where no frame holds an object
+    assert judge_scale(ROWS, LargerDiscrepancy(2.0, 0.0, 0.0)) == ROWS
+
+
+def test_a_misfit_that_was_seen_stays() -> None:
+    bad = dataclasses.replace(GOOD, misfit=True, reasons=("a reason",))
+    assert judge_fit(bad, LargerDiscrepancy(0.1, 0.0, 0.1)) == bad
+    both = judge_fit(bad, LargerDiscrepancy(1e4, 0.0, 0.1))
+    assert both.misfit
+    assert len(both.reasons) == 2
