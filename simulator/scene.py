@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 import pydantic
 
+from simulator.discrepancy import DISCREPANCY_SD
 from simulator.errors import InvalidInputError, Problem
 from simulator.priors import Prior
 from simulator.sensor import PulsedSensor, Sensor
@@ -152,7 +153,8 @@ class Scene(Validated):
     motion : "radial", "tangential" or "static"
         Tangential: the range is fixed and the amplitude changes.
     discrepancy : float, optional
-        Standard deviation of a smooth relative error of the object's flux along log r.
+        Standard deviation of a smooth relative error of the object's flux along log r; "default"
+        stands for `simulator.discrepancy.DISCREPANCY_SD`, measured on the optical simulator.
     """
 
     object: ObjectTerm = ObjectTerm()
@@ -176,7 +178,13 @@ class Scene(Validated):
         | None
     ) = None
     motion: Motion = "radial"
-    discrepancy: Positive | None = None
+    discrepancy: Annotated[
+        Positive | None,
+        pydantic.BeforeValidator(
+            lambda value: DISCREPANCY_SD if value == "default" else value,
+            json_schema_input_type=Positive | Literal["default"] | None,
+        ),
+    ] = None
 
     @property
     def crosstalk_values(self) -> tuple[Quantity, Quantity] | None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from simulator.discrepancy import DISCREPANCY_SD, discrepancy_basis, matern
 from simulator.optics.misfit import model_misfit
+from simulator.scene import parse_scene
 
 Array = NDArray[np.float64]
 
@@ -65,3 +66,8 @@ def test_size_and_length_are_those_of_the_optical_simulators_misfit() -> None:
     length = np.interp(-math.exp(-0.5), -correlation / correlation[0], lags)
     # the longest paths leave 0.37: the table cannot tell lengths above one apart
     assert length == pytest.approx(measured.correlation_length, rel=0.2)
+
+
+def test_a_scene_may_ask_for_the_measured_size() -> None:
+    assert parse_scene({"discrepancy": "default"}).discrepancy == DISCREPANCY_SD
+    assert parse_scene({}).discrepancy is None
