@@ -36,12 +36,10 @@ STRENGTH = {"prior": "lognormal", "median": 0.01, "sigma": 1.5}
 
 @dataclasses.dataclass(frozen=True)
 class Foreseen:
-    """Standard deviations of log R and of the common scale of the ranges, at the truth."""
+    """Standard deviations of log R, at the truth."""
 
     bound: float
     predicted: float
-    scale_bound: float
-    scale_predicted: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,7 +121,7 @@ class Cell:
         ends = experiment.parameters.natural(experiment.z + np.outer([1, -1], step))[:, j]
         slope = float(np.log(ends[0] / ends[1])) / 2e-5  # of log R along its z: the prior is cut
         predicted = float(prediction.sd[j]) * slope
-        return Foreseen(float(bounds.sd[j]), predicted, bounds.scale_sd, prediction.scale_sd)
+        return Foreseen(float(bounds.sd[j]), predicted)
 
 
 def prior_sd() -> float:
@@ -160,9 +158,6 @@ COLUMNS = (
         "sd",
         "median_m",
         "error",
-        "scale_bound",
-        "scale_predicted",
-        "scale_sd",
     ),
     *("status", "converged", "method", "ess", "rhat", "k_hat", "cpu_s", "version"),
 )
@@ -193,9 +188,6 @@ def row_of(number: int, version: str, seconds: float) -> Row:
         "sd": float(distances.std()),
         "median_m": summary.q50,
         "error": math.log(summary.q50 / cell.distance) / float(distances.std()),
-        "scale_bound": foreseen.scale_bound,
-        "scale_predicted": foreseen.scale_predicted,
-        "scale_sd": float(np.log(found.draws.range_m).mean(axis=-1).std()),
         "status": status,
         "converged": int(found.verdict.converged),
         "method": found.method,
