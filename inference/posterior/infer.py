@@ -1,7 +1,10 @@
 """The fold in a loop: from readings to the posterior in one call."""
 
+import functools
 import time
+from collections.abc import Callable
 from concurrent.futures import Executor
+from typing import Any, TypeVar
 
 from inference.posterior.fold import merge, prepare, run, start, summarise, tasks
 from inference.posterior.posterior import Posterior
@@ -11,6 +14,8 @@ from simulator.scene import Scene
 from simulator.sensor import Sensor
 
 __all__ = ["infer"]
+
+R = TypeVar("R")
 
 
 def infer(
@@ -43,14 +48,24 @@ def infer(
     RefusedError
         Where no honest answer exists.
     """
-    begin, cpu = time.perf_counter(), time.process_time()
+    begin, cpu_s = time.perf_counter(), 0.0
     settings = SamplerSettings() if settings is None else settings
     job = prepare(sensor, scene, frames, settings)
-    checkpoint = start(job)
+    checkpoint, spent = _timed(start, job)
+    cpu_s += spent
     while time.perf_counter() - begin < settings.max_seconds:
         chunk = tasks(job, checkpoint)
         if not chunk:
             break
-        pieces = list(map(run, chunk) if executor is None else executor.map(run, chunk))
-        checkpoint = merge(job, checkpoint, pieces)
-    return summarise(job, checkpoint, time.perf_counter() - begin, time.process_time() - cpu)
+        timed_run = functools.partial(_timed, run)
+        done = list(map(timed_run, chunk) if executor is None else executor.map(timed_run, chunk))
+        checkpoint, spent = _timed(merge, job, checkpoint, [piece for piece, _ in done])
+        cpu_s += spent + sum(seconds for _, seconds in done)
+    return summarise(job, checkpoint, time.perf_counter() - begin, cpu_s)
+
+
+def _timed(function: Callable[..., R], *arguments: Any) -> tuple[R, float]:
+    """Call a function and return the processor time that it took, in whatever process it runs."""
+    begin = time.process_time()
+    result = function(*arguments)
+    return result, time.process_time() - begin

@@ -1,0 +1,118 @@
+"""Time to a posterior where a background is unknown: curved posteriors of six to nine parameters.
+
+    python -m benchmarks.hard_posteriors [--seeds 1] [--kinds pulsed sine_wave] [--ensembles 4]
+
+N = 40 frames log-uniform in 0.1-2 m, signal-to-noise 1000 at 1 m, two processes. The baseline of
+the ratio is the scene without crosstalk or background in the same run. Compilation is not counted.
+"""
+
+import argparse
+import multiprocessing
+import time
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+
+from inference.posterior.infer import infer
+from inference.posterior.settings import SamplerSettings
+from simulator.scene import parse_scene
+from simulator.sensor import parse_sensor
+from simulator.simulate import simulate
+from simulator.trajectories import RadialTrajectory
+
+SENSORS = {
+    "pulsed": {"kind": "pulsed", "pulse_width_s": 1e-7},
+    "sine_wave": {"kind": "sine_wave", "frequency_hz": 5e6},
+}
+CROSSTALK = {"crosstalk": [{"prior": "normal", "mean": 0.0, "sd": 0.1}] * 2}
+STRENGTH = {"prior": "lognormal", "median": 0.02, "sigma": 1.0}
+DISTANCE = {"prior": "lognormal", "median": 3.0, "sigma": 0.5}
+SCENES = {
+    "object": {},
+    "background, R known": {"background": {"strength": STRENGTH, "distance_m": 3.0}},
+    "crosstalk, background, R known": {
+        **CROSSTALK,
+        "background": {"strength": STRENGTH, "distance_m": 3.0},
+    },
+    "background, R unknown": {"background": {"strength": STRENGTH, "distance_m": DISTANCE}},
+    "everything unknown": {
+        **CROSSTALK,
+        "background": {"strength": STRENGTH, "distance_m": DISTANCE},
+    },
+}
+TRUTH = {
+    "object": {"c0": 0.0769, "c1": -0.123, "c2": 0.0957},
+    "crosstalk": [5e-4, 0.01],
+    "background": {"strength": 0.017, "distance_m": 3.0, "shadow": {"c0": 0.056, "c1": 0.02}},
+}
+READ = 7.7e-6  # a thousandth of the object's w2 at 1 m
+
+
+def _case(kind, name, frames, seed):  # type: ignore[no-untyped-def]
+    sensor = parse_sensor({**SENSORS[kind], "noise": {"read": [READ, READ]}})
+    terms = SCENES[name]
+    truth = {"object": TRUTH["object"], **{term: TRUTH[term] for term in terms}}
+    path = RadialTrajectory(from_m=0.1, to_m=2.0, frames=frames, spacing="log")
+    simulation = simulate(sensor, parse_scene(truth), path, seed)
+    return sensor, parse_scene(terms), simulation
+
+
+def _warm(kind, name):  # type: ignore[no-untyped-def]
+    sensor, scene, simulation = _case(kind, name, 12, 0)
+    infer(sensor, scene, simulation.frames, SamplerSettings(seed=1, target_ess=10, max_seconds=5))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--kinds", nargs="+", default=list(SENSORS), choices=list(SENSORS))
+    parser.add_argument("--ensembles", type=int, default=4)
+    parser.add_argument("--max-seconds", type=float, default=120.0)
+    arguments = parser.parse_args()
+    context = multiprocessing.get_context("spawn")
+    print(
+        f"{'sensor':<11}{'scene':<32}{'d':>3}{'wall':>8}{'ratio':>7}{'cpu':>8}{'ESS':>7}"
+        f"{'R-hat':>8}{'inside':>8}  verdict"
+    )
+    with ProcessPoolExecutor(2, mp_context=context) as executor:
+        for kind in arguments.kinds:
+            base = None
+            for name in SCENES:
+                list(executor.map(_warm, [kind] * 2, [name] * 2))
+                _warm(kind, name)
+                for seed in range(arguments.seeds):
+                    sensor, scene, simulation = _case(kind, name, 40, seed)
+                    settings = SamplerSettings(
+                        seed=seed,
+                        ensembles=arguments.ensembles,
+                        max_seconds=arguments.max_seconds,
+                    )
+                    begin = time.perf_counter()
+                    posterior = infer(sensor, scene, simulation.frames, settings, executor)
+                    wall = time.perf_counter() - begin
+                    base = base or wall
+                    ess = min(p.ess_bulk for p in posterior.parameters.values())
+                    r_hat = max(p.rhat or 9.0 for p in posterior.parameters.values())
+                    low, high = posterior.range_m.q05, posterior.range_m.q95
+                    inside = np.mean((low <= simulation.range_m) & (simulation.range_m <= high))
+                    verdict = (
+                        "converged"
+                        if posterior.verdict.converged
+                        else "; ".join(posterior.verdict.reasons)
+                    )
+                    open_ones = [
+                        row.parameter
+                        for row in posterior.identifiability
+                        if row.status == "not_identified"
+                    ]
+                    print(
+                        f"{kind:<11}{name:<32}{len(posterior.parameters):>3}{wall:>7.1f}s"
+                        f"{wall / base:>7.1f}{posterior.runtime.cpu_s:>7.1f}s{ess:>7.0f}"
+                        f"{r_hat:>8.4f}{inside:>8.0%}  {verdict}"
+                        + (f"; not identified: {', '.join(open_ones)}" if open_ones else ""),
+                        flush=True,
+                    )
+
+
+if __name__ == "__main__":
+    main()
