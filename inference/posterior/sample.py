@@ -14,7 +14,7 @@ __all__ = ["Sample", "sample_of"]
 
 Array = NDArray[np.float64]
 
-_WHERE_NOTHING_IS_UNKNOWN = 1000
+_NOTHING_DRAWN = 1000
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ def sample_of(
     else:
         # nothing unknown, or stopped before the first chunk: the starts are all there is
         weighted = None
-        z = _starts(checkpoint)
+        z = _starts(density, checkpoint, rng)
         log_density = density(z)
     n = len(z)
     mode = np.zeros(n, dtype=np.intp)
@@ -103,14 +103,16 @@ def sample_of(
     )
 
 
-def _starts(checkpoint: Checkpoint) -> Array:
+def _starts(density: CollapsedDensity, checkpoint: Checkpoint, rng: np.random.Generator) -> Array:
     """Return where the walkers, or else the populations on their way, stand."""
     proposal = checkpoint.proposal
     if proposal is None:
-        return np.empty((_WHERE_NOTHING_IS_UNKNOWN, 0))
+        return np.empty((_NOTHING_DRAWN, 0))
     if checkpoint.ensembles:
-        return np.concatenate(
-            [proposal.bend(ensemble.coords)[0] for ensemble in checkpoint.ensembles]
-        )
+        return np.concatenate([proposal.bend(e.coords)[0] for e in checkpoint.ensembles])
     arrived = [p.z for p in checkpoint.populations if p is not None and len(p.z)]
-    return np.concatenate(arrived or [proposal.optima.centres])
+    if arrived:
+        return np.concatenate(arrived)
+    around = proposal.optima.draw(rng, _NOTHING_DRAWN)
+    inside = np.isfinite(density(around))
+    return around[inside] if inside.sum() > 1 else np.repeat(proposal.optima.centres, 2, axis=0)
