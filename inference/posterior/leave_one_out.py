@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 MAX_K_HAT = 0.7
 _LEAST_TAIL = 5
+_TINY = 1e-290  # of the largest weight: one over it is still a number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -71,7 +72,7 @@ def _smooth(log_weights: Array) -> tuple[Array, float]:
     if np.unique(excess[excess > 0]).size < _LEAST_TAIL:
         # all weights equal: nothing to smooth, nothing that dominates
         return log_weights, -math.inf
-    shape, scale = generalised_pareto(np.maximum(excess, 1e-300))
+    shape, scale = generalised_pareto(np.maximum(excess, _TINY))
     probability = (np.arange(tail) + 0.5) / tail
     step = special.boxcox1p(-probability, -shape)  # ((1 - p)^-k - 1) / -k, good at k = 0 as well
     smoothed = log_weights.copy()

@@ -201,3 +201,16 @@ def test_a_frame_without_density_under_some_draw_has_no_k_hat() -> None:
     assert found.k_hat[0] < 0.7
     assert found.k_hat[1] == math.inf
     assert found.log_predictive[1] == -math.inf
+
+
+def test_weights_of_any_span_and_equal_draws_have_a_k_hat() -> None:
+    """Resampled draws are equal to one another; under a misfit weights span hundreds of nats."""
+    rng = np.random.default_rng(9)
+    for likelihoods in (
+        np.repeat(rng.normal(size=(20, 1)), 100, axis=0),
+        1e3 * rng.normal(size=(2000, 1)),
+        np.zeros((2000, 1)),
+    ):
+        found = leave_one_out(likelihoods)
+        assert not np.isnan(found.k_hat[0])
+        assert found.log_predictive[0] <= likelihoods.max() + 1e-12
