@@ -53,7 +53,8 @@ class TechniqueResult:
         What a technique of many frames found besides the ranges: by scene path ``value``, ``sd``
         and ``status``.
     fit : mapping, optional
-        How well a technique of many frames explains them: ``chi_square``,
+        How well a technique of many frames explains them: ``chi_square``, ``deviance``
+        (-2 log likelihood relative to no residual under read noise alone; joint fits only),
         ``degrees_of_freedom``, ``p_value``, ``misfit``, ``rank`` and ``optima``.
     runtime_s : float
         Time that the technique took [s].

@@ -119,10 +119,12 @@ class TechniqueFit(pydantic.BaseModel):
     """How well a technique of many frames explains them."""
 
     chi_square: float
+    deviance: float | None = None
     degrees_of_freedom: int
     p_value: float
     misfit: bool
     rank: int
+    widening: float | None = None
     optima: list[FittedOptimum]
 
 

@@ -8,6 +8,7 @@ from scipy import special
 
 from inference.identifiability.information import Information
 from inference.multiframe.climb import climb
+from inference.multiframe.held import held, released
 from inference.multiframe.information import residuals_and_information
 from inference.multiframe.polish import polish
 from inference.multiframe.problem import FitProblem
@@ -58,6 +59,11 @@ _LITTLE = _Effort(points=300, climbs=12, few=6, kept=4, many=40, polished=3)
 # with crosstalk and background together optima lie in long flat valleys
 _MUCH = _Effort(points=600, climbs=24, few=10, kept=8, many=100, polished=6)
 _EASY = 5  # unknowns
+_WAVES = 3  # of such tries, as long as they help
+_RESTARTED = 3  # unknowns of which other values are tried once more
+_QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
+_FOLLOWED = 4  # of them, to the top
+_PROMISING = 50.0  # deviance above the best up to which such a try is followed
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -107,7 +113,7 @@ def _spread(order: NDArray[np.intp], count: int) -> NDArray[np.intp]:
 
 
 def _starts(problem: FitProblem, count: int) -> Array:
-    """Points of the screen, the best first; those without any likelihood left out."""
+    """Return the points of the screen, the best first; those without likelihood left out."""
     parameters = problem.parameters
     light = _light(problem)
     objects = np.flatnonzero(problem.present)
@@ -211,6 +217,24 @@ def optimum_from(problem: FitProblem, x: Array) -> Optimum:
     return _to_the_top(problem, _climb(problem, x, _MUCH.many))
 
 
+def _second_wave(problem: FitProblem, best: Optimum, starts: Array) -> list[Optimum]:
+    """Look for more from the best optimum, its weakest unknowns held elsewhere for a while."""
+    _, facts = residuals_and_information(problem, best.x, best.positions)
+    weakest = np.argsort(-np.where(np.isin(problem.slots, (3, 4)), 0.0, facts.sd), kind="stable")
+    found: list[Optimum] = []
+    for j in weakest[:_RESTARTED].tolist():
+        for value in np.quantile(starts[:, j], _QUANTILES):
+            x = best.x.copy()
+            x[j] = value
+            smaller, rest = held(problem, j, x)
+            there = _climb(smaller, rest, _MUCH.many // 2)
+            if there.deviance < best.deviance + _PROMISING:
+                whole = released(problem, smaller, there.x)
+                found.append(_climb(problem, whole, _MUCH.many // 2))
+    found.sort(key=lambda optimum: optimum.deviance)
+    return [_to_the_top(problem, optimum) for optimum in found[:_FOLLOWED]]
+
+
 def _distinct(optima: list[Optimum], information: list[Information]) -> list[int]:
     """Return the indices of optima that are not one with a better one before them."""
     kept: list[int] = []
@@ -253,5 +277,11 @@ def find_optima(problem: FitProblem) -> tuple[Optimum, ...]:
     last = [_to_the_top(problem, optimum) for optimum in second[: effort.polished]]
     last = [optimum for optimum in last if np.isfinite(optimum.deviance)]
     last.sort(key=lambda optimum: optimum.deviance)
+    for _ in range(_WAVES if last and len(problem) > _EASY else 0):
+        before = last[0].deviance
+        last += _second_wave(problem, last[0], starts)
+        last.sort(key=lambda optimum: optimum.deviance)
+        if before - last[0].deviance < _TOP:
+            break
     facts = [residuals_and_information(problem, top.x, top.positions)[1] for top in last]
     return tuple(last[i] for i in _distinct(last, facts))

@@ -32,6 +32,8 @@ from tests.multiframe.scenes import (
     values_of,
 )
 
+pytestmark = pytest.mark.xdist_group("multiframe")  # compile each kernel once
+
 UNKNOWN_WALL: dict[str, Any] = {
     "strength": {"prior": "lognormal", "median": 0.02, "sigma": 1.0},
     "distance_m": {"prior": "uniform", "low": 2.2, "high": 8.0},

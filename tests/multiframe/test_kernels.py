@@ -14,6 +14,8 @@ from inference.multiframe.triangle import damped_step, solve_least_squares, tria
 from simulator.scene import parse_scene
 from tests.multiframe.scenes import OBJECT, VAGUE, WALL, data, path, sensor_of
 
+pytestmark = pytest.mark.xdist_group("multiframe")  # compile each kernel once
+
 EVERYTHING: dict[str, Any] = {
     "crosstalk": [VAGUE, VAGUE],
     "background": {

@@ -17,6 +17,8 @@ from simulator.sensor import Sensor, parse_sensor
 from simulator.simulate import mean_readings
 from tests.multiframe.scenes import KINDS, OBJECT, VAGUE, WALL, data, path, sensor_of, values_of
 
+pytestmark = pytest.mark.xdist_group("multiframe")  # compile each kernel once
+
 Array = NDArray[np.float64]
 PRIOR = {"prior": "lognormal", "median": 0.02, "sigma": 1.0}
 

@@ -15,6 +15,8 @@ from simulator.scene import parse_scene
 from simulator.sensor import Sensor
 from tests.multiframe.scenes import OBJECT, VAGUE, WALL, data, path, sensor_of
 
+pytestmark = pytest.mark.xdist_group("multiframe")  # compile each kernel once
+
 PRIOR = {"prior": "lognormal", "median": 1.0, "sigma": 1.0}
 CROSSTALK = {"crosstalk": [VAGUE, VAGUE]}
 TRUTH = {"object": OBJECT, "crosstalk": [0.002, 0.01]}

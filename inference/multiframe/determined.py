@@ -1,0 +1,89 @@
+"""Whether frames determine what is unknown, told after the fit with the reason and the remedy."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import special
+
+from inference.identifiability.information import Information
+from inference.multiframe.multistart import Optimum
+from inference.multiframe.problem import FitProblem
+from inference.multiframe.report import FALSE_ALARM, describe
+from simulator.errors import RefusedError
+
+__all__ = ["LIMIT", "refuse_if_open"]
+
+LIMIT = 0.1  # relative standard deviation of the ranges that the unknowns share out
+
+
+def _words(paths: Sequence[str]) -> str:
+    return paths[0] if len(paths) == 1 else ", ".join(paths[:-1]) + " and " + paths[-1]
+
+
+def _still(problem: FitProblem) -> bool:
+    """Tell whether all frames with an object read the same but for noise."""
+    shown = problem.frames[problem.present]
+    if np.ptp(shown[:, 2]) > 0:
+        return False
+    read, shot, relative = np.asarray(problem.instrument[2]), *problem.instrument[3:]
+    middle = shown[:, :2].mean(axis=0)
+    variance = read**2 + (shot or 0.0) * np.abs(middle) + ((relative or 0.0) * middle) ** 2
+    spread = float((((shown[:, :2] - middle) ** 2) / variance).sum())
+    return bool(spread < special.chdtri(2 * max(len(shown) - 1, 1), FALSE_ALARM))
+
+
+def refuse_if_open(problem: FitProblem, top: Optimum, facts: Information, wider: float) -> None:
+    """Refuse what the frames do not determine.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    top : Optimum
+        Its best optimum.
+    facts : Information
+        There.
+    wider : float
+        Factor on all standard deviations (`widening`).
+
+    Raises
+    ------
+    RefusedError
+        Where the Jacobian has not full rank, or the ranges share a relative standard deviation
+        above `LIMIT`.
+    """
+    present = problem.present & np.isfinite(top.positions)
+    still = _still(problem)
+    if facts.rank < len(problem):
+        weights = np.abs(facts.null_space).max(axis=1)
+        names = [name for name, w in zip(problem.names, weights, strict=True) if w > 0.05]
+        cause = (
+            "the object does not move: all frames read the same but for noise"
+            if still
+            else "the frames do not tell them apart"
+        )
+        raise RefusedError(
+            f"{_words(names or list(problem.names))} cannot be determined (rank {facts.rank} of "
+            f"{len(problem)}): {cause}; move the object nearer and farther, add frames of the "
+            "empty scene (object_present false), or state one of them as known"
+        )
+    shared = facts.sd_of(facts.response[present])
+    typical = wider * float(np.median(shared)) if shared.size else math.inf
+    if not typical <= LIMIT:
+        open_ones = [
+            name
+            for name, item in describe(problem, top.x, facts, wider).items()
+            if item["status"] != "identified"
+        ]
+        cause = (
+            "the object does not move: all frames read the same but for noise"
+            if still
+            else (f"{_words(open_ones or list(problem.names))} are too uncertain")
+        )
+        raise RefusedError(
+            f"the ranges would have a common relative standard deviation of {typical:.2g}, more "
+            f"than {LIMIT:g}: {cause}; move the object nearer and farther, add frames of the "
+            "empty scene (object_present false), lower the noise, state a number as known, or use "
+            "a posterior with priors"
+        )

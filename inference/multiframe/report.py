@@ -1,0 +1,117 @@
+"""What a fit says of its unknowns and of itself."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from inference.identifiability.information import Information
+from inference.multiframe.information import residuals_and_information
+from inference.multiframe.multistart import Optimum
+from inference.multiframe.problem import FitProblem
+
+__all__ = ["FALSE_ALARM", "describe", "fit_report"]
+
+Array = NDArray[np.float64]
+
+FALSE_ALARM = 1e-3
+_IDENTIFIED, _WEAK = 0.1, 1.0
+_CROSSTALK = (3, 4)
+
+
+def _typical_light(problem: FitProblem, x: Array) -> float:
+    """Median modulus of the readings net of crosstalk, in the problem's unit."""
+    net = problem.frames[:, :2] - problem.values(x)[3:5]
+    return float(np.median(np.abs(net).max(axis=1)))
+
+
+def describe(
+    problem: FitProblem, x: Array, facts: Information, wider: float = 1.0
+) -> dict[str, Any]:
+    """Return value, standard deviation and status of every unknown.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    x : ndarray, shape (d,)
+        Coordinates.
+    facts : Information
+        There.
+    wider : float
+        Factor on all standard deviations (`widening`).
+
+    Returns
+    -------
+    dict
+        By scene path: ``value`` and ``sd`` (Cramer-Rao bound, ranges eliminated, times ``wider``)
+        in SI or reading units, and ``status``: identified (sd below a tenth), weak, not_identified
+        (above 1), of the logarithm of what is positive, of crosstalk against the light of the
+        scene.
+    """
+    functionals = problem.chain(x)[problem.slots] * problem.units[:, None]
+    sds = wider * facts.sd_of(functionals)
+    values = problem.natural(x)
+    relative = (
+        wider
+        * facts.sd
+        / np.where(np.isin(problem.slots, _CROSSTALK), max(_typical_light(problem, x), 1e-300), 1.0)
+    )
+    found: dict[str, Any] = {}
+    for name, value, sd, size in zip(problem.names, values, sds, relative, strict=True):
+        status = "identified" if size < _IDENTIFIED else "weak"
+        found[name] = {
+            "value": float(value),
+            "sd": float(sd) if math.isfinite(sd) else None,
+            "status": status if size < _WEAK else "not_identified",
+        }
+    return found
+
+
+def fit_report(
+    problem: FitProblem, optima: Sequence[Optimum], facts: Information, wider: float
+) -> dict[str, Any]:
+    """Return how well a fit explains the frames.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    optima : sequence of Optimum
+        Distinct ones, the best first.
+    facts : Information
+        At the best.
+    wider : float
+        Factor on all standard deviations (`widening`).
+
+    Returns
+    -------
+    dict
+        ``chi_square``, ``deviance``, ``degrees_of_freedom``, ``p_value``, ``misfit``, ``rank``,
+        ``widening`` and ``optima``, each with its deviance above the best and its values.
+    """
+    residual, _ = residuals_and_information(problem, optima[0].x, optima[0].positions)
+    chi_square = float(np.einsum("ni,ni->", residual, residual))
+    freedom = 2 * problem.present.size - int(problem.present.sum()) - len(problem)
+    p_value = float(special.chdtrc(freedom, chi_square))
+    return {
+        "chi_square": chi_square,
+        "deviance": optima[0].deviance,
+        "degrees_of_freedom": freedom,
+        "p_value": p_value,
+        "misfit": p_value < FALSE_ALARM,
+        "rank": facts.rank,
+        "widening": wider,
+        "optima": [
+            {
+                "excess_deviance": optimum.deviance - optima[0].deviance,
+                "parameters": dict(
+                    zip(problem.names, problem.natural(optimum.x).tolist(), strict=True)
+                ),
+            }
+            for optimum in optima
+        ],
+    }

@@ -1,0 +1,99 @@
+"""How much wider the likelihood is than its curvature at the optimum says.
+
+In a flat curved valley the Cramer-Rao bound at the optimum can be far too small: it belongs to the
+place where noise has put the optimum. Here the unknown that moves the ranges' common scale most is
+held at values farther and farther out, everything else is fitted anew, and the deviance tells how
+far one standard deviation really reaches.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.identifiability.information import Information
+from inference.multiframe.held import held, released
+from inference.multiframe.multistart import Optimum, optimum_from
+from inference.multiframe.problem import FitProblem
+
+__all__ = ["widening"]
+
+Array = NDArray[np.float64]
+
+_LINEAR = 0.02  # standard deviation of all coordinates below which curvature tells everything
+_DOUBLINGS = 7
+_HELD = 2  # unknowns that are held in turn
+_ENOUGH = 4.0  # deviance that two standard deviations cost
+_LEAST = 0.01  # below which rounding of an optimum counts
+_FARTHEST = 1.0  # change of the mean log range beyond which nothing more need be known
+_BETTER = 0.05  # deviance by which another optimum is better
+_STRIDE = 1.0  # most that a coordinate is moved ahead
+_CROSSTALK = (3, 4)
+
+
+def widening(problem: FitProblem, top: Optimum, facts: Information) -> tuple[float, Optimum | None]:
+    """Return by how much standard deviations of the ranges exceed those from curvature.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    top : Optimum
+        Its best optimum.
+    facts : Information
+        There, of full rank.
+
+    Returns
+    -------
+    (float, Optimum or None)
+        At least 1, and 1 where the unknowns are fixed so well that curvature tells everything;
+        and a better optimum, if the walk met one.
+    """
+    d = len(problem)
+    logarithms = ~np.isin(problem.slots, _CROSSTALK)
+    if d < 2 or not (facts.sd[logarithms] >= _LINEAR).any():
+        return 1.0, None
+    present = problem.present & np.isfinite(top.positions)
+    mean = facts.response[present].mean(axis=0)
+    along = facts.factor @ (facts.factor.T @ mean)
+    spread = math.sqrt(max(float(mean @ along), 0.0))
+    if not spread > 0.0:
+        return 1.0, None
+    order = np.argsort(-np.abs(along) / facts.sd, kind="stable")
+    widest = 1.0
+    for j in order[:_HELD].tolist():
+        for sign in (1.0, -1.0):
+            ratio, better = _walk(problem, top, facts, j, sign)
+            if better is not None:
+                return widest, better
+            widest = max(widest, ratio / spread)
+    return widest, None
+
+
+def _walk(
+    problem: FitProblem, top: Optimum, facts: Information, j: int, sign: float
+) -> tuple[float, Optimum | None]:
+    """Hold one unknown farther and farther out; the shift of the ranges a standard deviation."""
+    present = problem.present & np.isfinite(top.positions)
+    sd = float(facts.sd[j])
+    # where the others go meanwhile, as far as curvature knows
+    ahead = sign * facts.factor @ facts.factor[j] / sd
+    x, reach, widest = top.x + np.clip(ahead, -_STRIDE, _STRIDE), 1.0, 0.0
+    for _ in range(_DOUBLINGS):
+        x[j] = top.x[j] + sign * min(reach * sd, _STRIDE * reach)
+        smaller, rest = held(problem, j, x)
+        found = optimum_from(smaller, rest)
+        if not math.isfinite(found.deviance):
+            break
+        cost = found.deviance - top.deviance
+        x = released(problem, smaller, found.x)
+        if cost < -_BETTER:
+            better = optimum_from(problem, x)
+            return widest, better if better.deviance < top.deviance else None
+        shift = abs(float(np.mean(found.positions[present] - top.positions[present])))
+        if cost > _LEAST:
+            widest = max(widest, shift / math.sqrt(cost))
+        if cost >= _ENOUGH or shift > _FARTHEST:
+            break
+        reach *= 2.0
+    return widest, None
