@@ -112,7 +112,7 @@ class FittedOptimum(pydantic.BaseModel):
     """One of the distinct optima of a fit; the deviance is -2 log likelihood."""
 
     excess_deviance: float
-    parameters: dict[str, float]
+    parameters: dict[str, float | None]
 
 
 class TechniqueFit(pydantic.BaseModel):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.multiframe.linear_answer import linear_answer
+from inference.multiframe.linear_answer import linear_answer, without_warnings
 from inference.multiframe.object_fit import carrier, gains
 from inference.multiframe.problem import unknowns_of
 from inference.multiframe.weighted import LinearFit, covariances, solve_weighted
@@ -199,6 +199,6 @@ CROSSTALK_FIT = Technique(
     cost=2e4,
     equations="5.13: readings linear in crosstalk and c2 on ranges by `differential`",
     roots="as `differential`; the fit decides between several",
-    solve=_solve,
+    solve=without_warnings(_solve),
     obstacle=_obstacle,
 )

@@ -1,6 +1,8 @@
 """From a linear fit to a result: parameters, fit report, ranges that all frames agree upon."""
 
+import functools
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,8 +15,9 @@ from inference.multiframe.ranges import Answer, frame_ranges
 from inference.multiframe.weighted import LinearFit
 from inference.realtime.net import SATURATED, rule_out
 from inference.realtime.technique import Task
+from simulator.errors import RefusedError
 
-__all__ = ["linear_answer", "not_identified"]
+__all__ = ["linear_answer", "not_identified", "without_warnings"]
 
 Array = NDArray[np.float64]
 
@@ -25,6 +28,25 @@ _FALSE_ALARM = 1e-3
 def not_identified(reason: str) -> dict[str, Any]:
     """Return the entry of a parameter of which the frames say nothing."""
     return {"value": None, "sd": None, "status": "not_identified", "reason": reason}
+
+
+def without_warnings(
+    solve: Callable[[Task], TechniqueResult],
+) -> Callable[[Task], TechniqueResult]:
+    """Wrap a solver so that overflow shows in its numbers, which `linear_answer` judges.
+
+    Parameters
+    ----------
+    solve : callable
+        Task -> TechniqueResult.
+    """
+
+    @functools.wraps(solve)
+    def quiet(task: Task) -> TechniqueResult:
+        with np.errstate(all="ignore"):
+            return solve(task)
+
+    return quiet
 
 
 def _entry(value: float, sd: float, size: float) -> dict[str, Any]:
@@ -68,6 +90,12 @@ def linear_answer(
     TechniqueResult
         Ranges by all readings and parameters together where every parameter is identified.
     """
+    numbers = [fit.chi_square, *(value for value, _, _ in natural.values())]
+    if not np.isfinite(numbers).all():
+        raise RefusedError(
+            "the fit overflows: the readings are too large or too small against gain and noise, or "
+            "do not follow the object's law; check them"
+        )
     parameters: dict[str, Any] = {
         path: _entry(value, float(np.linalg.norm(gradient @ fit.factor)), size)
         for path, (value, gradient, size) in natural.items()
@@ -107,6 +135,8 @@ def linear_answer(
     values = np.array([natural[path][0] for path in problem.names])
     gradients = np.array([natural[path][1] for path in problem.names])
     x = problem.coordinates(values[None])[0]
+    if not np.isfinite(x).all():
+        raise RefusedError("the best fit is no object: a size or reflectance is not positive")
     along = problem.chain(x)[problem.slots] * problem.units[:, None]
     factor = np.asarray(np.linalg.solve(along, gradients @ fit.factor), dtype=np.float64)
     return frame_ranges(name, problem, [Answer(x, 0.0, factor)], state, parameters, report)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.multiframe.linear_answer import linear_answer
+from inference.multiframe.linear_answer import linear_answer, without_warnings
 from inference.multiframe.problem import unknowns_of
 from inference.multiframe.weighted import Equations, LinearFit, Observed, fit_equations
 from inference.realtime.background_intensity import BACKGROUND_INTENSITY
@@ -202,6 +202,6 @@ OBJECT_FIT = Technique(
     cost=2e4,
     equations="5.6-5.8 with errata: 1/Phi linear in 1/c2, c1/(c0 c2), 1/(c0 c2)",
     roots="as `conventional`, or `background_intensity` before a known background",
-    solve=_solve,
+    solve=without_warnings(_solve),
     obstacle=_obstacle,
 )

@@ -64,7 +64,7 @@ def describe(
     for name, value, sd, size in zip(problem.names, values, sds, relative, strict=True):
         status = "identified" if size < _IDENTIFIED else "weak"
         found[name] = {
-            "value": float(value),
+            "value": float(value) if math.isfinite(value) else None,
             "sd": float(sd) if math.isfinite(sd) else None,
             "status": status if size < _WEAK else "not_identified",
         }
@@ -108,9 +108,12 @@ def fit_report(
         "optima": [
             {
                 "excess_deviance": optimum.deviance - optima[0].deviance,
-                "parameters": dict(
-                    zip(problem.names, problem.natural(optimum.x).tolist(), strict=True)
-                ),
+                "parameters": {
+                    name: value if math.isfinite(value) else None
+                    for name, value in zip(
+                        problem.names, problem.natural(optimum.x).tolist(), strict=True
+                    )
+                },
             }
             for optimum in optima
         ],

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.multiframe.linear_answer import linear_answer
+from inference.multiframe.linear_answer import linear_answer, without_warnings
 from inference.multiframe.object_fit import carrier, gains
 from inference.multiframe.problem import unknowns_of
 from inference.multiframe.weighted import Equations, Observed, fit_equations
@@ -167,6 +167,6 @@ SHADOW_FIT = Technique(
     cost=2e4,
     equations="Table 5.1: S/(1-S) linear in 1/c0', c1'/c0'; or readings linear in the strength",
     roots="as `background_cancelling`; the fit decides between several",
-    solve=_solve,
+    solve=without_warnings(_solve),
     obstacle=_obstacle,
 )
