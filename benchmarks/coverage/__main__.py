@@ -17,13 +17,12 @@ from benchmarks.coverage.figure import draw
 from benchmarks.coverage.intervals import COLUMNS
 from benchmarks.coverage.recorded import CELLS, recorded_row
 from benchmarks.coverage.recorded import TERMS as RECORDED_TERMS
-from benchmarks.coverage.report import coverage, recorded_report, report
+from benchmarks.coverage.report import SETS, coverage, recorded_report, report
 from benchmarks.resumable import code_version, resume, rows_of
 from tests.recorded.experiment import PATH
 
 TABLES = Path(__file__).with_name("results")
 FIGURE = Path(__file__).parents[2] / "docs" / "coverage.png"
-SETS = 50
 
 
 def _table(name: str, term: str) -> Path:

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["GOAL", "Coverage", "confidently_wrong", "coverage", "recorded_report", "report"]
+__all__ = ["GOAL", "SETS", "Coverage", "confidently_wrong", "coverage", "recorded_report", "report"]
 
 GOAL = (0.80, 0.97)  # with the discrepancy term, in every class
+SETS = 50  # that make a class complete
 _RESAMPLES = 4000
 _LEAST_INSIDE = 0.8
 
@@ -105,7 +106,9 @@ def report(found: Sequence[Coverage]) -> str:
     ]
     missed = [f"{c.name}: {c.inside:.0%}" for c in found if c.term == "with" and not c.reached]
     goal = f"{GOAL[0]:.0%} to {GOAL[1]:.0%} with the discrepancy term"
-    lines += ["", f"outside {goal}: {'; '.join(missed) or 'none'}"]
+    lines += ["", f"outside {goal}: {'; '.join(missed) or 'none that was run'}"]
+    few = [f"{c.name}, {c.term}: {c.sets}" for c in found if c.sets < SETS]
+    lines += [f"fewer than {SETS} data sets: {'; '.join(few) or 'none'}"]
     return "\n".join(lines)
 
 
