@@ -215,6 +215,9 @@ class Parameters:
         if background is not None:
             # a shadow with c1' < 0 is negative below r = -c1': such ranges are not physical
             law[:, 6] = np.maximum(law[:, 6], -background[:, 3])
+            # and an object stands before its background: else a frame whose object is dark could
+            # lie anywhere behind it, where nothing contradicts, and draw the other unknowns along
+            law[:, 7] = np.minimum(law[:, 7], background[:, 1])
         law[:, 0] = -self._log_normaliser(law)
         return law
 
@@ -318,8 +321,10 @@ def _add_shape(
 
 def _range_prior(sensor: Sensor, scene: Scene) -> Distribution | Stroke:
     limit = sensor.r0 if isinstance(sensor, PulsedSensor) else math.inf
+    if scene.background is not None and isinstance(scene.background.distance_m, float | int):
+        limit = min(limit, scene.background.distance_m)
     if scene.range_m is None:
-        high = min(sensor.max_range_m, _DEFAULT_RANGE[1])
+        high = min(sensor.max_range_m, _DEFAULT_RANGE[1], limit)
         # a sensor that sees less than 2 cm still has ranges
         low = _DEFAULT_RANGE[0] if high > _DEFAULT_RANGE[0] else high / 100
         return LogUniform(low=low, high=high).distribution()

@@ -289,7 +289,7 @@ def check_scene(sensor: Sensor, scene: Scene) -> None:
     """
     problems = _check_shape(scene.object.c0, scene.object.c1, "/object")
     problems += _check_support(scene.object.c2, 0.0, math.inf, "/object/c2")
-    limit = sensor.r0 if isinstance(sensor, PulsedSensor) else math.inf
+    limit, of_limit = (sensor.r0 if isinstance(sensor, PulsedSensor) else math.inf), "r0 ="
     if scene.background is not None:
         where = "/background"
         problems += _check_support(scene.background.strength, 0.0, math.inf, f"{where}/strength")
@@ -306,9 +306,11 @@ def check_scene(sensor: Sensor, scene: Scene) -> None:
         if isinstance(scene.background.shadow, Shadow):
             shadow = scene.background.shadow
             problems += _check_shape(shadow.c0, shadow.c1, f"{where}/shadow")
+        if isinstance(distance, float | int) and 0 < distance < limit:
+            limit, of_limit = float(distance), "the background at"
     if isinstance(scene.range_m, Stroke):
         if scene.range_m.low >= limit:
-            problems.append(Problem("/range_m/low", f"lies beyond r0 = {limit:g} m"))
+            problems.append(Problem("/range_m/low", f"lies beyond {of_limit} {limit:g} m"))
     elif scene.range_m is not None:
         problems += _check_support(scene.range_m, 0.0, limit, "/range_m")
     if problems:

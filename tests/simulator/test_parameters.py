@@ -305,3 +305,27 @@ def test_priors_that_all_but_exclude_one_another_are_refused_when_drawn() -> Non
 def test_a_scene_that_the_sensor_forbids_has_no_parameters() -> None:
     with pytest.raises(InvalidInputError):
         made({"background": {"strength": 1.0, "distance_m": 16.0}})
+
+
+@pytest.mark.parametrize("distance", [1.5, {"prior": "lognormal", "median": 1.5, "sigma": 0.3}])
+def test_an_object_stands_before_its_background(distance: Any) -> None:
+    """Behind it a dark object could lie anywhere, and nothing would contradict."""
+    scene = parse_scene({"background": {"strength": 0.02, "distance_m": distance}})
+    parameters = parameters_of(PULSED, scene)
+    terms = parameters.terms(np.random.default_rng(6).standard_normal((50, len(parameters))))
+    assert terms.background is not None
+    np.testing.assert_array_equal(terms.ranges[:, 7], terms.background[:, 1])
+    low, high = np.log(terms.ranges[:, 6]), np.log(terms.ranges[:, 7])
+    np.testing.assert_allclose(terms.ranges[:, 0], -np.log(high - low), rtol=1e-12)
+
+
+def test_ranges_behind_a_known_background_are_refused() -> None:
+    scene = parse_scene(
+        {
+            "background": {"strength": 0.02, "distance_m": 1.5},
+            "range_m": {"prior": "uniform", "low": 2.0, "high": 3.0},
+        }
+    )
+    with pytest.raises(InvalidInputError) as caught:
+        parameters_of(PULSED, scene)
+    assert [problem.pointer for problem in caught.value.problems] == ["/range_m"]
