@@ -202,7 +202,7 @@ class Parameters:
         if isinstance(self.range_prior, Stroke):
             law[:, 1] = -1.0
             law[:, 4] = np.log(values["range_m.centre"])
-            with np.errstate(divide="ignore"):  # far out in z a spread underflows
+            with np.errstate(divide="ignore", over="ignore"):  # far out in z a spread underflows
                 law[:, 5] = 1.0 / values["range_m.spread"]
             law[:, 6], law[:, 7] = self.range_prior.low, self.range_prior.high
         else:
