@@ -130,15 +130,17 @@ def _enough(ess, r_hat):  # type: ignore[no-untyped-def]
 
 def ours(job, cap):  # type: ignore[no-untyped-def]
     begin = time.process_time()
-    checkpoint = fold.start(job)
+    checkpoint, earlier = fold.start(job), ""
     while time.process_time() - begin < cap:
         tasks = fold.tasks(job, checkpoint)
         if not tasks:
             break
         checkpoint = fold.merge(job, checkpoint, [fold.run(task) for task in tasks])
+        if not earlier and _enough(checkpoint.ess or 0.0, checkpoint.r_hat or math.inf):
+            earlier = f"ESS and R-hat after {time.process_time() - begin:.1f} s"
     posterior = fold.summarise(job, checkpoint, 0.0, 0.0)
     seconds = time.process_time() - begin
-    note = "; ".join(posterior.verdict.reasons)
+    note = "; ".join(filter(None, [earlier, *posterior.verdict.reasons]))
     if not checkpoint.ensembles or checkpoint.ensembles[0].steps < 4:
         empty = np.empty((0, len(job.density().parameters)))
         return Outcome(seconds, False, 0.0, math.inf, empty, np.empty(0), note), checkpoint
@@ -286,7 +288,7 @@ def nuts(job, density, optima, cap):  # type: ignore[no-untyped-def]
                 if i >= warmup:
                     draws[k].append(np.asarray(states[k].z))
                     divergent += bool(states[k].diverging)
-                if time.process_time() - begin > cap * (1 + k / 4):
+                if time.process_time() - begin > cap:
                     break
         done += 50
         if done >= warmup + 100:
