@@ -392,7 +392,7 @@ def _wrong(outcome, mean, sd, truth, names):  # type: ignore[no-untyped-def]
 
 
 def _row(sampler, outcome, wrong):  # type: ignore[no-untyped-def]
-    r_hat = "-" if math.isnan(outcome.r_hat) else f"{outcome.r_hat:.3f}"
+    r_hat = "-" if not math.isfinite(outcome.r_hat) else f"{outcome.r_hat:.3f}"
     reached = "yes" if outcome.reached else "no"
     return (
         f"| {sampler} | {outcome.seconds:.1f} | {reached} | {outcome.ess:.0f} | {r_hat} | {wrong} "
