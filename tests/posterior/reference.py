@@ -209,8 +209,9 @@ def random_case(rng: np.random.Generator, among: Sequence[Terms] | None = None) 
             "shadow": {"c0": s0, "c1": s1},
         }
     scene["range_m"] = {"prior": "loguniform", "low": low, "high": high}
+    near = high if background is None else min(high, background[1])  # an object stands before it
     case = Case(
-        sensor, parse_scene(scene), (c0, c1, c2), crosstalk, background, low, high, (0.0, 0.0)
+        sensor, parse_scene(scene), (c0, c1, c2), crosstalk, background, low, near, (0.0, 0.0)
     )
     m1, m2, _, _ = mean_readings(case, np.array([math.log(r)]))
     read = sensor.noise.read

@@ -56,6 +56,7 @@ def make(
         strength, distance, s0, s1 = background
         shadow = {"c0": s0, "c1": s1}
         scene["background"] = {"strength": strength, "distance_m": distance, "shadow": shadow}
+        span = (span[0], min(span[1], distance))  # an object stands before its background
     if crosstalk is not None:
         scene["crosstalk"] = list(crosstalk)
     probe = parse_sensor({**sensor, "noise": {"read": [1.0, 1.0]}})

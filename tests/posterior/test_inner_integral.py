@@ -23,7 +23,10 @@ def test_random_frames(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     for k in range(count):
         case = random_case(rng, FEW_TERMS)
-        assert integrated(case) == pytest.approx(reference(case), abs=NAT), (seed, k)
+        expected = reference(case)
+        # a log density of 1e11 nats is itself known to some dozen roundings
+        allowed = NAT + 50 * np.finfo(float).eps * abs(expected)
+        assert integrated(case) == pytest.approx(expected, abs=allowed, rel=0), (seed, k)
 
 
 def test_a_dip_beside_the_top() -> None:

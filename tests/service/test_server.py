@@ -155,7 +155,13 @@ def test_ctrl_c_ends_an_inference(tmp_path: Path) -> None:
     command = hybridtof("infer", str(tmp_path / "frames.json"), "--scene",
                         str(tmp_path / "scene.json"), "--target-ess", "1000000")  # fmt: skip
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment()
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+        # tests that run in the background hand down a signal that is ignored
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:
         while not (workers := children(process.pid)) and process.poll() is None:
             time.sleep(0.05)
