@@ -213,7 +213,7 @@ def random_case(rng: np.random.Generator, among: Sequence[Terms] | None = None) 
     case = Case(
         sensor, parse_scene(scene), (c0, c1, c2), crosstalk, background, low, near, (0.0, 0.0)
     )
-    m1, m2, _, _ = mean_readings(case, np.array([math.log(r)]))
+    m1, m2, _, _ = mean_readings(case, np.array([math.log(min(r, near))]))
     read = sensor.noise.read
     spread = 1.0 if rng.random() < 0.8 else 10 ** rng.uniform(0, 3)
     reading = (
