@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from simulator.errors import RefusedError
 from simulator.priors import Distribution, HalfNormal, LogNormal, LogUniform, Uniform
-from simulator.scene import Quantity, Scene, Stroke, check_scene, largest
+from simulator.scene import Quantity, Reference, Scene, Stroke, check_scene, largest
 from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = ["Parameters", "Terms", "Unknown", "parameters_of"]
@@ -91,7 +91,7 @@ class Parameters:
     crosstalk: tuple[str, str] | None
     has_background: bool
     shadow_is_object: bool
-    range_prior: Distribution | Stroke
+    range_prior: Distribution | Stroke | Reference
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -205,6 +205,9 @@ class Parameters:
             with np.errstate(divide="ignore", over="ignore"):  # far out in z a spread underflows
                 law[:, 5] = 1.0 / values["range_m.spread"]
             law[:, 6], law[:, 7] = self.range_prior.low, self.range_prior.high
+        elif isinstance(self.range_prior, Reference):
+            law[:, 1] = -1.0
+            law[:, 6], law[:, 7] = self.range_prior.low, self.range_prior.high
         else:
             prior = self.range_prior
             law[:, 1] = -1.0 if prior.log else 0.0
@@ -224,6 +227,8 @@ class Parameters:
     def _log_normaliser(self, law: Array) -> Array:
         """Log integral of the unnormalised law over its support, shape (n,)."""
         low, high = law[:, 6], law[:, 7]
+        if isinstance(self.range_prior, Reference):  # a density per distinguishable range
+            return np.where(high > low, 0.0, np.inf)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             if isinstance(self.range_prior, Stroke) or self.range_prior.base == "normal":
                 in_log = isinstance(self.range_prior, Stroke) or self.range_prior.log
@@ -319,7 +324,7 @@ def _add_shape(
         )
 
 
-def _range_prior(sensor: Sensor, scene: Scene) -> Distribution | Stroke:
+def _range_prior(sensor: Sensor, scene: Scene) -> Distribution | Stroke | Reference:
     limit = sensor.r0 if isinstance(sensor, PulsedSensor) else math.inf
     if scene.background is not None and isinstance(scene.background.distance_m, float | int):
         limit = min(limit, scene.background.distance_m)
@@ -328,8 +333,8 @@ def _range_prior(sensor: Sensor, scene: Scene) -> Distribution | Stroke:
         # a sensor that sees less than 2 cm still has ranges
         low = _DEFAULT_RANGE[0] if high > _DEFAULT_RANGE[0] else high / 100
         return LogUniform(low=low, high=high).distribution()
-    if isinstance(scene.range_m, Stroke):
-        return Stroke(low=scene.range_m.low, high=min(scene.range_m.high, limit))
+    if isinstance(scene.range_m, Stroke | Reference):
+        return type(scene.range_m)(low=scene.range_m.low, high=min(scene.range_m.high, limit))
     return scene.range_m.distribution().truncated(0.0, limit)
 
 

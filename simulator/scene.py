@@ -1,7 +1,7 @@
 """The scene language: a number is known, a prior is unknown, absence is left out."""
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import pydantic
 
@@ -17,6 +17,7 @@ __all__ = [
     "Motion",
     "ObjectTerm",
     "Quantity",
+    "Reference",
     "Scene",
     "Shadow",
     "Stroke",
@@ -113,18 +114,35 @@ class Background(Validated):
     optional: bool = False
 
 
-class Stroke(Validated):
-    """Log-normal ranges with unknown centre and spread inside [low, high] [m]."""
+class _Support(Validated):
+    """Ranges inside [low, high] [m]."""
 
-    prior: Literal["stroke"] = "stroke"
     low: Positive
     high: Positive
 
     @pydantic.model_validator(mode="after")
-    def _ordered(self) -> "Stroke":
+    def _ordered(self) -> Self:
         if not self.low < self.high:
             raise ValueError("low must be below high")
         return self
+
+
+class Stroke(_Support):
+    """Log-normal ranges with unknown centre and spread inside [low, high] [m]."""
+
+    prior: Literal["stroke"] = "stroke"
+
+
+class Reference(_Support):
+    """Ranges inside [low, high] [m] of whose spread nothing is assumed.
+
+    Given the other unknowns every range has its own reference prior (Berger and Bernardo 1992): the
+    square root of its Fisher information, joined to a log-uniform density where the readings say
+    less than that. How the ranges are spread then tells nothing of the other unknowns, as it would
+    if they were taken for independent draws of one law.
+    """
+
+    prior: Literal["reference"] = "reference"
 
 
 def _kind_of_crosstalk(value: object) -> str:
@@ -133,7 +151,7 @@ def _kind_of_crosstalk(value: object) -> str:
 
 def _kind_of_range(value: object) -> str:
     kind = value.get("prior") if isinstance(value, dict) else getattr(value, "prior", None)
-    return "stroke" if kind == "stroke" else "independent"
+    return kind if kind in ("stroke", "reference") else "independent"
 
 
 class Scene(Validated):
@@ -147,7 +165,7 @@ class Scene(Validated):
         Given as two values or as `Crosstalk`. Left out: there is none.
     background : Background, optional
         Left out: there is none.
-    range_m : Prior or Stroke, optional
+    range_m : Prior, Stroke or Reference, optional
         Prior of every range [m]. Left out: loguniform (0.02 m, the smaller of the sensor's
         unambiguous range and 20 m).
     motion : "radial", "tangential" or "static"
@@ -172,7 +190,8 @@ class Scene(Validated):
     range_m: (
         Annotated[
             Annotated[Prior, pydantic.Tag("independent")]
-            | Annotated[Stroke, pydantic.Tag("stroke")],
+            | Annotated[Stroke, pydantic.Tag("stroke")]
+            | Annotated[Reference, pydantic.Tag("reference")],
             pydantic.Discriminator(_kind_of_range),
         ]
         | None
@@ -308,7 +327,7 @@ def check_scene(sensor: Sensor, scene: Scene) -> None:
             problems += _check_shape(shadow.c0, shadow.c1, f"{where}/shadow")
         if isinstance(distance, float | int) and 0 < distance < limit:
             limit, of_limit = float(distance), "the background at"
-    if isinstance(scene.range_m, Stroke):
+    if isinstance(scene.range_m, Stroke | Reference):
         if scene.range_m.low >= limit:
             problems.append(Problem("/range_m/low", f"lies beyond {of_limit} {limit:g} m"))
     elif scene.range_m is not None:

@@ -36,12 +36,11 @@ RADII_M = (0.05, 0.1, 0.2, 0.4, 0.8)
 MATERIALS = {"diffuse": "R00", "glossy": "R01"}
 TILTS = {"T00": ("T00",), "tilted": ("T12", "T06", "T04")}
 # what the scene says of the ranges and of the model's error
+SUPPORT = {"low": 0.02, "high": 15.0}
 TERMS: Mapping[str, Mapping[str, Any]] = {
     "without": {},
-    "with": {
-        "range_m": {"prior": "stroke", "low": 0.02, "high": 15.0},
-        "discrepancy": 0.05,
-    },
+    "stroke": {"range_m": {"prior": "stroke", **SUPPORT}, "discrepancy": "default"},
+    "with": {"range_m": {"prior": "reference", **SUPPORT}, "discrepancy": "default"},
 }
 
 
@@ -110,6 +109,7 @@ class DataSet:
     range_m: Array
     name: str
     terms: dict[str, Any]
+    crosstalk: tuple[float, float] = (0.0, 0.0)
 
 
 def _surface(group: SceneClass, rng: np.random.Generator) -> tuple[str, PlateScene, float]:
@@ -166,6 +166,7 @@ def draw(group: SceneClass, number: int) -> DataSet:
     sensor = parse_sensor({**kind, "noise": {"read": [noise, noise]}})
     scene = OpticalScene(surfaces=(_at(plate, radius, 1.0),))
     terms: dict[str, Any] = {}
+    first = second = 0.0
     if group.crosstalk:
         first, second = (0.1 * middle * rng.standard_normal(2)).tolist()
         scene = scene.model_copy(update={"electronics": Electronics(crosstalk=(first, second))})
@@ -183,7 +184,8 @@ def draw(group: SceneClass, number: int) -> DataSet:
             "distance_m": distance,
         }
     seen = series(scene, lambda d: _at(plate, radius, d).pose, distances, sensor, rng)
-    return DataSet(sensor, Frames(seen.frames.readings), seen.range_m, name, terms)
+    crosstalk = first, second
+    return DataSet(sensor, Frames(seen.frames.readings), seen.range_m, name, terms, crosstalk)
 
 
 def told(data: DataSet, term: str) -> dict[str, Any]:

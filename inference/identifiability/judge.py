@@ -16,6 +16,11 @@ __all__ = ["Spread", "judge"]
 Array = NDArray[np.float64]
 
 _WIDER = 3.0  # than the curvature predicts: more than one solution, or a curved valley
+_NARROWER = 3.0  # than it predicts: told by the law of the ranges, not by the readings
+_LEANING = (
+    ", but the readings by themselves only to {:.2g}: the rest is taken from how range_m says that "
+    'ranges are spread. Where that is not known, {{"prior": "reference"}} takes nothing from it'
+)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -87,7 +92,12 @@ def judge(
     ):
         status = status_of(name, value)
         text = _headline(name, status, value)
-        if status != "identified" and prediction is not None:
+        if expected > _NARROWER * value and not name.startswith("range_m."):
+            # the law is an assumption: what it alone tells is not identified by the data
+            alone = status_of(name, expected)
+            status = "weak" if alone == "identified" else alone
+            text += _LEANING.format(expected)
+        elif status != "identified" and prediction is not None:
             text += ": " + _cause(diagnosis, name, value, expected)
         contraction = 1 - (value / unit) ** 2 if math.isfinite(value) else 0.0
         rows.append(Identifiability(name, status, contraction, text))

@@ -10,7 +10,7 @@ from scipy import linalg
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.sensitivity import term_changes, whiteners
 from simulator.parameters import Parameters
-from simulator.scene import Stroke
+from simulator.scene import Reference, Stroke
 
 __all__ = ["Prediction", "log_range_spread", "predict"]
 
@@ -48,7 +48,7 @@ class Prediction:
 def log_range_spread(parameters: Parameters) -> float:
     """Return the standard deviation of log r under its prior (of a normal, from its quantiles)."""
     law = parameters.range_prior
-    if isinstance(law, Stroke):
+    if isinstance(law, Stroke | Reference):
         return math.log(law.high / law.low) / math.sqrt(12)
     low, high = law.from_normal(np.array([-1.0, 1.0]))
     return 0.5 * math.log(high / low)

@@ -10,7 +10,8 @@ from inference.multiframe.coordinates import Layout, bounds_of, chain, physical
 from inference.multiframe.linearisation import linearise
 from inference.multiframe.slopes import SLOTS
 from inference.multiframe.triangle import damped_step, triangularise
-from inference.posterior.integrand import Pair, log_integrand, log_top, slope_and_curvature
+from inference.posterior.gaussian import Pair, log_top
+from inference.posterior.integrand import log_integrand, slope_and_curvature
 from inference.posterior.profile import fill_best_ranges
 from inference.posterior.rows import background_of, crosstalk_of, law_of
 from simulator.compiled import compiled

@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.multiframe.problem import FitProblem
-from inference.posterior.frame_integral import find_modes, integration_bounds, tabulate
-from inference.posterior.integrand import Pair
+from inference.posterior.curve_table import integration_bounds, tabulate
+from inference.posterior.frame_integral import find_modes
+from inference.posterior.gaussian import Pair
 from inference.posterior.rows import background_of, crosstalk_of, law_of
 from simulator.compiled import compiled
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.multiframe.slopes import SLOTS, frame_slopes
-from inference.posterior.integrand import Pair
+from inference.posterior.gaussian import Pair
 from simulator.compiled import compiled
 from simulator.readings import noise_parts
 

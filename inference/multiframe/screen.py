@@ -15,7 +15,7 @@ from inference.multiframe.climb import deviance
 from inference.multiframe.coordinates import Layout, bounds_of, physical
 from inference.multiframe.slopes import SLOTS, frame_slopes
 from inference.multiframe.triangle import solve_least_squares
-from inference.posterior.integrand import log_top
+from inference.posterior.gaussian import log_top
 from simulator.compiled import compiled
 
 __all__ = ["LINEAR", "screen"]

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.collapsed import CollapsedDensity
-from inference.posterior.integrand import log_top
+from inference.posterior.gaussian import log_top
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames, frames_from_columns
 from simulator.parameters import Parameters, parameters_of

@@ -7,19 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.posterior.frame_integral import (
-    find_modes,
-    frame_log_likelihood,
-    integration_bounds,
-    tabulate,
-)
-from inference.posterior.integrand import Pair, Quad, Triple, gaussian, log_top
-from inference.posterior.rows import background_of, crosstalk_of, law_of
+from inference.posterior.curve_table import integration_bounds, tabulate
+from inference.posterior.frame_integral import find_modes, frame_log_likelihood
+from inference.posterior.gaussian import Pair, gaussian, log_top
+from inference.posterior.integrand import Quad, Triple
+from inference.posterior.rows import background_of, crosstalk_of, law_of, row_of
 from simulator.compiled import compiled
 from simulator.frames import Frames
 from simulator.parameters import Parameters, Terms, parameters_of
 from simulator.readings import background_readings
-from simulator.scene import Scene
+from simulator.scene import Reference, Scene
 from simulator.sensor import Sensor, instrument
 
 __all__ = ["CollapsedDensity", "collapsed_density"]
@@ -55,7 +52,7 @@ def _log_likelihoods(
     shapes: Array,
     crosstalks: Array | None,
     backgrounds: Array | None,
-    laws: Array,
+    laws: Array | tuple[Array],
     frames: Array,
     present: NDArray[np.bool_] | None,
     r0: float,
@@ -137,15 +134,26 @@ class CollapsedDensity:
             self.relative,
         )
 
+    def integrals(self, terms: Terms) -> tuple[Any, ...]:
+        """Return the arguments of kernels that integrate ranges out, or draw them.
+
+        A reference prior is a density for integrals; maxima over ranges and linearisations take
+        `arguments`, whose law is then flat in log r.
+        """
+        arguments = self.arguments(terms)
+        if isinstance(self.parameters.range_prior, Reference):
+            return (*arguments[:3], (terms.ranges,), *arguments[4:])
+        return arguments
+
     def paired_log_likelihood(self, z: Array, readings: Array) -> Array:
         """Return log p(readings_i | z_i) for readings of shape (n, frames, 2), shape (n,)."""
-        arguments = self.arguments(self.parameters.terms(z))
+        arguments = self.integrals(self.parameters.terms(z))
         scene, sensor = arguments[:4], arguments[5:]
         out = np.empty((len(z), self.frames.shape[0]))
         frames = self.frames.copy()
         for i in range(len(z)):
             frames[:, :2] = readings[i]
-            row = [None if part is None else part[i : i + 1] for part in scene]
+            row = [row_of(part, i) for part in scene]
             everything: list[Any] = [*row, frames, *sensor]
             _log_likelihoods(out[i : i + 1], *everything)
         return np.asarray(out.sum(axis=1))
@@ -153,7 +161,7 @@ class CollapsedDensity:
     def _of_terms(self, terms: Terms) -> Array:
         """Return log p(y_j | terms_i) for physical terms."""
         out = np.empty((terms.object.shape[0], self.frames.shape[0]))
-        _log_likelihoods(out, *self.arguments(terms))
+        _log_likelihoods(out, *self.integrals(terms))
         return out
 
     def frame_log_likelihoods(self, z: Array) -> Array:

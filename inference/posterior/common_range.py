@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.collapsed import empty_frame_log_likelihood
-from inference.posterior.frame_integral import integration_bounds, tabulate
+from inference.posterior.curve_table import integration_bounds, tabulate
+from inference.posterior.gaussian import Pair, log_top
 from inference.posterior.integrand import (
-    Pair,
     SceneArguments,
     log_integrand,
     log_range_density,
-    log_top,
     range_slope,
     slope_and_curvature,
 )

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.collapsed import empty_frame_log_likelihood
+from inference.posterior.curve_table import integration_bounds, tabulate
 from inference.posterior.flux_error import add_row, expand
-from inference.posterior.frame_integral import find_modes, integration_bounds, tabulate
+from inference.posterior.frame_integral import find_modes
+from inference.posterior.gaussian import Pair, log_top
 from inference.posterior.integrand import (
-    Pair,
     Triple,
     WarpedArguments,
     log_integrand,
-    log_top,
     slope_and_curvature,
 )
 from inference.posterior.rows import background_of, crosstalk_of, law_of
@@ -104,7 +104,7 @@ def climb_jointly(
                 continue
             frame = (frames[j, 0], frames[j, 1], frames[j, 2])
             at[j] = _follow(at[j], frame, bounds, scene)
-            density, along, bend, flux, mixed, stiff, free = expand(at[j], frame, *scene)
+            density, along, bend, flux, mixed, stiff, free, _ = expand(at[j], frame, *scene)
             value += density
             # at an end of the support, or where nothing bends, the range cannot follow
             stuck = (at[j] <= bounds[0] and along < 0.0) or (at[j] >= bounds[1] and along > 0.0)

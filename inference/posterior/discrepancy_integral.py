@@ -12,15 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.collapsed import empty_frame_log_likelihood
+from inference.posterior.curve_table import integration_bounds, tabulate
 from inference.posterior.discrepancy_climb import best_positions, climb_jointly
 from inference.posterior.flux_error import add_mode
-from inference.posterior.frame_integral import (
-    find_modes,
-    frame_log_likelihood,
-    integration_bounds,
-    tabulate,
-)
-from inference.posterior.integrand import Pair, WarpedArguments
+from inference.posterior.frame_integral import find_modes, frame_log_likelihood
+from inference.posterior.gaussian import Pair
+from inference.posterior.integrand import WarpedArguments
 from inference.posterior.rows import background_of, crosstalk_of, law_of
 from inference.posterior.triangular import solve_factor, update_factor
 from inference.posterior.warp import fill_curve
@@ -174,7 +171,7 @@ def integrate_flux_error(
     shapes: Array,
     crosstalks: Array | None,
     backgrounds: Array | None,
-    laws: Array,
+    laws: Array | tuple[Array],
     frames: Array,
     present: NDArray[np.bool_] | None,
     r0: float,
@@ -221,8 +218,10 @@ def integrate_flux_error(
             continue
         scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative, delta)
         fill_curve(knots, basis, centre)
-        best_positions(positions, frames, present, bounds, strongest, scene)
-        climb_jointly(centre, positions, frames, bounds, basis, scene)
+        # a maximum over ranges knows no reference prior, which is a density for integrals
+        flat = (shape, crosstalk, background, law[:8], r0, wave, read, shot, relative, delta)
+        best_positions(positions, frames, present, bounds, strongest, flat)
+        climb_jointly(centre, positions, frames, bounds, basis, flat)
         total = _newton(out[i], centre, factor, frames, present, bounds, strongest, basis, scene)
         if not math.isfinite(total):
             out[i, :] = -math.inf

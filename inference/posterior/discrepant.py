@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.discrepancy_climb import best_under_flux_error
 from inference.posterior.discrepancy_integral import integrate_flux_error
-from inference.posterior.integrand import Pair
+from inference.posterior.gaussian import Pair
+from inference.posterior.rows import row_of
 from simulator.discrepancy import DiscrepancyBasis, discrepancy_basis
 from simulator.parameters import Parameters, Terms
-from simulator.scene import Stroke
+from simulator.scene import Reference, Stroke
 
 __all__ = ["DiscrepantDensity", "basis_of", "with_discrepancy"]
 
@@ -56,14 +57,14 @@ class DiscrepantDensity(CollapsedDensity):
         size = self.basis.size
         out = np.empty((n, self.frames.shape[0]))
         work: list[Any] = [np.empty((1, size)), np.empty((1, size, size))]
-        arguments = [*self.arguments(terms), self.knots, self.grid]
+        arguments = [*self.integrals(terms), self.knots, self.grid]
         if readings is None:
             integrate_flux_error(out, *work, *arguments)
             return out
         frames = self.frames.copy()
         for i in range(n):
             frames[:, :2] = readings[i]
-            row = [None if part is None else part[i : i + 1] for part in arguments[:4]]
+            row = [row_of(part, i) for part in arguments[:4]]
             everything: list[Any] = [out[i : i + 1], *work, *row, frames, *arguments[5:]]
             integrate_flux_error(*everything)
         return out
@@ -93,7 +94,7 @@ class DiscrepantDensity(CollapsedDensity):
         # a single row would be taken as work space by all vectors
         centres, factors = np.empty((max(n, 2), size)), np.empty((max(n, 2), size, size))
         out = np.empty((n, self.frames.shape[0]))
-        arguments: list[Any] = [*self.arguments(self.parameters.terms(z)), self.knots, self.grid]
+        arguments: list[Any] = [*self.integrals(self.parameters.terms(z)), self.knots, self.grid]
         integrate_flux_error(out, centres, factors, *arguments)
         return centres[:n], factors[:n]
 
@@ -156,7 +157,7 @@ class DiscrepantDensity(CollapsedDensity):
 def basis_of(parameters: Parameters) -> DiscrepancyBasis:
     """Return the basis that reaches over the prior of the ranges."""
     law = parameters.range_prior
-    if isinstance(law, Stroke):
+    if isinstance(law, Stroke | Reference):
         return discrepancy_basis(law.low, law.high)
     low, high = (float(x) for x in law.from_normal(np.array([-_FAR, _FAR])))
     return discrepancy_basis(max(low, 0.0), high if math.isfinite(high) else law.high)

@@ -6,27 +6,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.frame_integral import falls_off
-from inference.posterior.integrand import (
-    Law,
+from inference.posterior.gaussian import (
     Pair,
-    Quad,
-    Triple,
-    WarpedArguments,
     covariance_slope,
     gaussian,
-    log_range_density,
     precision_times,
-    range_slope,
     squared_cross,
 )
-from inference.posterior.warp import Curve, cubic_weights, curve_at
-from simulator.compiled import compiled
-from simulator.readings import (
-    background_readings,
-    background_slopes,
-    object_readings,
-    object_slopes,
+from inference.posterior.integrand import (
+    Law,
+    Quad,
+    ReferenceLaw,
+    Triple,
+    WarpedArguments,
+    log_range_density,
+    range_slope,
+    readings_along,
 )
+from inference.posterior.warp import Curve, cubic_weights, slope_weights
+from simulator.compiled import compiled
 
 __all__ = ["add_mode", "add_row", "expand"]
 
@@ -46,14 +44,14 @@ def expand(
     shape: Triple,
     crosstalk: Pair | None,
     background: Quad | None,
-    law: Law,
+    law: Law | ReferenceLaw,
     r0: float,
     wave: Pair | None,
     read: Pair,
     shot: float | None,
     relative: float | None,
     delta: Curve,
-) -> tuple[float, float, float, float, float, float, float]:
+) -> tuple[float, float, float, float, float, float, float, float]:
     """Expand a frame's log density in log r and in the logarithm of the flux.
 
     Parameters
@@ -63,28 +61,18 @@ def expand(
 
     Returns
     -------
-    tuple of seven floats
+    tuple of eight floats
         Log density; slope and curvature along u; slope along log flux; mixed curvature; curvature
-        along log flux; the same with u free to follow. Curvatures hold the covariance fixed.
+        along log flux; the same with u free to follow; slope along the slope of log flux, which
+        only a reference prior of the range feels. Curvatures hold the covariance fixed; the slope
+        along u is that without the reference prior.
     """
     r = math.exp(u)
-    gain = frame[2]
-    value, warp = curve_at(u, delta)
-    strength = gain * shape[0] * math.exp(value)
-    o1, o2 = object_readings(r, r0, wave, strength, shape[1], shape[2])
-    t1, t2 = object_slopes(r, r0, wave, strength, shape[1], shape[2])
-    t1, t2 = t1 + warp * o1, t2 + warp * o2
-    signal, signal_slope = (o1, o2), (t1, t2)
-    m1, m2 = o1, o2
-    if background is not None:
-        b1, b2 = background_readings(r, r0, wave, background)
-        a1, a2 = background_slopes(r, r0, wave, background)
-        m1, m2 = m1 + gain * b1, m2 + gain * b2
-        t1, t2 = t1 + gain * a1, t2 + gain * a2
-    if crosstalk is not None:
-        m1, m2 = m1 + crosstalk[0], m2 + crosstalk[1]
-    mean, slope = (m1, m2), (t1, t2)
-    e1, e2 = frame[0] - m1, frame[1] - m2
+    signal, signal_slope, mean, slope = readings_along(
+        u, frame[2], shape, crosstalk, background, r0, wave, delta
+    )
+    e1, e2 = frame[0] - mean[0], frame[1] - mean[1]
+    (o1, o2), (t1, t2) = signal, slope
     pulsed = wave is None
     density = gaussian((e1, e2), mean, signal, read, shot, relative, pulsed)
     density += log_range_density(r, u, law)
@@ -104,7 +92,13 @@ def expand(
     if bend > 0.0:
         cross = squared_cross(slope, signal, mean, signal, read, shot, relative, pulsed)
         free = (cross + prior * stiff) / bend
-    return density, along, bend, flux, mixed, stiff, free
+    turn = 0.0
+    if len(law) == 9:  # decided at compile time
+        information = 1.0 + t1 * p1 + t2 * p2
+        density += 0.5 * math.log(information)
+        flux += (signal_slope[0] * p1 + signal_slope[1] * p2) / information
+        turn = (o1 * p1 + o2 * p2) / information
+    return density, along, bend, flux, mixed, stiff, free, turn
 
 
 @compiled
@@ -119,6 +113,16 @@ def add_row(out: Array, basis: Array, u: float, delta: Curve, scale: float) -> N
             + c * basis[i + 1, 0, k]
             + d * basis[i + 1, 1, k]
         )
+
+
+@compiled
+def _add_slopes(out: Array, basis: Array, u: float, delta: Curve, scale: float) -> None:
+    """Add scale times the slopes of all basis functions at u."""
+    i, a, b, c = slope_weights(u, delta[1], delta[2], basis.shape[0])
+    a, b, c = scale * a, scale * b, scale * c
+    for k in range(out.size):
+        rise = basis[i + 1, 0, k] - basis[i, 0, k]
+        out[k] += a * rise + b * basis[i, 1, k] + c * basis[i + 1, 1, k]
 
 
 @compiled
@@ -154,22 +158,22 @@ def add_mode(
     u, top, sd = mode[0], mode[1], mode[2]
     row[:] = 0.0
     if sd < _NARROW and falls_off(mode, frame, scene):
-        total, pull = 0.0, 0.0
-        if sd < _NEARLY_GAUSSIAN:
-            for j in range(_NODES.size):
-                x = _NODES[j]
-                found = expand(u + x * sd, frame, *scene)
-                share = _WEIGHTS[j] * math.exp(min(found[0] - top + 0.5 * x * x, 1.0))
-                total += share
-                pull += share * found[3]
-        else:
-            for j in range(-_HALF, _HALF + 1):
-                found = expand(u + j * _STEP * sd, frame, *scene)
+        total, pull, turn = 0.0, 0.0, 0.0
+        half = _NODES.size // 2 if sd < _NEARLY_GAUSSIAN else _HALF
+        for j in range(-half, half + 1):
+            x = _NODES[j + half] if sd < _NEARLY_GAUSSIAN else j * _STEP
+            found = expand(u + x * sd, frame, *scene)
+            if sd < _NEARLY_GAUSSIAN:
+                share = _WEIGHTS[j + half] * math.exp(min(found[0] - top + 0.5 * x * x, 1.0))
+            else:
                 share = math.exp(found[0] - top)
-                total += share
-                pull += share * found[3]
+            total += share
+            pull += share * found[3]
+            # the functions are straight over so narrow a mode
+            turn += share * (found[3] * x * sd + found[7])
         free = expand(u, frame, *scene)[6]
         add_row(gradient, basis, u, delta, weight * pull / total)
+        _add_slopes(gradient, basis, u, delta, weight * turn / total)
         add_row(row, basis, u, delta, math.sqrt(weight * free))
         return
     total, mean, square, stiff = 0.0, 0.0, 0.0, 0.0
@@ -197,6 +201,8 @@ def add_mode(
                     stiff += share * found[5]
                 elif share > 0.0:
                     add_row(gradient, basis, at, delta, weight * share / whole * found[3])
+                    if len(scene[3]) == 9:  # decided at compile time
+                        _add_slopes(gradient, basis, at, delta, weight * share / whole * found[7])
         if not total > 0.0:
             return
     mean, square, stiff = mean / total, square / total, stiff / total

@@ -2,39 +2,43 @@
 
 import math
 
+from inference.posterior.gaussian import Pair, covariance_slope, gaussian, precision_times
 from inference.posterior.warp import Curve, curve_at
 from simulator.compiled import compiled
 from simulator.readings import (
     background_readings,
     background_slopes,
-    noise_parts,
     object_readings,
     object_slopes,
 )
 
 __all__ = [
-    "covariance_slope",
-    "gaussian",
+    "Law",
+    "Quad",
+    "ReferenceLaw",
+    "SceneArguments",
+    "Triple",
+    "WarpedArguments",
     "log_integrand",
     "log_range_density",
-    "log_top",
-    "precision_times",
+    "log_resolution",
     "range_slope",
+    "readings_along",
     "slope_and_curvature",
-    "squared_cross",
 ]
 
-Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 Quad = tuple[float, float, float, float]
 Law = tuple[float, float, float, float, float, float, float, float]
+# with a ninth entry, the ranges have their reference prior: the length is known at compile time
+ReferenceLaw = tuple[float, float, float, float, float, float, float, float, float]
 # shape, crosstalk, background, law of the range, r0, wave, read, shot, relative, error of the flux:
 # what the kernels know of a scene and its sensor; what is None does not exist in the machine code
 SceneArguments = tuple[
     Triple,
     Pair | None,
     Quad | None,
-    Law,
+    Law | ReferenceLaw,
     float,
     Pair | None,
     Pair,
@@ -47,7 +51,7 @@ WarpedArguments = tuple[
     Triple,
     Pair | None,
     Quad | None,
-    Law,
+    Law | ReferenceLaw,
     float,
     Pair | None,
     Pair,
@@ -56,11 +60,11 @@ WarpedArguments = tuple[
     Curve,
 ]
 
-LOG_2PI = math.log(2 * math.pi)
+_DIFFERENCE = 1e-3  # in log r, over which the resolution changes slowly
 
 
 @compiled
-def log_range_density(r: float, u: float, law: Law) -> float:
+def log_range_density(r: float, u: float, law: Law | ReferenceLaw) -> float:
     """Return the log prior density of u = log r (`simulator.parameters.Terms.ranges`)."""
     linear = (r - law[2]) * law[3]
     logarithmic = (u - law[4]) * law[5]
@@ -68,152 +72,78 @@ def log_range_density(r: float, u: float, law: Law) -> float:
 
 
 @compiled
-def range_slope(r: float, u: float, law: Law) -> float:
+def range_slope(r: float, u: float, law: Law | ReferenceLaw) -> float:
     """Return the derivative of `log_range_density` along u."""
     return law[1] + 1.0 - r * (r - law[2]) * law[3] * law[3] - (u - law[4]) * law[5] * law[5]
 
 
 @compiled
-def gaussian(
-    residual: Pair,
-    mean: Pair,
-    signal: Pair,
-    read: Pair,
-    shot: float | None,
-    relative: float | None,
-    pulsed: bool,
-) -> float:
-    """Return the log density of a residual, relative to the top of the read noise's density.
+def readings_along(
+    u: float,
+    gain: float,
+    shape: Triple,
+    crosstalk: Pair | None,
+    background: Quad | None,
+    r0: float,
+    wave: Pair | None,
+    delta: Curve | None,
+) -> tuple[Pair, Pair, Pair, Pair]:
+    """Return mean readings and their slopes along log r.
 
-    With independent noise parts determinant and chi-square are sums of squares: a common relative
-    error far above the read noise leaves the matrix near singular, but nothing cancels.
+    Parameters
+    ----------
+    u, shape, crosstalk, background, r0, wave, delta
+        As for `log_integrand`.
+    gain : float
+        The frame's gain factor.
+
+    Returns
+    -------
+    tuple of four (float, float)
+        The object's readings and slopes, then those of everything.
     """
-    if shot is not None or relative is not None:
-        unit = read[1]
-        own1, own2, shared, s1, s2 = noise_parts(read, shot, relative, pulsed, mean, signal)
-        own1, own2, shared = own1 / unit / unit, own2 / unit / unit, shared / unit / unit
-        s1, s2, e1, e2 = s1 / unit, s2 / unit, residual[0] / unit, residual[1] / unit
-        determinant = _determinant(own1, own2, shared, s1, s2)
-        turned = s2 * e1 - s1 * e2
-        square = own2 * e1 * e1 + own1 * e2 * e2 + shared * (e1 - e2) ** 2 + turned * turned
-        ratio = read[0] / unit
-        return -0.5 * square / determinant - 0.5 * math.log(determinant / ratio / ratio)
-    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
-        e1 = residual[0] / read[0]
-        e2 = residual[1] / read[1]
-        return -0.5 * (e1 * e1 + e2 * e2)
+    r = math.exp(u)
+    strength, warp = gain * shape[0], 0.0
+    if delta is not None:
+        value, warp = curve_at(u, delta)
+        strength *= math.exp(value)
+    o1, o2 = object_readings(r, r0, wave, strength, shape[1], shape[2])
+    s1, s2 = object_slopes(r, r0, wave, strength, shape[1], shape[2])
+    if delta is not None:
+        s1, s2 = s1 + warp * o1, s2 + warp * o2
+    m1, m2, t1, t2 = o1, o2, s1, s2
+    if background is not None:
+        b1, b2 = background_readings(r, r0, wave, background)
+        a1, a2 = background_slopes(r, r0, wave, background)
+        m1, m2 = m1 + gain * b1, m2 + gain * b2
+        t1, t2 = t1 + gain * a1, t2 + gain * a2
+    if crosstalk is not None:
+        m1, m2 = m1 + crosstalk[0], m2 + crosstalk[1]
+    return (o1, o2), (s1, s2), (m1, m2), (t1, t2)
 
 
 @compiled
-def log_top(read: Pair) -> float:
-    """Return the log density of a zero residual under read noise alone."""
-    return -math.log(read[0]) - math.log(read[1]) - LOG_2PI
-
-
-@compiled
-def _determinant(own1: float, own2: float, shared: float, s1: float, s2: float) -> float:
-    """Return the determinant of diag(own1, own2) + shared [1 1; 1 1] + s s^T, a sum of squares."""
-    return (
-        own1 * own2
-        + shared * (own1 + own2)
-        + own2 * s1 * s1
-        + own1 * s2 * s2
-        + shared * (s1 - s2) ** 2
-    )
-
-
-@compiled
-def precision_times(
-    vector: Pair,
-    mean: Pair,
-    signal: Pair,
+def log_resolution(
+    u: float,
+    gain: float,
+    shape: Triple,
+    crosstalk: Pair | None,
+    background: Quad | None,
+    r0: float,
+    wave: Pair | None,
     read: Pair,
     shot: float | None,
     relative: float | None,
-    pulsed: bool,
-) -> Pair:
-    """Return the inverse covariance times a vector."""
-    if shot is not None or relative is not None:
-        unit = read[1]
-        own1, own2, shared, s1, s2 = noise_parts(read, shot, relative, pulsed, mean, signal)
-        own1, own2, shared = own1 / unit / unit, own2 / unit / unit, shared / unit / unit
-        s1, s2, t1, t2 = s1 / unit, s2 / unit, vector[0] / unit, vector[1] / unit
-        determinant = _determinant(own1, own2, shared, s1, s2)
-        turned = s2 * t1 - s1 * t2
-        return (
-            (own2 * t1 + shared * (t1 - t2) + s2 * turned) / determinant / unit,
-            (own1 * t2 + shared * (t2 - t1) - s1 * turned) / determinant / unit,
-        )
-    else:  # noqa: RET505
-        return vector[0] / read[0] / read[0], vector[1] / read[1] / read[1]
-
-
-@compiled
-def squared_cross(
-    first: Pair,
-    second: Pair,
-    mean: Pair,
-    signal: Pair,
-    read: Pair,
-    shot: float | None,
-    relative: float | None,
-    pulsed: bool,
+    delta: Curve | None,
 ) -> float:
-    """Return the squared cross product of two whitened vectors: of both readings, what is free."""
-    unit = read[1]
-    cross = (first[0] / unit) * (second[1] / unit) - (first[1] / unit) * (second[0] / unit)
-    if shot is not None or relative is not None:
-        own1, own2, shared, s1, s2 = noise_parts(read, shot, relative, pulsed, mean, signal)
-        own1, own2, shared = own1 / unit / unit, own2 / unit / unit, shared / unit / unit
-        return cross * cross / _determinant(own1, own2, shared, s1 / unit, s2 / unit)
-    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
-        cross *= unit / read[0]
-        return cross * cross
+    """Return log sqrt(1 + I), I the Fisher information of a frame on its log r.
 
-
-@compiled
-def covariance_slope(
-    pull: Pair,
-    mean: Pair,
-    mean_slope: Pair,
-    signal: Pair,
-    signal_slope: Pair,
-    read: Pair,
-    shot: float | None,
-    relative: float | None,
-    pulsed: bool,
-) -> float:
-    """Return what the change of the covariance adds to the slope of the log density.
-
-    With w = V^-1 e it is (w^T V' w - tr(V^-1 V')) / 2, V' from the independent parts.
+    It is the density of the reference prior where the readings tell ranges apart, and that of a
+    log-uniform one where they do not.
     """
-    if shot is not None or relative is not None:
-        own1, own2, shared, s1, s2 = noise_parts(read, shot, relative, pulsed, mean, signal)
-        d1, d2, dk, t1, t2 = 0.0, 0.0, 0.0, 0.0, 0.0
-        if shot is not None:
-            d1 = shot * mean_slope[0] * math.copysign(1.0, mean[0])
-            d2 = shot * mean_slope[1] * math.copysign(1.0, mean[1])
-            if pulsed:
-                dk = d1 if abs(mean[0]) < abs(mean[1]) else d2
-            d1, d2 = d1 - dk, d2 - dk
-        if relative is not None:
-            t1, t2 = relative * signal_slope[0], relative * signal_slope[1]
-        unit = read[1]
-        determinant = _determinant(
-            own1 / unit / unit, own2 / unit / unit, shared / unit / unit, s1 / unit, s2 / unit
-        )
-        scale = determinant * unit * unit
-        p11 = (own2 + shared + s2 * s2) / unit / unit / scale
-        p22 = (own1 + shared + s1 * s1) / unit / unit / scale
-        p12 = -(shared + s1 * s2) / unit / unit / scale
-        w1, w2 = pull
-        square = d1 * w1 * w1 + d2 * w2 * w2 + dk * (w1 + w2) ** 2
-        square += 2.0 * (w1 * t1 + w2 * t2) * (w1 * s1 + w2 * s2)
-        q1, q2 = precision_times((s1, s2), mean, signal, read, shot, relative, pulsed)
-        trace = d1 * p11 + d2 * p22 + dk * (p11 + 2.0 * p12 + p22) + 2.0 * (t1 * q1 + t2 * q2)
-        return 0.5 * (square - trace)
-    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
-        return 0.0
+    signal, _, mean, slope = readings_along(u, gain, shape, crosstalk, background, r0, wave, delta)
+    p1, p2 = precision_times(slope, mean, signal, read, shot, relative, wave is None)
+    return 0.5 * math.log1p(max(slope[0] * p1 + slope[1] * p2, 0.0))
 
 
 @compiled
@@ -223,7 +153,7 @@ def log_integrand(
     shape: Triple,
     crosstalk: Pair | None,
     background: Quad | None,
-    law: Law,
+    law: Law | ReferenceLaw,
     r0: float,
     wave: Pair | None,
     read: Pair,
@@ -264,9 +194,13 @@ def log_integrand(
         m1, m2 = m1 + crosstalk[0], m2 + crosstalk[1]
     e1, e2 = frame[0] - m1, frame[1] - m2
     pulsed = wave is None
-    return gaussian((e1, e2), (m1, m2), (o1, o2), read, shot, relative, pulsed) + log_range_density(
-        r, u, law
-    )
+    density = gaussian((e1, e2), (m1, m2), (o1, o2), read, shot, relative, pulsed)
+    density += log_range_density(r, u, law)
+    if len(law) == 9:  # decided at compile time
+        density += log_resolution(
+            u, gain, shape, crosstalk, background, r0, wave, read, shot, relative, delta
+        )
+    return density
 
 
 @compiled
@@ -276,7 +210,7 @@ def slope_and_curvature(
     shape: Triple,
     crosstalk: Pair | None,
     background: Quad | None,
-    law: Law,
+    law: Law | ReferenceLaw,
     r0: float,
     wave: Pair | None,
     read: Pair,
@@ -289,32 +223,18 @@ def slope_and_curvature(
     The curvature holds the covariance fixed.
     """
     r = math.exp(u)
-    gain = frame[2]
-    strength, warp = gain * shape[0], 0.0
-    if delta is not None:
-        value, warp = curve_at(u, delta)
-        strength *= math.exp(value)
-    o1, o2 = object_readings(r, r0, wave, strength, shape[1], shape[2])
-    t1, t2 = object_slopes(r, r0, wave, strength, shape[1], shape[2])
-    if delta is not None:
-        t1, t2 = t1 + warp * o1, t2 + warp * o2
-    m1, m2 = o1, o2
-    signal_slope = (t1, t2)
-    if background is not None:
-        b1, b2 = background_readings(r, r0, wave, background)
-        a1, a2 = background_slopes(r, r0, wave, background)
-        m1, m2 = m1 + gain * b1, m2 + gain * b2
-        t1, t2 = t1 + gain * a1, t2 + gain * a2
-    if crosstalk is not None:
-        m1, m2 = m1 + crosstalk[0], m2 + crosstalk[1]
-    e1, e2 = frame[0] - m1, frame[1] - m2
     pulsed = wave is None
-    p1, p2 = precision_times((t1, t2), (m1, m2), (o1, o2), read, shot, relative, pulsed)
-    pull = precision_times((e1, e2), (m1, m2), (o1, o2), read, shot, relative, pulsed)
-    change = covariance_slope(
-        pull, (m1, m2), (t1, t2), (o1, o2), signal_slope, read, shot, relative, pulsed
+    signal, signal_slope, mean, slope = readings_along(
+        u, frame[2], shape, crosstalk, background, r0, wave, delta
     )
-    return (
-        e1 * p1 + e2 * p2 + change + range_slope(r, u, law),
-        t1 * p1 + t2 * p2 + law[5] * law[5] + r * r * law[3] * law[3],
-    )
+    e1, e2 = frame[0] - mean[0], frame[1] - mean[1]
+    p1, p2 = precision_times(slope, mean, signal, read, shot, relative, pulsed)
+    pull = precision_times((e1, e2), mean, signal, read, shot, relative, pulsed)
+    rise = e1 * p1 + e2 * p2 + range_slope(r, u, law)
+    rise += covariance_slope(pull, mean, slope, signal, signal_slope, read, shot, relative, pulsed)
+    if len(law) == 9:  # decided at compile time
+        rest = (frame[2], shape, crosstalk, background, r0, wave, read, shot, relative, delta)
+        ahead = log_resolution(u + _DIFFERENCE, *rest)
+        rise += (ahead - log_resolution(u - _DIFFERENCE, *rest)) / (2 * _DIFFERENCE)
+    bend = slope[0] * p1 + slope[1] * p2 + law[5] * law[5] + r * r * law[3] * law[3]
+    return rise, bend

@@ -23,7 +23,7 @@ from scipy import linalg, special
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.profile import best_ranges, linearise
 from simulator.priors import LogUniform
-from simulator.scene import Stroke
+from simulator.scene import Reference, Stroke
 
 __all__ = ["parameter_conflicts", "prior_conflicts", "range_conflicts", "scores"]
 
@@ -169,7 +169,9 @@ def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
     """
     law = density.parameters.range_prior
     distribution = (
-        LogUniform(low=law.low, high=law.high).distribution() if isinstance(law, Stroke) else law
+        LogUniform(low=law.low, high=law.high).distribution()
+        if isinstance(law, Stroke | Reference)
+        else law
     )
     with np.errstate(invalid="ignore"):
         middle = np.exp(np.median(log_r, axis=0))

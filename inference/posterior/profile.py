@@ -8,13 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.collapsed import CollapsedDensity, empty_frame_log_likelihood
+from inference.posterior.curve_table import integration_bounds, tabulate
 from inference.posterior.discrepant import DiscrepantDensity
-from inference.posterior.frame_integral import (
-    find_modes,
-    integration_bounds,
-    tabulate,
-)
-from inference.posterior.integrand import Pair, log_top
+from inference.posterior.frame_integral import find_modes
+from inference.posterior.gaussian import Pair, log_top
 from inference.posterior.rows import background_of, crosstalk_of, law_of
 from inference.posterior.static import StaticDensity
 from simulator.compiled import compiled

@@ -7,14 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.collapsed import CollapsedDensity
-from inference.posterior.frame_integral import (
-    falls_off,
-    find_modes,
-    frame_log_likelihood,
-    integration_bounds,
-    tabulate,
-)
-from inference.posterior.integrand import Pair, SceneArguments, Triple, log_integrand
+from inference.posterior.curve_table import integration_bounds, tabulate
+from inference.posterior.frame_integral import falls_off, find_modes, frame_log_likelihood
+from inference.posterior.gaussian import Pair
+from inference.posterior.integrand import SceneArguments, Triple, log_integrand
 from inference.posterior.rows import background_of, crosstalk_of, curve_of, law_of
 from inference.posterior.static import StaticDensity
 from simulator.compiled import compiled
@@ -72,7 +68,7 @@ def _draw_ranges(
     shapes: Array,
     crosstalks: Array | None,
     backgrounds: Array | None,
-    laws: Array,
+    laws: Array | tuple[Array],
     frames: Array,
     present: NDArray[np.bool_] | None,
     r0: float,
@@ -184,7 +180,7 @@ def draw_ranges(density: CollapsedDensity, z: Array, rng: np.random.Generator) -
     n, frames = z.shape[0], density.frames.shape[0]
     out = np.empty((n, frames))
     curves = density.curves(z, rng)
-    everything: list[Any] = [*density.arguments(density.parameters.terms(z)), *curves]
+    everything: list[Any] = [*density.integrals(density.parameters.terms(z)), *curves]
     _draw_ranges(out, rng.random((n, frames, 2)), *everything)
     return out
 

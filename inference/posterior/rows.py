@@ -12,11 +12,12 @@ import numpy as np
 from numba import extending
 from numpy.typing import NDArray
 
-from inference.posterior.integrand import Law, Pair, Quad
+from inference.posterior.gaussian import Pair
+from inference.posterior.integrand import Law, Quad, ReferenceLaw
 from inference.posterior.warp import Curve
 from simulator.compiled import compiled
 
-__all__ = ["background_of", "crosstalk_of", "curve_of", "law_of"]
+__all__ = ["background_of", "crosstalk_of", "curve_of", "law_of", "row_of"]
 
 Array = NDArray[np.float64]
 
@@ -38,9 +39,21 @@ def curve_of(knots: Array | None, grid: Pair | None, i: int) -> Curve | None:
     return None if knots is None or grid is None else (knots[i], grid[0], grid[1])
 
 
+def law_of(rows: Array | tuple[Array], i: int) -> Law | ReferenceLaw:
+    """Return row i of the range priors; of a tuple of them as that of a reference prior."""
+    return (*_plain_law(rows[0], i), 1.0) if isinstance(rows, tuple) else _plain_law(rows, i)
+
+
+def row_of(rows: Any, i: int) -> Any:
+    """Return row i of an argument of the kernels, as an argument of one row."""
+    if isinstance(rows, tuple):
+        return tuple(row_of(part, i) for part in rows)
+    return None if rows is None else rows[i : i + 1]
+
+
 @compiled
-def law_of(rows: Array, i: int) -> Law:
-    """Return row i of the range priors."""
+def _plain_law(rows: Array, i: int) -> Law:
+    """Return row i as eight numbers."""
     return (
         rows[i, 0],
         rows[i, 1],
@@ -72,3 +85,10 @@ def _curve_of(knots: Any, grid: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG
     if knots is numba.types.none:
         return lambda knots, grid, i: None  # noqa: ARG005
     return lambda knots, grid, i: (knots[i], grid[0], grid[1])
+
+
+@extending.overload(law_of, strict=False)
+def _law_of(rows: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
+    if isinstance(rows, numba.types.BaseTuple):
+        return lambda rows, i: (*_plain_law(rows[0], i), 1.0)
+    return lambda rows, i: _plain_law(rows, i)

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from simulator.compiled import compiled
 
-__all__ = ["Curve", "cubic_weights", "curve_at", "fill_curve"]
+__all__ = ["Curve", "cubic_weights", "curve_at", "fill_curve", "slope_weights"]
 
 Array = NDArray[np.float64]
 # knots of shape (n, 2), value and slope times spacing; log r of the first; one over the spacing
@@ -36,14 +36,23 @@ def curve_at(u: float, curve: Curve) -> tuple[float, float]:
     knots, first, rate = curve
     i, a, b, c, d = cubic_weights(u, first, rate, knots.shape[0])
     value = a * knots[i, 0] + b * knots[i, 1] + c * knots[i + 1, 0] + d * knots[i + 1, 1]
+    i, a, b, c = slope_weights(u, first, rate, knots.shape[0])
+    slope = a * (knots[i + 1, 0] - knots[i, 0]) + b * knots[i, 1] + c * knots[i + 1, 1]
+    return value, slope
+
+
+@compiled
+def slope_weights(
+    u: float, first: float, rate: float, count: int
+) -> tuple[int, float, float, float]:
+    """Return the knot left of u and what the slope there takes of rise and slopes; 0 outside."""
     x = (u - first) * rate
-    if x <= 0.0 or x >= knots.shape[0] - 1.0:
-        return value, 0.0
+    i = min(int(max(x, 0.0)), count - 2)
+    if x <= 0.0 or x >= count - 1.0:
+        return i, 0.0, 0.0, 0.0
     t = x - i
     rest = 1.0 - t
-    slope = 6.0 * t * rest * (knots[i + 1, 0] - knots[i, 0])
-    slope += rest * (1.0 - 3.0 * t) * knots[i, 1] + t * (3.0 * t - 2.0) * knots[i + 1, 1]
-    return value, slope * rate
+    return i, 6.0 * t * rest * rate, rest * (1.0 - 3.0 * t) * rate, t * (3.0 * t - 2.0) * rate
 
 
 @compiled

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.realtime import curves
-from simulator.scene import Quantity, Scene, Stroke
+from simulator.scene import Quantity, Reference, Scene, Stroke
 from simulator.sensor import Sensor, SineWaveSensor
 
 __all__ = ["Known", "known_of"]
@@ -108,7 +108,7 @@ def known_of(scene: Scene) -> Known:
         if "crosstalk" in scene.optional_terms:
             crosstalk = None
     support = (0.0, math.inf)
-    if isinstance(scene.range_m, Stroke):
+    if isinstance(scene.range_m, Stroke | Reference):
         support = (scene.range_m.low, scene.range_m.high)
     elif scene.range_m is not None:
         distribution = scene.range_m.distribution()

@@ -27,7 +27,7 @@ from inference.tracking.tabulate import (
 )
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.parameters import Terms, parameters_of
-from simulator.scene import Scene, Stroke
+from simulator.scene import Reference, Scene, Stroke
 from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = ["Tracker", "tracker"]
@@ -249,9 +249,9 @@ def _units(sensor: Sensor, by_rate: bool) -> tuple[float, float]:
 
 
 def _law(scene: Scene, centre: Terms) -> Any:
-    """Return the law of ranges; of a stroke its support alone, since its centre is unknown."""
+    """Return the law of ranges; of one with unknowns of its own the support alone."""
     law = centre.ranges.copy()
-    if isinstance(scene.range_m, Stroke):
+    if isinstance(scene.range_m, Stroke | Reference):
         low, high = law[0, 6], law[0, 7]
         law[0] = [-math.log(math.log(high / low)), -1.0, 0.0, 0.0, 0.0, 0.0, low, high]
     return law_of(law, 0)

@@ -8,13 +8,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from inference.posterior.integrand import (
-    _determinant,
-    gaussian,
-    log_integrand,
-    precision_times,
-    slope_and_curvature,
-)
+from inference.posterior.gaussian import _determinant, gaussian, precision_times
+from inference.posterior.integrand import log_integrand, slope_and_curvature
 
 EPS = float(np.finfo(float).eps)
 CASES = 60

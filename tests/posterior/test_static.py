@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from scipy import special
 
 from inference.posterior.collapsed import CollapsedDensity, collapsed_density
+from inference.posterior.gaussian import log_top
 from inference.posterior.infer import infer
-from inference.posterior.integrand import log_integrand, log_range_density, log_top
+from inference.posterior.integrand import log_integrand, log_range_density
 from inference.posterior.profile import best_ranges, linearise
 from inference.posterior.ranges import draw_ranges
 from inference.posterior.settings import SamplerSettings

@@ -1,0 +1,199 @@
+"""The reference prior of the ranges: how they are spread says nothing."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import integrate, stats
+
+from inference.posterior.collapsed import CollapsedDensity, collapsed_density
+from inference.posterior.discrepant import with_discrepancy
+from inference.posterior.ranges import draw_ranges
+from simulator.errors import InvalidInputError
+from simulator.frames import Frames
+from simulator.object_model import object_flux
+from simulator.readings import covariance
+from simulator.scene import parse_scene
+from simulator.sensor import PulsedSensor, Sensor
+from tests.posterior.discrepancy_reference import matern_path_covariance
+from tests.posterior.scenes import KINDS, OBJECT, UNKNOWN_CROSSTALK, data, sensor_of
+
+Array = NDArray[np.float64]
+NOTHING = np.empty((1, 0))
+C = (OBJECT["c0"], OBJECT["c1"], OBJECT["c2"])
+CROSSTALK = (0.002, 0.01)
+SPAN: dict[str, Any] = {"prior": "reference", "low": 0.1, "high": 3.0}
+WALL: dict[str, Any] = {"strength": 0.02, "distance_m": 4.0, "shadow": {"c0": 0.05, "c1": 0.02}}
+
+
+@pytest.fixture(params=list(KINDS))
+def kind(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+def density_of(sensor: Sensor, scene: dict[str, Any], frames: Frames) -> CollapsedDensity:
+    return collapsed_density(sensor, parse_scene(scene), frames)
+
+
+def readings_at(sensor: Sensor, u: float, scene: dict[str, Any]) -> tuple[Array, Array]:
+    """Mean readings and the object's part, from the formulas."""
+    r = math.exp(u)
+    flux = object_flux(r, C[0] * C[2], C[0], C[1])
+    hidden = 0.0
+    if "background" in scene:
+        c0, c1 = WALL["shadow"]["c0"], WALL["shadow"]["c1"]
+        hidden = WALL["strength"] * (r**2 + c1 * r) / (r**2 + c1 * r + c0)
+    if isinstance(sensor, PulsedSensor):
+        own = flux * np.array([r / sensor.r0, 1.0])
+        behind = hidden * np.array([WALL["distance_m"] / sensor.r0, 1.0])
+    else:
+        turn = sensor.wave_number
+        own = flux * np.array([math.cos(turn * r), math.sin(turn * r)])
+        phase = turn * WALL["distance_m"]
+        behind = hidden * np.array([math.cos(phase), math.sin(phase)])
+    return own + behind + np.array(CROSSTALK), own
+
+
+def log_densities(sensor: Sensor, scene: dict[str, Any], reading: Array, u: Array) -> Array:
+    """One frame's log density, plus that of the root of one plus its information."""
+    noise, pulsed, out = sensor.noise, isinstance(sensor, PulsedSensor), np.empty(u.size)
+    for k, at in enumerate(u):
+        mean, own = readings_at(sensor, at, scene)
+        ahead, behind = (readings_at(sensor, at + h, scene)[0] for h in (1e-5, -1e-5))
+        slope = (ahead - behind) / 2e-5
+        v1, v2, c = covariance(
+            noise.read,
+            noise.shot or None,
+            noise.relative or None,
+            pulsed,
+            (mean[0], mean[1]),
+            (own[0], own[1]),
+        )
+        matrix = np.array([[v1, c], [c, v2]])
+        e, information = reading - mean, slope @ np.linalg.solve(matrix, slope)
+        out[k] = -0.5 * (e @ np.linalg.solve(matrix, e) + math.log(np.linalg.det(matrix)))
+        out[k] += 0.5 * math.log1p(information) - math.log(2 * math.pi)
+    return out
+
+
+def by_quadrature(sensor: Sensor, scene: dict[str, Any], reading: Array) -> float:
+    """Integrate a frame over a grid that is graded around its best range."""
+    low, high = math.log(SPAN["low"]), math.log(SPAN["high"])
+    grid = np.linspace(low, high, 800)
+    for _ in range(3):
+        values = log_densities(sensor, scene, reading, grid)
+        best = grid[int(np.argmax(values))]
+        near = grid[values > values.max() - 20.0]
+        width = float(np.ptp(near)) + 2 * (grid[1] - grid[0])  # seen, and what a step may hide
+        grid = np.linspace(max(best - width, low), min(best + width, high), 1601)
+    values = log_densities(sensor, scene, reading, grid)
+    return float(values.max() + math.log(integrate.simpson(np.exp(values - values.max()), x=grid)))
+
+
+@pytest.mark.parametrize("behind", [False, True])
+@pytest.mark.parametrize("noise", [{}, {"shot": 1e-6, "relative": 0.01}])
+@pytest.mark.parametrize("snr", [3.0, 300.0])
+def test_a_frame_agrees_with_quadrature(
+    kind: str, snr: float, noise: dict[str, float], behind: bool
+) -> None:
+    sensor = sensor_of(kind, snr, **noise)
+    scene = {"object": OBJECT, "crosstalk": list(CROSSTALK), "range_m": SPAN}
+    if behind:
+        scene["background"] = WALL
+    frames = data(sensor, {k: v for k, v in scene.items() if k != "range_m"}, 3, seed=3).frames
+    found = density_of(sensor, scene, frames).frame_log_likelihoods(NOTHING)[0]
+    wanted = [by_quadrature(sensor, scene, reading) for reading in frames.readings]
+    # differences are good to 1e-9, the rule of a narrow peak to 1e-6
+    np.testing.assert_allclose(found, wanted, atol=1e-5)
+
+
+def test_only_the_distance_from_the_curve_counts(kind: str) -> None:
+    """A weaker signal with less information on every range is not preferred for it.
+
+    Readings on the curve of an object are on that of another as well where crosstalk makes up for
+    it nearly: both have the density of a point on a straight line.
+    """
+    sensor = sensor_of(kind, 1e5)
+    frames = data(sensor, {}, 6, seed=2).frames
+    clean = density_of(sensor, {"object": OBJECT, "range_m": SPAN}, frames)
+    found = clean.frame_log_likelihoods(NOTHING)[0]
+    read = sensor.noise.read
+    # on the line: 1 / (2 pi s1 s2), times sqrt(2 pi) of the integral along it, less its chi-square
+    top = -0.5 * math.log(2 * math.pi) - math.log(read[0] * read[1])
+    assert (found < top + 1e-4).all()
+    # six chi-squares of one degree: beyond 40 once in 1e6 runs
+    assert -2 * (found - top).sum() < 40.0
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e12])
+def test_units_do_not_matter(scale: float) -> None:
+    sensor = sensor_of("pulsed", 300.0, shot=1e-6, relative=0.01)
+    noise = {
+        "read": [scale * x for x in sensor.noise.read],
+        "shot": scale * 1e-6,
+        "relative": 0.01,
+    }
+    other = sensor.model_copy(update={"gain": scale, "noise": sensor.noise.model_validate(noise)})
+    frames = data(sensor, {"crosstalk": list(CROSSTALK)}, 6).frames
+    scene = {"object": OBJECT, "crosstalk": list(CROSSTALK), "range_m": SPAN}
+    scaled = {**scene, "crosstalk": [scale * x for x in CROSSTALK]}
+    found = density_of(other, scaled, Frames(scale * frames.readings))(NOTHING)[0]
+    wanted = density_of(sensor, scene, frames)(NOTHING)[0]
+    assert found == pytest.approx(wanted - 12 * math.log(scale), abs=1e-5)
+
+
+def test_with_a_flux_error_and_little_noise() -> None:
+    """Readings are then range and flux; the law of the ranges cancels their Jacobian."""
+    sensor = sensor_of("pulsed", 1e4)
+    assert isinstance(sensor, PulsedSensor)
+    scene = {"object": OBJECT, "crosstalk": [0.0, 0.0], "range_m": SPAN}
+    frames = data(sensor, {"discrepancy": 0.05}, 7, seed=7, span=(0.4, 1.2)).frames
+    w1, w2 = frames.readings.T
+    r = sensor.r0 * w1 / w2
+    c0, c1, c2 = C
+    quadratic = r**2 + c1 * r + c0
+    delta = np.log(w2 * r**2 * quadratic / (c0 * c2))
+    slope = 2 + r * (2 * r + c1) / quadratic
+    read = sensor.noise.read
+    blur = (slope / w1 * read[0]) ** 2 + ((1 - slope) / w2 * read[1]) ** 2
+    covariance_of_path = matern_path_covariance(np.log(r), 0.05) + np.diag(blur)
+    path = stats.multivariate_normal(np.zeros(7), covariance_of_path).logpdf(delta)
+    resolution = np.hypot((1 - slope) * w1 / read[0], slope * w2 / read[1])
+    wanted = path + np.log(resolution).sum() - np.log(w1 * w2).sum()
+    found = with_discrepancy(density_of(sensor, scene, frames), 0.05)(NOTHING)[0]
+    # the slope of the error, of the order of 0.05 times sqrt(5/3), changes the resolution by its
+    # share of the whole slope in each frame, and frames share it; without the prior's resolution
+    # the two would be 7 log(1000), 48 nats, apart
+    allowed = 7 * 2 * 0.05 * math.sqrt(5 / 3) / 2.5
+    assert found == pytest.approx(wanted, abs=allowed)
+
+
+def test_a_vanishing_error_leaves_the_plain_density(kind: str) -> None:
+    sensor = sensor_of(kind)
+    scene = {"crosstalk": UNKNOWN_CROSSTALK, "range_m": SPAN}
+    frames = data(sensor, {"crosstalk": list(CROSSTALK)}, 12).frames
+    plain = collapsed_density(sensor, parse_scene(scene), frames)
+    natural = np.array([[*C, *CROSSTALK]])
+    z = plain.parameters.standard(natural) + 1e-5 * np.random.default_rng(1).normal(size=(5, 5))
+    found = with_discrepancy(plain, 1e-9)(z)
+    np.testing.assert_allclose(found, plain(z), atol=2e-3, rtol=1e-9)
+
+
+def test_a_range_is_drawn_from_what_is_integrated(kind: str) -> None:
+    sensor = sensor_of(kind, 20.0)
+    scene = {"object": OBJECT, "crosstalk": list(CROSSTALK), "range_m": SPAN}
+    frames = data(sensor, {"crosstalk": list(CROSSTALK)}, 1, seed=4, span=(0.8, 0.9)).frames
+    density = density_of(sensor, scene, frames)
+    drawn = draw_ranges(density, np.empty((4000, 0)), np.random.default_rng(5))[:, 0]
+    u = np.linspace(math.log(SPAN["low"]), math.log(SPAN["high"]), 3001)
+    mass = np.exp(log_densities(sensor, scene, frames.readings[0], u))
+    law = np.concatenate([[0.0], np.cumsum(mass[1:] + mass[:-1])])
+    # one test in a thousand fails by chance, and the seed is fixed
+    assert stats.kstest(drawn, lambda x: np.interp(x, u, law / law[-1])).pvalue > 1e-3
+
+
+def test_an_impossible_support_is_named() -> None:
+    with pytest.raises(InvalidInputError, match="/range_m"):
+        parse_scene({"range_m": {"prior": "reference", "low": 2.0, "high": 1.0}})
