@@ -109,7 +109,6 @@ class DataSet:
     range_m: Array
     name: str
     terms: dict[str, Any]
-    crosstalk: tuple[float, float] = (0.0, 0.0)
 
 
 def _surface(group: SceneClass, rng: np.random.Generator) -> tuple[str, PlateScene, float]:
@@ -166,7 +165,6 @@ def draw(group: SceneClass, number: int) -> DataSet:
     sensor = parse_sensor({**kind, "noise": {"read": [noise, noise]}})
     scene = OpticalScene(surfaces=(_at(plate, radius, 1.0),))
     terms: dict[str, Any] = {}
-    first = second = 0.0
     if group.crosstalk:
         first, second = (0.1 * middle * rng.standard_normal(2)).tolist()
         scene = scene.model_copy(update={"electronics": Electronics(crosstalk=(first, second))})
@@ -184,8 +182,7 @@ def draw(group: SceneClass, number: int) -> DataSet:
             "distance_m": distance,
         }
     seen = series(scene, lambda d: _at(plate, radius, d).pose, distances, sensor, rng)
-    crosstalk = first, second
-    return DataSet(sensor, Frames(seen.frames.readings), seen.range_m, name, terms, crosstalk)
+    return DataSet(sensor, Frames(seen.frames.readings), seen.range_m, name, terms)
 
 
 def told(data: DataSet, term: str) -> dict[str, Any]:

@@ -11,10 +11,11 @@ from benchmarks.coverage.report import GOAL, Coverage
 
 __all__ = ["draw"]
 
-_COLOURS = {"without": "tab:red", "with": "tab:blue"}
+_COLOURS = {"without": "tab:red", "stroke": "tab:orange", "with": "tab:blue"}
 _LABELS = {
     "without": "without the term",
-    "with": "discrepancy and stroke prior",
+    "stroke": "discrepancy and stroke prior",
+    "with": "discrepancy and reference prior of the ranges",
 }
 
 

@@ -17,7 +17,7 @@ __all__ = ["CELLS", "TERMS", "RecordedCell", "recorded_row"]
 SUPPORT = {"low": 0.05, "high": 1.0}
 TERMS: Mapping[str, Mapping[str, Any]] = {
     "without": {"range_m": {"prior": "loguniform", **SUPPORT}},
-    "with": {"range_m": {"prior": "stroke", **SUPPORT}, "discrepancy": 0.05},
+    "with": {"range_m": {"prior": "reference", **SUPPORT}, "discrepancy": "default"},
 }
 
 

@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 _ROUNDS = 8
 _SMALL = 1e-2  # nats; the slope of wide modes is not exact
 _DONE = 1e-3  # nats below the maximum at which the expansion is good
+# nats below the maximum after the climb: parameters that fit nothing, where more would decide
+# nothing; the climb comes to within a nat wherever the posterior has mass
+_LOST = 100.0
 _LONGEST = 1.0  # of a step, in log flux
 _FEW = 1e-5  # weight of a mode that is not looked at
 
@@ -153,7 +156,7 @@ def _newton(
         if not math.isfinite(longest):
             return -math.inf
         last[:] = step * min(1.0, _LONGEST / max(longest, _LONGEST))
-        if gain < _DONE:
+        if gain < _DONE or gain > _LOST:
             break
         trial[:] = coefficients + last
     coefficients += last
