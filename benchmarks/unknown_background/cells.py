@@ -32,6 +32,7 @@ C0, C1, C2 = 0.0769, -0.123, 0.0957
 # what is known beforehand: the order of magnitude
 DISTANCE = {"prior": "lognormal", "median": 5.0, "sigma": 0.7}
 STRENGTH = {"prior": "lognormal", "median": 0.01, "sigma": 1.5}
+SUPPORT = {"low": 0.02, "high": 15.0}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,9 +55,8 @@ class Cell:
 
     @property
     def ranges(self) -> Array:
-        """The expected order statistics of as many draws from the prior of log r."""
-        low, high = np.log(self.span)
-        return np.exp(low + (high - low) * np.arange(1, FRAMES + 1) / (FRAMES + 1))
+        """An object at constant speed: what no law of independent draws expects."""
+        return np.linspace(*self.span, FRAMES)
 
     @property
     def strength(self) -> float:
@@ -81,11 +81,8 @@ class Cell:
         background: dict[str, Any] = {"strength": STRENGTH, "distance_m": DISTANCE}
         if self.case != "B":
             background["shadow"] = "object"
-        if self.case == "W":
-            return parse_scene({"background": background})
-        low, high = self.span
-        law = {"prior": "loguniform", "low": low, "high": high}
-        return parse_scene({"background": background, "range_m": law})
+        law = "loguniform" if self.case == "W" else "reference"
+        return parse_scene({"background": background, "range_m": {"prior": law, **SUPPORT}})
 
     @property
     def made_of(self) -> Scene:
