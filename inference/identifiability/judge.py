@@ -10,6 +10,7 @@ from inference.identifiability.experiment import Experiment
 from inference.identifiability.prediction import Prediction, log_range_spread
 from inference.identifiability.reasons import Diagnosis
 from inference.identifiability.status import Identifiability, status_of
+from simulator.scene import Reference
 
 __all__ = ["Spread", "judge"]
 
@@ -81,6 +82,7 @@ def judge(
     foreseen = np.full(len(names) + 1, np.nan)
     if prediction is not None:
         foreseen = np.append(prediction.sd, prediction.scale_sd)
+    independent = not isinstance(experiment.parameters.range_prior, Reference)
     rows = []
     for (name, value, unit), expected in zip(
         [
@@ -92,7 +94,7 @@ def judge(
     ):
         status = status_of(name, value)
         text = _headline(name, status, value)
-        if expected > _NARROWER * value and not name.startswith("range_m."):
+        if independent and expected > _NARROWER * value and not name.startswith("range_m."):
             # the law is an assumption: what it alone tells is not identified by the data
             alone = status_of(name, expected)
             status = "weak" if alone == "identified" else alone

@@ -50,6 +50,23 @@ def test_more_spread_than_the_curvature_says() -> None:
     assert "there are several solutions, or one valley that bends" in row.reason
 
 
+@pytest.mark.parametrize("law", ["loguniform", "reference"])
+def test_what_the_law_of_the_ranges_tells_is_not_identified_by_the_data(law: str) -> None:
+    """Draws far narrower than the readings can make them."""
+    scene = {"range_m": {"prior": law, "low": 0.02, "high": 15.0}, "crosstalk": UNKNOWN_CROSSTALK}
+    weak, made = sensor_of("pulsed", 1.0), parameters_of(SENSOR, parse_scene(scene))
+    rng = np.random.default_rng(6)
+    z = 1e-4 * rng.standard_normal((500, 5))
+    log_r = np.log(np.linspace(0.5, 1.0, 20)) + 1e-4 * rng.standard_normal((500, 20))
+    for row in judge_draws(weak, made, z, z, log_r):
+        if law == "reference":
+            assert row.status == "identified"
+            continue
+        assert row.status != "identified"
+        assert "the readings by themselves only to" in row.reason
+        assert '{"prior": "reference"}' in row.reason
+
+
 @pytest.mark.parametrize("shared", [0.0, 0.3])
 def test_ranges_that_scatter_by_their_noise_alone_do_not_move(shared: float) -> None:
     """Also where all of them are uncertain together."""

@@ -29,6 +29,7 @@ SCENES: dict[str, dict[str, Any]] = {
     "crosstalk": {"crosstalk": UNKNOWN_CROSSTALK},
     "background": {"background": BACKGROUND, "object": {"c0": 0.08, "c1": 0.0}},
     "stroke": {"range_m": {"prior": "stroke", "low": 0.05, "high": 5.0}},
+    "reference": {"range_m": {"prior": "reference", "low": 0.05, "high": 5.0}},
     "known law": {"range_m": {"prior": "lognormal", "median": 0.5, "sigma": 0.7}},
 }
 LOG_R = np.log(np.geomspace(0.15, 1.5, 12))

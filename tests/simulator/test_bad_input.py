@@ -67,6 +67,7 @@ SCENES: list[dict[str, Any]] = [
     {"background": {"strength": LAWS["lognormal"], "distance_m": LAWS["uniform"]}},
     {"background": WALL | {"shadow": {"c1": LAWS["halfnormal"]}}, "motion": "static"},
     {"range_m": {"prior": "stroke", "low": 0.1, "high": 3.0}},
+    {"range_m": {"prior": "reference", "low": 0.1, "high": 3.0}},
 ]
 
 
@@ -246,6 +247,9 @@ def test_a_wrong_prior_wherever_it_stands(place: str, law: Any, pointer: str) ->
         ({"range_m": {"prior": "stroke", "low": 0.1}}, "/range_m/high"),
         ({"range_m": {"prior": "stroke", "low": 3.0, "high": 1.0}}, "/range_m"),
         ({"range_m": {"prior": "stroke", "low": 15.0, "high": 16.0}}, "/range_m/low"),
+        ({"range_m": {"prior": "reference", "high": 1.0}}, "/range_m/low"),
+        ({"range_m": {"prior": "reference", "low": 3.0, "high": 1.0}}, "/range_m"),
+        ({"range_m": {"prior": "reference", "low": 15.0, "high": 16.0}}, "/range_m/low"),
         ({"range_m": LAWS["uniform"] | {"low": -2.0, "high": -1.0}}, "/range_m"),
         ({"motion": None}, "/motion"),
         ({"motion": ["radial"]}, "/motion"),
@@ -344,7 +348,7 @@ NAMES = sorted(
     | set(Background.model_fields)
     | {"values", "read", "shot", "a/b", "~"}
 )
-WORDS = [*LAWS, *SENSORS, "stroke", "object", "radial"]
+WORDS = [*LAWS, *SENSORS, "stroke", "reference", "object", "radial"]
 numbers = st.floats() | st.integers(-(2**70), 2**70) | st.just(10**400)
 scalars = st.none() | st.booleans() | numbers | st.text(max_size=4) | st.sampled_from(WORDS)
 anything = st.recursive(

@@ -193,6 +193,20 @@ def test_a_stroke_has_a_centre_inside_and_a_spread() -> None:
         assert row[0] == pytest.approx(wanted, rel=1e-9, abs=1e-9)
 
 
+def test_a_reference_prior_has_no_unknowns_and_ends_at_the_background() -> None:
+    wall = {"strength": 1.0, "distance_m": WIDE, "shadow": "object"}
+    law = {"prior": "reference", "low": 0.1, "high": 3.0}
+    parameters = made({"object": KNOWN, "background": wall, "range_m": law})
+    assert parameters.names == ("background.distance_m",)
+    z = np.random.default_rng(3).standard_normal((20, 1))
+    distance = parameters.natural(z)[:, 0]
+    found = parameters.terms(z).ranges
+    assert (found[:, 6] == 0.1).all()
+    np.testing.assert_array_equal(found[:, 7], np.minimum(distance, 3.0))
+    # a density for every range that the readings tell apart: no constant goes with its support
+    np.testing.assert_array_equal(found[distance > 0.1, 0], 0.0)
+
+
 SCENES: list[dict[str, Any]] = [
     {"crosstalk": [NORMAL, WIDE]},
     {"background": {"strength": WIDE, "distance_m": WIDE}},
@@ -202,6 +216,7 @@ SCENES: list[dict[str, Any]] = [
     {"object": {"c0": WIDE, "c1": -2.5}},
     {"object": {"c1": {"prior": "uniform", "low": -0.7, "high": -0.5}}},
     {"range_m": {"prior": "stroke", "low": 0.1, "high": 3.0}},
+    {"range_m": {"prior": "reference", "low": 0.1, "high": 3.0}},
 ]
 
 

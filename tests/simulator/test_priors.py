@@ -63,6 +63,7 @@ def test_cut_laws(prior, law) -> None:  # type: ignore[no-untyped-def]
         {"object": {"c1": {"prior": "normal", "mean": 0.0, "sd": 1.0}}},
         {"object": {"c1": -0.5}},
         {"range_m": {"prior": "stroke", "low": 0.1, "high": 3.0}},
+        {"range_m": {"prior": "reference", "low": 0.1, "high": 3.0}},
     ],
 )
 def test_coordinates_and_values_are_inverse(scene: dict[str, object]) -> None:
