@@ -44,12 +44,12 @@ from inference.posterior.diagnostics import effective_sample_size, split_r_hat
 from inference.posterior.importance import draw_weighted
 from inference.posterior.integrand import log_integrand
 from inference.posterior.job import chains
-from inference.posterior.local_mixture import adapted
 from inference.posterior.profile import best_ranges
-from inference.posterior.proposal import mixture_of
+from inference.posterior.proposal import Proposal, mixture_of
 from inference.posterior.rows import background_of, crosstalk_of, law_of
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.start import find_optima
+from inference.posterior.transport import fit_map
 from simulator.scene import parse_scene
 from tests.posterior.scenes import OBJECT, data, sensor_of
 
@@ -353,7 +353,9 @@ def _reference(job, density, optima, cap):  # type: ignore[no-untyped-def]
     outcome, _ = ours(dataclasses.replace(job, settings=long), cap)
     rng = np.random.default_rng(job.seed + 2000)
     pilot = outcome.z[rng.integers(0, len(outcome.z), 20_000)]
-    weighted = draw_weighted(density, adapted(mixture_of(optima), pilot, rng), rng, 30_000)
+    weighted = draw_weighted(
+        density, Proposal(mixture_of(optima), fit_map(pilot), 1.0), rng, 30_000
+    )
     if weighted.k_hat < 0.7:
         z, w = weighted.z, weighted.weights
         basis = f"importance sampling, k-hat {weighted.k_hat:.2f}, ESS {weighted.ess:.0f}"

@@ -1,8 +1,8 @@
 """The evidence of a model: the probability of the frames with everything unknown integrated out.
 
 Importance sampling from a mixture around the optima, where its weights can be trusted; otherwise
-from a mixture adapted to a population that was tempered in from the prior; otherwise bridge
-sampling between such a mixture and walkers. All in nats, on one scale for models of any
+through a map fitted to two populations that were carried from the prior; otherwise bridge sampling
+between each population and the map of the other. All in nats, on one scale for models of any
 dimension: priors normalised, joint truncations included.
 """
 
@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.stats import qmc
 
-from inference.posterior.bridge import bridge, walk
+from inference.posterior.bridge import bridge
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.importance import WeightedDraws, draw_weighted
-from inference.posterior.local_mixture import adapted
-from inference.posterior.proposal import Mixture, mixture_of
+from inference.posterior.population import Population, carried
+from inference.posterior.proposal import Mixture, Proposal, mixture_of
 from inference.posterior.start import Optimum, climb, find_optima, refine
 from inference.posterior.tempering import temper
+from inference.posterior.transport import fit_map
 from simulator.parameters import Parameters
 
 __all__ = ["Evidence", "Weighed", "adapt", "log_prior_mass", "resample", "weigh"]
@@ -31,15 +32,9 @@ Array = NDArray[np.float64]
 _MAX_K_HAT = 0.4
 _DRAWS = 2000
 _LEAST_ESS = 100.0
-_TRIALS = 3  # of importance sampling, from one mixture after another
-_POPULATION = 128
-_WALKERS = 128
-_WALKS = 3
-_STEPS = 160
-_MOST_EVALUATIONS = 1_000_000  # of a frame, in one walk
-# nats for each unknown beyond three, where no quadrature can check: in nine dimensions estimates
-# from other populations were seen to differ by 1.5 nats though each was stable in itself
-_UNCHECKED = 0.25
+_POPULATION = 128  # that looks for optima which the multistart missed
+_MAPPED_DRAWS = 4000
+_BRIDGE_DRAWS = 2000
 _PRIOR_POINTS = 13  # log2
 _PRIOR_REPEATS = 4
 
@@ -150,8 +145,8 @@ def _distinct(optima: list[Optimum]) -> list[Optimum]:
     return kept
 
 
-def adapt(laplace: Mixture, pilot: Array, rng: np.random.Generator) -> Mixture:
-    """Adapt a mixture to pilot draws, of which many may be equal.
+def adapt(laplace: Mixture, pilot: Array) -> Mixture | Proposal:
+    """Adapt a proposal to pilot draws, of which many may be equal.
 
     Parameters
     ----------
@@ -159,18 +154,15 @@ def adapt(laplace: Mixture, pilot: Array, rng: np.random.Generator) -> Mixture:
         Laplace approximations at the optima, which keep a share.
     pilot : ndarray, shape (n, d)
         Draws.
-    rng : numpy.random.Generator
-        Source of randomness.
 
     Returns
     -------
-    Mixture
+    Mixture or Proposal
         `laplace` itself where the draws are too few to have a shape.
     """
-    distinct = np.unique(pilot, axis=0)
-    if len(distinct) < 10 * (pilot.shape[1] + 1):
+    if len(np.unique(pilot, axis=0)) < 10 * (pilot.shape[1] + 1):
         return laplace
-    return adapted(laplace, distinct, rng)
+    return Proposal(laplace, fit_map(pilot), 1.0)
 
 
 def resample(weighted: WeightedDraws, rng: np.random.Generator, n: int) -> NDArray[np.intp]:
@@ -227,35 +219,61 @@ def weigh(density: CollapsedDensity, rng: np.random.Generator) -> Weighed:
     if not optima:
         nothing = Evidence(-math.inf, 0.0, None)
         return Weighed(nothing, np.empty((0, d)), np.empty(0), None, calls)
-    mixture = laplace = mixture_of(optima)
-    pilot = population.z
-    for trial in range(_TRIALS):
-        weighted = draw_weighted(density, mixture, rng, _DRAWS)
-        calls += _DRAWS
-        if weighted.k_hat < _MAX_K_HAT and weighted.ess > _LEAST_ESS:
-            error = math.hypot(_relative_error(weighted), constant_error)
-            evidence = Evidence(weighted.log_evidence + constant, error, weighted.k_hat)
-            with np.errstate(divide="ignore"):
-                return Weighed(evidence, weighted.z, np.log(weighted.weights), laplace, calls)
-        if trial:
-            pilot = np.concatenate([population.z, weighted.z[resample(weighted, rng, _DRAWS)]])
-        if np.linalg.matrix_rank(pilot - pilot[:1]) < d:
-            pilot = mixture.draw(rng, _DRAWS)
-        mixture = adapt(laplace, pilot, rng)
-    values = []
-    z = weighted.z[resample(weighted, rng, _WALKERS)]
-    steps = int(np.clip(_MOST_EVALUATIONS / _WALKERS / len(density.frames), 40, _STEPS))
-    for _ in range(_WALKS):
-        walked = walk(density, mixture, z, rng, steps)
-        weighted = draw_weighted(density, mixture, rng, _DRAWS)
-        calls += walked.calls + _DRAWS
-        value, error = bridge(walked, mixture, weighted.z, weighted.log_density)
+    laplace = mixture_of(optima)
+    weighted = draw_weighted(density, laplace, rng, _DRAWS)
+    calls += _DRAWS
+    if _trusted(weighted):
+        return _by_importance(weighted, laplace, (constant, constant_error), calls)
+    populations = [carried(density, rng) for _ in range(2)]
+    calls += sum(each.calls for each in populations)
+    members = np.concatenate([each.z for each in populations])
+    if not len(members):  # the prior hardly ever explains the frames: only the optima are known
+        return _by_importance(weighted, laplace, (constant, constant_error), calls)
+    weighted = draw_weighted(density, adapt(laplace, members), rng, _MAPPED_DRAWS)
+    calls += _MAPPED_DRAWS
+    if _trusted(weighted):
+        return _by_importance(weighted, laplace, (constant, constant_error), calls)
+    value, error = _by_bridge(density, laplace, populations, rng)
+    calls += 2 * _BRIDGE_DRAWS
+    evidence = Evidence(value + constant, math.hypot(error, constant_error), None)
+    return Weighed(evidence, members, np.zeros(len(members)), laplace, calls)
+
+
+def _trusted(weighted: WeightedDraws) -> bool:
+    return weighted.k_hat < _MAX_K_HAT and weighted.ess > _LEAST_ESS
+
+
+def _by_importance(
+    weighted: WeightedDraws, laplace: Mixture, constant: tuple[float, float], calls: int
+) -> Weighed:
+    error = math.hypot(_relative_error(weighted), constant[1])
+    evidence = Evidence(weighted.log_evidence + constant[0], error, weighted.k_hat)
+    with np.errstate(divide="ignore"):
+        return Weighed(evidence, weighted.z, np.log(weighted.weights), laplace, calls)
+
+
+def _by_bridge(
+    density: CollapsedDensity,
+    laplace: Mixture,
+    populations: list[Population],
+    rng: np.random.Generator,
+) -> tuple[float, float]:
+    """Bridge each population to the map of the other, which it was not fitted to.
+
+    Two populations that came from the prior apart contradict each other where one missed something:
+    half of their difference is the standard error of the mean, and so is the batches' own.
+    """
+    halves = [(each.z, each.log_likelihood + each.log_prior) for each in populations]
+    if not all(len(z) for z, _ in halves):  # one of them died on the way
+        z, at = halves[0] if len(halves[0][0]) else halves[1]
+        order = rng.permutation(len(z))
+        halves = [(z[part], at[part]) for part in (order[::2], order[1::2])]
+    values, errors = [], []
+    for k, (z, at) in enumerate(halves):
+        proposal = adapt(laplace, halves[1 - k][0])
+        drawn = draw_weighted(density, proposal, rng, _BRIDGE_DRAWS)
+        value, error = bridge(z, at, proposal, drawn.z, drawn.log_density)
         values.append(value)
-        z = walked.z[-1]
-        pilot = walked.z.reshape(-1, d)
-        mixture = adapt(laplace, pilot, rng)
-    # a population that still drifts shows in the last two estimates
-    drift = abs(values[-1] - values[-2])
-    error = math.hypot(max(error, drift, _UNCHECKED * (d - 3)), constant_error)
-    evidence = Evidence(values[-1] + constant, error, None)
-    return Weighed(evidence, pilot, np.zeros(len(pilot)), laplace, calls)
+        errors.append(error)
+    spread = 0.5 * abs(values[0] - values[1])
+    return float(np.mean(values)), math.hypot(spread, float(np.mean(errors)))

@@ -20,7 +20,7 @@ from inference.posterior.proposal import log_student, student
 from inference.posterior.tempering import next_power
 from inference.posterior.transport import TriangularMap, fit_map
 
-__all__ = ["Population", "first_population", "temper"]
+__all__ = ["Population", "carried", "first_population", "temper"]
 
 Array = NDArray[np.float64]
 
@@ -204,4 +204,25 @@ def temper(
             moves += 0.5 * moved
         if moves > (_LAST_MOVES if last else _MOVES):
             break
+    return population
+
+
+def carried(density: CollapsedDensity, rng: np.random.Generator) -> Population:
+    """Carry a population all the way from the prior to the posterior.
+
+    Parameters
+    ----------
+    density : CollapsedDensity
+        Target.
+    rng : numpy.random.Generator
+        Source of randomness.
+
+    Returns
+    -------
+    Population
+        Empty where the likelihood is zero at nearly every draw of the prior.
+    """
+    population = first_population(density, rng)
+    while len(population.z) and population.power < 1.0:
+        population = temper(density, population, rng)
     return population
