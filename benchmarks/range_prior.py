@@ -1,6 +1,6 @@
 """What the prior of the ranges does to the intervals of a posterior.
 
-    python -m benchmarks.range_prior [--runs 24] [--walls 4]
+    python -m benchmarks.range_prior [--runs 24] [--walls 4] [--laws loguniform reference]
 
 First table: the notebook's scene (a plate and crosstalk, both unknown; 30 frames), simulated with
 new noise each time: once with ranges drawn from its prior, loguniform in 0.1-3 m, once with ranges
@@ -35,6 +35,7 @@ OPEN_WALL = {
     "distance_m": {"prior": "lognormal", "median": 3.0, "sigma": 0.5},
     "shadow": "object",
 }
+LAWS = ("loguniform", "stroke", "reference")
 Span = tuple[float, float, int, bool]  # from, to [m], frames, whether evenly in log r
 
 
@@ -73,6 +74,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=24)
     parser.add_argument("--walls", type=int, default=4, help="runs before a wall")
+    parser.add_argument("--laws", nargs="+", default=LAWS, choices=LAWS)
     given = parser.parse_args()
     made = read_document(SystemDescription, NOTEBOOKS / "simulated.json")
     told = read_document(SystemDescription, NOTEBOOKS / "scene.json")
@@ -80,7 +82,7 @@ def main() -> None:
         "| prior | ranges | 90 % intervals that hold the truth | standard error | relative width "
     )
     print(head + "| says weak | converged |", "|---|---|---|---|---|---|---|", sep="\n")
-    for law in ("loguniform", "stroke", "reference"):
+    for law in given.laws:
         scene = {**told.scene.model_dump(exclude_none=True), "range_m": {"prior": law, **NEAR}}
         other = told.model_copy(update={"scene": parse_scene(scene)})
         for drawn in (True, False):
@@ -88,7 +90,7 @@ def main() -> None:
             _study(f"{law} | {where}", made, other, given.runs, drawn, (0.15, 1.2, 30, True))
     sensor = parse_sensor({**SENSOR, "noise": {"read": [9.3e-6, 9.3e-6]}})
     before = SystemDescription(sensor=sensor, scene=parse_scene({**PLATE, "background": WALL}))
-    for law in ("loguniform", "stroke", "reference"):
+    for law in given.laws:
         scene = {"background": OPEN_WALL, "range_m": {"prior": law, **FAR}}
         other = before.model_copy(update={"scene": parse_scene(scene)})
         name = f"{law}, wall | 0.2-2 m at constant speed"
