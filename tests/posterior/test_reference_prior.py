@@ -10,13 +10,17 @@ from scipy import integrate, stats
 
 from inference.posterior.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.discrepant import with_discrepancy
+from inference.posterior.infer import infer
 from inference.posterior.ranges import draw_ranges
+from inference.posterior.settings import SamplerSettings
 from simulator.errors import InvalidInputError
 from simulator.frames import Frames
 from simulator.object_model import object_flux
 from simulator.readings import covariance
 from simulator.scene import parse_scene
-from simulator.sensor import PulsedSensor, Sensor
+from simulator.sensor import PulsedSensor, Sensor, parse_sensor
+from simulator.simulate import simulate
+from simulator.trajectories import RadialTrajectory
 from tests.posterior.discrepancy_reference import matern_path_covariance
 from tests.posterior.scenes import KINDS, OBJECT, UNKNOWN_CROSSTALK, data, sensor_of
 
@@ -197,3 +201,36 @@ def test_a_range_is_drawn_from_what_is_integrated(kind: str) -> None:
 def test_an_impossible_support_is_named() -> None:
     with pytest.raises(InvalidInputError, match="/range_m"):
         parse_scene({"range_m": {"prior": "reference", "low": 2.0, "high": 1.0}})
+
+
+WALL_BEHIND = {"strength": 0.0177, "distance_m": 3.0, "shadow": "object"}
+OPEN_WALL = {
+    "strength": {"prior": "lognormal", "median": 0.02, "sigma": 1.0},
+    "distance_m": {"prior": "lognormal", "median": 3.0, "sigma": 0.5},
+    "shadow": "object",
+}
+DISTANCE = "background.distance_m"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["loguniform", "reference"])
+def test_an_object_at_constant_speed_before_a_wall(law: str) -> None:
+    """Independent draws of a wide law are not what moves: what only that law tells is said."""
+    sensor = parse_sensor({**KINDS["pulsed"], "noise": {"read": [9.3e-6, 9.3e-6]}})
+    path = RadialTrajectory(from_m=0.2, to_m=2.0, frames=16, spacing="linear")
+    made = simulate(sensor, parse_scene({"object": OBJECT, "background": WALL_BEHIND}), path, 1)
+    scene = parse_scene({"background": OPEN_WALL, "range_m": {**SPAN, "prior": law}})
+    settings = SamplerSettings(method="auto", seed=1, ensembles=2)
+    found = infer(sensor, scene, made.frames, settings)
+    rows = {row.parameter: row for row in found.identifiability}
+    if law == "loguniform":
+        assert rows[DISTANCE].status == rows["range_m"].status == "weak"
+        assert "the readings by themselves only to" in rows[DISTANCE].reason
+        return
+    assert found.verdict.converged
+    wall = found.parameters[DISTANCE]
+    # a normal variate beyond four standard deviations once in 16,000 data sets
+    assert abs(wall.mean - 3.0) < 4 * wall.sd
+    assert "by themselves" not in rows[DISTANCE].reason
+    low, high = found.range_m.q05, found.range_m.q95
+    assert np.mean((low <= made.range_m) & (made.range_m <= high)) > 0.5
