@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 WALKERS = 32
 POPULATIONS = 2  # independent of one another, so that they can disagree
+_TEMPERED_FRAMES = 200  # at most; the walkers then start the wider, the more frames there are
 _IMPORTANCE_DRAWS = 2000
 _MOST_IMPORTANCE_DRAWS = 200_000
 _TRIAL_DRAWS = 400
@@ -61,7 +62,7 @@ def start(job: Job) -> Checkpoint:
             raise RefusedError("no range allowed by the scene explains every frame")
         return Checkpoint("importance", None, None, calls=1, verdict=known, finished=True)
     optima = find_optima(density, job.stream(0))
-    tempered, calls = tempered_walkers(density, job.stream(1), WALKERS)
+    tempered, calls = tempered_walkers(_thinned(density), job.stream(1), WALKERS)
     if len(tempered):
         optima = _with(optima, refine(density, climb(density, tempered[0])[0]))
         optima = _with(optima, refine(density, tempered[0]))
@@ -109,6 +110,17 @@ def start(job: Job) -> Checkpoint:
     ensembles = new_ensembles(density, proposal, (*starts, tempered), job)
     calls += WALKERS * len(ensembles)
     return dataclasses.replace(begun, proposal=proposal, ensembles=ensembles, calls=calls)
+
+
+def _thinned(density: CollapsedDensity) -> CollapsedDensity:
+    """Return the density of some of the frames, spread over all: enough to show every branch."""
+    n = len(density.frames)
+    if n <= _TEMPERED_FRAMES:
+        return density
+    chosen = np.linspace(0, n - 1, _TEMPERED_FRAMES).round().astype(int)
+    present = None if density.present is None else density.present[chosen]
+    frames = np.ascontiguousarray(density.frames[chosen])
+    return dataclasses.replace(density, frames=frames, present=present)
 
 
 def _with(optima: list[Optimum], found: Optimum | None) -> list[Optimum]:
