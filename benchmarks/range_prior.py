@@ -82,7 +82,7 @@ def main() -> None:
         "| prior | ranges | 90 % intervals that hold the truth | standard error | relative width "
     )
     print(head + "| says weak | converged |", "|---|---|---|---|---|---|---|", sep="\n")
-    for law in given.laws:
+    for law in given.laws if given.runs else ():
         scene = {**told.scene.model_dump(exclude_none=True), "range_m": {"prior": law, **NEAR}}
         other = told.model_copy(update={"scene": parse_scene(scene)})
         for drawn in (True, False):
