@@ -217,7 +217,8 @@ DISTANCE = "background.distance_m"
 def test_an_object_at_constant_speed_before_a_wall(law: str) -> None:
     """Independent draws of a wide law are not what moves: what only that law tells is said."""
     sensor = parse_sensor({**KINDS["pulsed"], "noise": {"read": [9.3e-6, 9.3e-6]}})
-    path = RadialTrajectory(from_m=0.2, to_m=2.0, frames=16, spacing="linear")
+    count = 40 if law == "loguniform" else 16  # the law tells the more, the more frames there are
+    path = RadialTrajectory(from_m=0.2, to_m=2.0, frames=count, spacing="linear")
     made = simulate(sensor, parse_scene({"object": OBJECT, "background": WALL_BEHIND}), path, 1)
     scene = parse_scene({"background": OPEN_WALL, "range_m": {**SPAN, "prior": law}})
     settings = SamplerSettings(method="auto", seed=1, ensembles=2)
