@@ -20,7 +20,7 @@ _BATCHES = 8
 
 
 def _estimate(walked: Array, drawn: Array, share: float) -> float:
-    """Iterate the optimal bridge from log ratios of target to mixture; share of the walked."""
+    """Iterate the optimal bridge from log ratios of target to proposal; share of the former."""
     top = float(np.median(walked))
     a, b = walked - top, drawn - top
     first, second = math.log(share), math.log1p(-share)

@@ -114,10 +114,10 @@ def test_a_frame_agrees_with_quadrature(
 
 
 def test_only_the_distance_from_the_curve_counts(kind: str) -> None:
-    """A weaker signal with less information on every range is not preferred for it.
+    """A weak signal, with less information on its range, is not preferred for it.
 
-    Readings on the curve of an object are on that of another as well where crosstalk makes up for
-    it nearly: both have the density of a point on a straight line.
+    Frames whose signals differ twenty thousandfold have one density, that of a point near
+    a straight line.
     """
     sensor = sensor_of(kind, 1e5)
     frames = data(sensor, {}, 6, seed=2).frames

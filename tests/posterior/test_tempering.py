@@ -1,5 +1,6 @@
 """Walkers tempered in from the prior stand where importance sampling says that the mass is."""
 
+import dataclasses
 import math
 from typing import Any, cast
 
@@ -8,6 +9,7 @@ import pytest
 
 from inference.posterior.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.importance import MAX_K_HAT, draw_weighted
+from inference.posterior.launch import _thinned
 from inference.posterior.proposal import mixture_of
 from inference.posterior.start import find_optima
 from inference.posterior.tempering import tempered_walkers
@@ -86,3 +88,20 @@ def test_an_impossible_density_has_no_walkers() -> None:
     )
     assert walkers.shape == (0, 1)
     assert calls > 0
+
+
+def test_many_frames_are_thinned_over_all_of_them() -> None:
+    """Those that are kept keep their readings, their gain and whether they hold an object."""
+    sensor, scene, frames = example("pulsed", False, frames=500)
+    present = np.arange(500) % 7 != 0
+    density = collapsed_density(sensor, scene, dataclasses.replace(frames, object_present=present))
+    thin = _thinned(density)
+    assert thin.present is not None
+    assert len(thin.frames) == len(thin.present) == 200
+    places = [int(np.flatnonzero((density.frames == row).all(axis=1))[0]) for row in thin.frames]
+    assert places[0] == 0
+    assert places[-1] == 499
+    assert max(np.diff(places)) <= 3
+    np.testing.assert_array_equal(thin.present, present[places])
+    few = collapsed_density(*example("pulsed", False, frames=200))
+    assert _thinned(few) is few
