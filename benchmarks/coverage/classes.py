@@ -35,6 +35,12 @@ PLATES = ("W01H01", "W02H02", "W04H04", "W08H08", "W16H16", "W01H16", "W02H08", 
 RADII_M = (0.05, 0.1, 0.2, 0.4, 0.8)
 MATERIALS = {"diffuse": "R00", "glossy": "R01"}
 TILTS = {"T00": ("T00",), "tilted": ("T12", "T06", "T04")}
+# what the scene says of a shadow of which nothing is known: sizes up to metres. The default prior
+# of a shadow ties it to a diffuse object's c0, and that of a glossy one is up to 1e17 times as large
+SHADOW: Mapping[str, Any] = {
+    "c0": {"prior": "lognormal", "median": 0.05, "sigma": 2.0},
+    "c1": {"prior": "normal", "mean": 0.0, "sd": 0.5},
+}
 # what the scene says of the ranges and of the model's error
 SUPPORT = {"low": 0.02, "high": 15.0}
 TERMS: Mapping[str, Mapping[str, Any]] = {
@@ -180,6 +186,7 @@ def draw(group: SceneClass, number: int) -> DataSet:
         terms["background"] = {
             "strength": {"prior": "lognormal", "median": median, "sigma": 0.5},
             "distance_m": distance,
+            "shadow": SHADOW,
         }
     seen = series(scene, lambda d: _at(plate, radius, d).pose, distances, sensor, rng)
     return DataSet(sensor, Frames(seen.frames.readings), seen.range_m, name, terms)

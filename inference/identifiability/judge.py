@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.identifiability.experiment import Experiment
-from inference.identifiability.prediction import Prediction, log_range_spread
+from inference.identifiability.prediction import Prediction, log_range_spread, predict
 from inference.identifiability.reasons import Diagnosis
 from inference.identifiability.status import Identifiability, status_of
 from simulator.scene import Reference
@@ -21,6 +21,12 @@ _NARROWER = 3.0  # than it predicts: told by the law of the ranges, not by the r
 _LEANING = (
     ", but the readings by themselves only to {:.2g}: the rest is taken from how range_m says that "
     'ranges are spread. Where that is not known, {{"prior": "reference"}} takes nothing from it'
+)
+_HELP = 2.0  # a term is to blame where the scale would be known so many times better with it known
+_ALIKE = (
+    ": {term} and an error of the object's flux of {error:.2g}, as stated by `discrepancy`, look "
+    "alike in these frames and leave it open by {spread:.2g} of itself, more than the error of the "
+    "flux; were {term} known, it would be known to {known:.2g}"
 )
 
 
@@ -93,8 +99,13 @@ def judge(
         strict=True,
     ):
         status = status_of(name, value)
+        alike = _left_open(experiment, spread, prediction) if name == "range_m" else None
+        if alike is not None:
+            status = "not_identified"
         text = _headline(name, status, value)
-        if independent and expected > _NARROWER * value and not name.startswith("range_m."):
+        if alike is not None:
+            text += alike
+        elif independent and expected > _NARROWER * value and not name.startswith("range_m."):
             # the law is an assumption: what it alone tells is not identified by the data
             alone = status_of(name, expected)
             status = "weak" if alone == "identified" else alone
@@ -104,6 +115,26 @@ def judge(
         contraction = 1 - (value / unit) ** 2 if math.isfinite(value) else 0.0
         rows.append(Identifiability(name, status, contraction, text))
     return tuple(rows)
+
+
+def _left_open(
+    experiment: Experiment, spread: Spread, prediction: Prediction | None
+) -> str | None:
+    """Say so where an error of the flux and light that stands still leave the ranges' scale open.
+
+    Unknown crosstalk takes up what a smooth error of the flux bends: all ranges then stretch
+    together, by more than the flux may err, and how far is decided by how right the model is taken
+    to be, not by the readings.
+    """
+    error = experiment.discrepancy
+    if error is None or prediction is None or not spread.scale > error:
+        return None
+    for term in ("crosstalk", "background"):
+        group = tuple(name for name in experiment.parameters.names if name.startswith(term))
+        known = predict(dataclasses.replace(experiment, known=group)).scale_sd
+        if group and _HELP * known < prediction.scale_sd:
+            return _ALIKE.format(term=term, error=error, spread=spread.scale, known=known)
+    return None
 
 
 def _cause(diagnosis: Diagnosis, name: str, spread: float, foreseen: float) -> str:

@@ -66,7 +66,8 @@ def predict(experiment: Experiment, whitener: Array | None = None) -> Prediction
     Parameters
     ----------
     experiment : Experiment
-        Sensor, unknowns, their values, ranges.
+        Sensor, unknowns, their values, ranges. What is ``known`` after all keeps its place: the
+        readings are taken not to depend on it.
     whitener : ndarray, shape (n, 2, 2), optional
         W with W^T W the inverse covariance of a frame's readings; left out: the sensor's.
 
@@ -88,6 +89,7 @@ def predict(experiment: Experiment, whitener: Array | None = None) -> Prediction
         k = experiment.by_error.shape[2]
         jacobian = np.zeros((n, 3, d + k))
         jacobian[:, :2, :d] = np.einsum("nij,njk->nik", whitener, of.by_term) @ change
+        jacobian[:, :2, [p.names.index(name) for name in experiment.known]] = 0.0
         jacobian[:, :2, d:] = np.einsum("nij,njk->nik", whitener, experiment.by_error)
         along = np.zeros((n, 3))
         along[:, :2] = np.einsum("nij,nj->ni", whitener, of.by_range)

@@ -96,3 +96,33 @@ def test_frames_without_object_and_nothing_unknown() -> None:
     z = np.empty((100, 0))
     (row,) = judge_draws(SENSOR, known, z, z, 1e-3 * rng.standard_normal((100, 4)))
     assert (row.parameter, row.status) == ("range_m", "identified")
+
+
+@pytest.mark.parametrize(
+    ("crosstalk", "spread", "status"),
+    [
+        (UNKNOWN_CROSSTALK, 0.10, "not_identified"),
+        (UNKNOWN_CROSSTALK, 0.04, "identified"),
+        ([0.0, 0.0], 0.10, "weak"),
+    ],
+)
+def test_a_scale_left_open_by_crosstalk_and_discrepancy_is_not_identified(
+    crosstalk: list[object], spread: float, status: str
+) -> None:
+    scene = {"range_m": {"prior": "reference", "low": 0.05, "high": 5.0}, "crosstalk": crosstalk}
+    made = parameters_of(SENSOR, parse_scene(scene))
+    rng = np.random.default_rng(7)
+    z = 1e-3 * rng.standard_normal((500, len(made)))
+    scale = spread * rng.standard_normal((500, 1))
+    log_r = np.log(np.linspace(0.2, 0.4, 20)) + 1e-4 * rng.standard_normal((500, 20)) + scale
+
+    def row(discrepancy: float | None) -> Identifiability:
+        return judge_draws(SENSOR, made, z, z, log_r, discrepancy=discrepancy)[-1]
+
+    found = row(0.072)
+    assert found.status == status
+    assert ("crosstalk and an error of the object's flux of 0.072" in found.reason) == (
+        status == "not_identified"
+    )
+    # a model that is stated to be exact cannot be what leaves it open
+    assert "error of the object's flux" not in row(None).reason
