@@ -36,7 +36,7 @@ RADII_M = (0.05, 0.1, 0.2, 0.4, 0.8)
 MATERIALS = {"diffuse": "R00", "glossy": "R01"}
 TILTS = {"T00": ("T00",), "tilted": ("T12", "T06", "T04")}
 # what the scene says of a shadow of which nothing is known: sizes up to metres. The default prior
-# of a shadow ties it to a diffuse object's c0, and that of a glossy one is up to 1e17 times as large
+# of a shadow ties it to the c0 of a diffuse object; a glossy one has up to 1e17 times as much
 SHADOW: Mapping[str, Any] = {
     "c0": {"prior": "lognormal", "median": 0.05, "sigma": 2.0},
     "c1": {"prior": "normal", "mean": 0.0, "sd": 0.5},

@@ -117,9 +117,7 @@ def judge(
     return tuple(rows)
 
 
-def _left_open(
-    experiment: Experiment, spread: Spread, prediction: Prediction | None
-) -> str | None:
+def _left_open(experiment: Experiment, spread: Spread, prediction: Prediction | None) -> str | None:
     """Say so where an error of the flux and light that stands still leave the ranges' scale open.
 
     Unknown crosstalk takes up what a smooth error of the flux bends: all ranges then stretch
