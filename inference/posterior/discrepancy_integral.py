@@ -3,7 +3,7 @@
 For given parameters the log likelihood of all frames is a function of the coefficients alone, each
 frame's range being integrated out exactly under the curve that they make, over all its modes. A
 joint climb in coefficients and ranges, which costs little, comes near the maximum; Newton's method
-on the integrals themselves ends there.
+on the integrals ends there. Where the maximum fits nothing, ranges are Laplace's as well.
 """
 
 import math
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from inference.posterior.collapsed import empty_frame_log_likelihood
 from inference.posterior.curve_table import integration_bounds, tabulate
 from inference.posterior.discrepancy_climb import best_positions, climb_jointly
-from inference.posterior.flux_error import add_mode
+from inference.posterior.flux_error import add_mode, add_row, expand
 from inference.posterior.frame_integral import find_modes, frame_log_likelihood
-from inference.posterior.gaussian import Pair
+from inference.posterior.gaussian import LOG_2PI, Pair, log_top
 from inference.posterior.integrand import WarpedArguments
 from inference.posterior.rows import background_of, crosstalk_of, law_of
 from inference.posterior.triangular import solve_factor, update_factor
@@ -33,6 +33,9 @@ _DONE = 1e-3  # nats below the maximum at which the expansion is good
 # nats that are still to be gained after the climb: parameters that fit nothing, where more would
 # decide nothing; at optima of the coverage study it was seen to end within a nat
 _LOST = 100.0
+# nats a frame that the joint maximum is below a perfect fit: as most parameters of a prior are, whose
+# value only tells a population where to turn
+_HOPELESS = 100.0
 _LONGEST = 1.0  # of a step, in log flux
 _FEW = 1e-5  # weight of a mode that is not looked at
 
@@ -167,6 +170,56 @@ def _newton(
 
 
 @compiled
+def _laplace(
+    values: Array,
+    coefficients: Array,
+    factor: Array,
+    positions: Array,
+    frames: Array,
+    present: NDArray[np.bool_] | None,
+    basis: Array,
+    scene: WarpedArguments,
+) -> float:
+    """Return Laplace's integral over coefficients and ranges around their joint maximum.
+
+    Filled are the frames' shares and the factor of the precision.
+    """
+    _, crosstalk, background, _, r0, wave, read, shot, _, delta = scene
+    n, size = frames.shape[0], coefficients.size
+    fill_curve(delta[0], basis, coefficients)
+    rows = np.zeros((size, n))
+    row = np.empty(size)
+    total = 0.0
+    factor[:] = 0.0
+    for k in range(size):
+        factor[k, k] = 1.0
+        total -= 0.5 * coefficients[k] * coefficients[k]
+    for j in range(n):
+        frame = (frames[j, 0], frames[j, 1], frames[j, 2])
+        if not math.isfinite(positions[j]):
+            values[j] = -math.inf
+            if present is not None and not present[j]:
+                values[j] = empty_frame_log_likelihood(
+                    frame, crosstalk, background, r0, wave, read, shot
+                )
+            total += values[j]
+            continue
+        density, _, bend, _, _, stiff, free, _ = expand(positions[j], frame, *scene)
+        # where nothing bends the range does not follow, and its prior is as wide as it can be
+        values[j] = density + log_top(read)
+        if bend > 0.0:
+            values[j] += 0.5 * (LOG_2PI - math.log(bend))
+        total += values[j]
+        row[:] = 0.0
+        add_row(row, basis, positions[j], delta, math.sqrt(free if bend > 0.0 else stiff))
+        rows[:, j] = row
+    update_factor(factor, rows, n)
+    for k in range(size):
+        total -= math.log(abs(factor[k, k]))
+    return total
+
+
+@compiled
 def integrate_flux_error(
     out: Array,
     centres: Array,
@@ -224,8 +277,13 @@ def integrate_flux_error(
         # a maximum over ranges knows no reference prior, which is a density for integrals
         flat = (shape, crosstalk, background, law[:8], r0, wave, read, shot, relative, delta)
         best_positions(positions, frames, present, bounds, strongest, flat)
-        climb_jointly(centre, positions, frames, bounds, basis, flat)
-        total = _newton(out[i], centre, factor, frames, present, bounds, strongest, basis, scene)
+        best = climb_jointly(centre, positions, frames, bounds, basis, flat)
+        if best < -_HOPELESS * n:
+            total = _laplace(out[i], centre, factor, positions, frames, present, basis, scene)
+        else:
+            total = _newton(
+                out[i], centre, factor, frames, present, bounds, strongest, basis, scene
+            )
         if not math.isfinite(total):
             out[i, :] = -math.inf
             continue

@@ -10,6 +10,7 @@ from scipy import stats
 from inference.posterior import fold
 from inference.posterior.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.discrepant import DiscrepantDensity, with_discrepancy
+from inference.posterior.gaussian import log_top
 from inference.posterior.profile import best_ranges, linearise
 from inference.posterior.ranges import draw_ranges, replicate
 from inference.posterior.settings import SamplerSettings
@@ -158,6 +159,23 @@ def test_far_from_the_data_the_density_stays_finite_and_never_nan() -> None:
     np.testing.assert_array_equal(np.isfinite(found), np.isfinite(plain))
     paired = density.paired_log_likelihood(z[:4], np.array([frames.readings] * 4))
     np.testing.assert_array_equal(paired, density.log_likelihood(z[:4]))
+
+
+def test_where_nothing_fits_laplace_takes_over_without_a_step() -> None:
+    """Beyond a hundred nats a frame; along z the integral stays as far below its maximum."""
+    sensor = sensor_of("pulsed", 1000.0)
+    scene = {
+        "object": {**OBJECT, "c2": {"prior": "lognormal", "median": OBJECT["c2"], "sigma": 0.3}},
+        "range_m": SPAN,
+    }
+    frames = data(sensor, {}, 10, span=(0.4, 1.2)).frames
+    density = density_of(sensor, scene, frames, 0.05)
+    z = np.linspace(6.0, 9.0, 61)[:, None]
+    joint = density.best(z)[0][:, :, 1].sum(axis=1)
+    below = joint - 10 * log_top(density.read)
+    assert below.min() < -1000.0 < below.max()
+    # the ranges are nearly normal: what the curvature leaves out is below half a nat a frame
+    assert np.abs(np.diff(density.log_likelihood(z) - joint)).max() < 5.0
 
 
 def test_the_gradient_of_the_joint_maximum_is_that_of_its_linearisation(kind: str) -> None:
