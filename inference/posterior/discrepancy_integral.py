@@ -33,8 +33,8 @@ _DONE = 1e-3  # nats below the maximum at which the expansion is good
 # nats that are still to be gained after the climb: parameters that fit nothing, where more would
 # decide nothing; at optima of the coverage study it was seen to end within a nat
 _LOST = 100.0
-# nats a frame that the joint maximum is below a perfect fit: as most parameters of a prior are, whose
-# value only tells a population where to turn
+# nats a frame that the joint maximum is below a perfect fit, as for most parameters of a prior:
+# their value only tells a population where to turn
 _HOPELESS = 100.0
 _LONGEST = 1.0  # of a step, in log flux
 _FEW = 1e-5  # weight of a mode that is not looked at
