@@ -14,6 +14,8 @@ from benchmarks.calibration.uniformity import chi_square_p
 __all__ = ["ALARM", "CellRanks", "cell_ranks", "report"]
 
 ALARM = 0.05  # of the whole study
+_MISFIT = 1e-3  # `fit.p_value` below which a misfit is said
+_LEVELS = (_MISFIT, 0.01, 0.05)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -28,8 +30,8 @@ class CellRanks:
         By quantity; data sets that were refused are missing.
     converged, refused : int
         How many data sets converged; how many were refused an answer.
-    misfits : int
-        Converged data sets of which the posterior says that the model does not fit.
+    fit_p : ndarray
+        ``fit.p_value`` of the converged ones.
     least_ess : int
         Fewest effective draws among converged data sets.
     reasons : tuple of str
@@ -42,7 +44,7 @@ class CellRanks:
     ranks: dict[str, NDArray[np.int64]]
     converged: int
     refused: int
-    misfits: int
+    fit_p: NDArray[np.float64]
     least_ess: int
     reasons: tuple[str, ...]
     versions: tuple[str, ...]
@@ -51,6 +53,11 @@ class CellRanks:
     def sets(self) -> int:
         """Number of data sets that have ranks."""
         return len(next(iter(self.ranks.values())))
+
+    @property
+    def misfits(self) -> int:
+        """Number of converged data sets whose posterior says that the model does not fit."""
+        return int(np.sum(self.fit_p < _MISFIT))
 
     @property
     def p_values(self) -> dict[str, float]:
@@ -79,7 +86,7 @@ def cell_ranks(cell: Cell, rows: Sequence[dict[str, str]]) -> CellRanks:
         {name: np.array([int(row[name]) for row in ranked], dtype=np.int64) for name in names},
         len(settled),
         len(rows) - len(ranked),
-        sum(float(row["fit_p"]) < 1e-3 for row in settled),
+        np.array([float(row["fit_p"]) for row in settled]),
         min((int(row["ess"]) for row in settled), default=0),
         tuple(f"{reason} ({count})" for reason, count in reasons.most_common()),
         tuple(sorted({row["version"] for row in rows})),
@@ -114,6 +121,12 @@ def report(found: Sequence[CellRanks]) -> str:
     limit = f"0.05 / {tests} tests = {ALARM / tests:.2g}"
     verdict = "no p-value" if not failed else f"{len(failed)} p-values"
     lines += ["", f"{verdict} below {limit}", *failed]
+    fit_p = np.concatenate([cell.fit_p for cell in found])
+    shares = ", ".join(
+        f"{level:g} in {np.sum(fit_p < level)} ({level * fit_p.size:.3g} if it were even)"
+        for level in _LEVELS
+    )
+    lines += ["", f"fit.p_value of {fit_p.size} posteriors of healthy data is below {shares}"]
     open_sets = [f"{c.cell.name}: {reason}" for c in found for reason in c.reasons]
     lines += ["", "not converged:" if open_sets else "every data set converged", *open_sets]
     versions = sorted({version for cell in found for version in cell.versions})

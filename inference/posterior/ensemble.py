@@ -1,6 +1,7 @@
 """One ensemble of walkers: its state, and the pure step that carries it on."""
 
 import dataclasses
+import math
 from typing import Any
 
 import emcee
@@ -13,6 +14,9 @@ from inference.posterior.proposal import Proposal
 __all__ = ["Ensemble", "advance", "new_ensemble", "restart"]
 
 Array = NDArray[np.float64]
+
+_SHORT = 0.1  # times the step that suits a normal posterior (ter Braak 2006)
+
 Stream = tuple[NDArray[np.uint32], int, int, float]
 
 
@@ -103,13 +107,19 @@ def restart(ensemble: Ensemble, old: Proposal, new: Proposal) -> Ensemble:
 
 
 def _moves(proposal: Proposal) -> list[tuple[Any, float]]:
-    """Independent jumps, and local moves that know nothing of the optima or the map's fit."""
+    """Independent jumps, and local moves that know nothing of the optima or the map's fit.
+
+    Where the posterior is narrower than the ensemble is wide, as at the ends of a curved sheet, all
+    steps of the ensemble's own width fail: a walker that gets there leaves by short ones.
+    """
     rest = 1.0 - proposal.share
+    short = _SHORT * 2.38 / math.sqrt(2.0 * proposal.optima.centres.shape[1])
     return [
         (emcee.moves.MHMove(proposal.propose), proposal.share),
-        (emcee.moves.DEMove(sigma=0.2), 0.4 * rest),
-        (emcee.moves.DESnookerMove(), 0.2 * rest),
-        (emcee.moves.StretchMove(), 0.4 * rest),
+        (emcee.moves.DEMove(sigma=0.2), 0.3 * rest),
+        (emcee.moves.DEMove(sigma=0.5, gamma0=short), 0.3 * rest),
+        (emcee.moves.DESnookerMove(), 0.1 * rest),
+        (emcee.moves.StretchMove(), 0.3 * rest),
     ]
 
 

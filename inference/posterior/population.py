@@ -24,7 +24,7 @@ __all__ = ["Population", "carried", "first_population", "temper"]
 
 Array = NDArray[np.float64]
 
-_SIZE = 512
+_SIZE = 384
 _SCREEN = 4  # times as many are drawn from the prior
 _REFIT = 4  # sweeps with one map
 _MOST_SWEEPS = 20

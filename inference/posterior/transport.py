@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from inference.posterior.triangular import update_factor
 from simulator.compiled import compiled
 
 __all__ = ["TriangularMap", "fit_map"]
@@ -163,12 +164,16 @@ def _features(w: Array, k: int, quadratic: bool, cubic: int) -> Array:
 
 def _ridge(features: Array, target: Array, strength: float) -> Array:
     """Least squares with scaled columns, all but the constant drawn towards zero."""
+    n, k = features.shape
     scale = np.sqrt(np.mean(features**2, axis=0))
     scale = np.where(scale > 0, scale, 1.0)
-    penalty = math.sqrt(strength) * np.eye(features.shape[1])[1:]
-    stacked = np.concatenate([features / scale, penalty])
-    right = np.concatenate([target, np.zeros(len(penalty))])
-    return np.asarray(linalg.lstsq(stacked, right)[0] / scale)
+    rows = np.empty((k + 1, n))
+    rows[:k], rows[k] = (features / scale).T, target
+    factor = math.sqrt(strength) * np.eye(k + 1)
+    factor[0, 0] = factor[k, k] = 0.0
+    # not LAPACK: the threads that it starts for so small a problem cost twice what they do
+    update_factor(factor, rows, n)
+    return np.asarray(linalg.solve_triangular(factor[:k, :k], factor[:k, k]) / scale)
 
 
 def fit_map(draws: Array) -> TriangularMap:
