@@ -227,8 +227,14 @@ def weigh(density: CollapsedDensity, rng: np.random.Generator) -> Weighed:
     populations = [carried(density, rng) for _ in range(2)]
     calls += sum(each.calls for each in populations)
     members = np.concatenate([each.z for each in populations])
-    if not len(members):  # the prior hardly ever explains the frames: only the optima are known
-        return _by_importance(weighted, laplace, (constant, constant_error), calls)
+    if not len(members):
+        # the prior hardly ever explains the frames: only the optima are known, and two accounts of
+        # them are as far off as they differ
+        rough = float(special.logsumexp([optimum.log_mass for optimum in optima]))
+        apart = abs(weighted.log_evidence - rough)
+        return _by_importance(
+            weighted, laplace, (constant, math.hypot(constant_error, apart)), calls
+        )
     weighted = draw_weighted(density, adapt(laplace, members), rng, _MAPPED_DRAWS)
     calls += _MAPPED_DRAWS
     if _trusted(weighted):

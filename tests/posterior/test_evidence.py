@@ -15,6 +15,8 @@ from inference.posterior.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.cross_validation import cross_validate
 from inference.posterior.evidence import log_prior_mass, weigh
 from inference.posterior.leave_one_out import leave_one_out
+from inference.posterior.population import Population
+from inference.posterior.start import find_optima
 from inference.posterior.static import with_common_range
 from simulator.parameters import parameters_of
 from simulator.scene import parse_scene
@@ -100,6 +102,23 @@ def test_evidence_by_bridge_agrees_with_quadrature(
     assert found.k_hat is None
     assert abs(found.log_evidence - wanted) < 5 * found.error + 1e-3
     assert found.error < 0.1
+
+
+def test_where_populations_die_the_error_is_what_two_accounts_differ_by(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    density = density_of("crosstalk")
+    none = np.empty((0, 2))
+    dead = Population(none, none[:, 0], none[:, 0], 0.0, 0.0, 1, 0)
+    monkeypatch.setattr(evidence, "_MAX_K_HAT", -math.inf)  # as if weights could not be trusted
+    monkeypatch.setattr(evidence, "carried", lambda *_: dead)
+    found = weigh(density, np.random.default_rng(5)).evidence
+    (optimum,) = find_optima(density, np.random.default_rng(5))
+    laplace = optimum.log_mass - math.log(2 * math.pi)  # two unknowns with standard normal priors
+    assert found.k_hat is not None
+    # optima are found to a hundredth of a standard deviation: 1e-3 nat
+    assert found.error >= abs(found.log_evidence - laplace) - 1e-3
+    assert abs(found.log_evidence - laplace) > 1e-3
 
 
 @pytest.mark.parametrize("name", ["c2", "crosstalk"])
