@@ -45,7 +45,6 @@ SHADOW: Mapping[str, Any] = {
 SUPPORT = {"low": 0.02, "high": 15.0}
 TERMS: Mapping[str, Mapping[str, Any]] = {
     "without": {},
-    "stroke": {"range_m": {"prior": "stroke", **SUPPORT}, "discrepancy": "default"},
     "with": {"range_m": {"prior": "reference", **SUPPORT}, "discrepancy": "default"},
 }
 
@@ -141,7 +140,7 @@ def draw(group: SceneClass, number: int) -> DataSet:
     The stroke starts at 0.1 to 0.4 m and ends 2 to 6 times as far; positions are spread evenly in
     log r within it. Crosstalk is normal with a tenth of the signal in the stroke's middle, and
     inference is told three tenths; the strength of a background is known to a factor exp(0.5), its
-    distance exactly, its shadow not at all.
+    distance exactly, of its shadow that it is up to metres wide.
 
     Parameters
     ----------
