@@ -99,9 +99,10 @@ def judge(
         strict=True,
     ):
         status = status_of(name, value)
-        alike = _left_open(experiment, spread, prediction) if name == "range_m" else None
-        if alike is not None:
-            status = "not_identified"
+        alike = None
+        if name == "range_m" and status == "weak":
+            alike = _left_open(experiment, spread, prediction)
+            status = "weak" if alike is None else "not_identified"
         text = _headline(name, status, value)
         if alike is not None:
             text += alike
@@ -129,8 +130,10 @@ def _left_open(experiment: Experiment, spread: Spread, prediction: Prediction | 
         return None
     for term in ("crosstalk", "background"):
         group = tuple(name for name in experiment.parameters.names if name.startswith(term))
+        if not group:
+            continue
         known = predict(dataclasses.replace(experiment, known=group)).scale_sd
-        if group and _HELP * known < prediction.scale_sd:
+        if _HELP * known < prediction.scale_sd:
             return _ALIKE.format(term=term, error=error, spread=spread.scale, known=known)
     return None
 
