@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from inference.posterior.collapsed import empty_frame_log_likelihood
 from inference.posterior.curve_table import integration_bounds, tabulate
+from inference.posterior.frame_integral import log_add
 from inference.posterior.gaussian import Pair, log_top
 from inference.posterior.integrand import (
     SceneArguments,
@@ -121,13 +122,6 @@ def _panel(start: float, width: float, frames: Array, scene: SceneArguments) -> 
 
 
 @compiled
-def _add(first: float, second: float) -> float:
-    """Return log(exp(first) + exp(second))."""
-    large, small = max(first, second), min(first, second)
-    return large + math.log1p(math.exp(small - large)) if small > -math.inf else large
-
-
-@compiled
 def _integrate(mode: Array, best: float, frames: Array, scene: SceneArguments) -> float:
     """Integrate a mode's interval by panels that march outward, each checked by its halves."""
     total = -math.inf
@@ -146,13 +140,13 @@ def _integrate(mode: Array, best: float, frames: Array, scene: SceneArguments) -
                 half = 0.5 * sign * width
                 near, high1 = _panel(edge, half, frames, scene)
                 far, high2 = _panel(edge + half, half, frames, scene)
-                both = _add(near, far)
+                both = log_add(near, far)
                 error = abs(math.expm1(both - mass)) if mass > -math.inf else 0.0
                 mass, highest = both, max(high1, high2)
                 if error <= 1e-6 + 1e-14 * abs(mass) or abs(half) < 1e-14 * (1.0 + abs(edge)):
                     break
                 width, mass, highest = 0.5 * width, near, high1
-            total = _add(total, mass)
+            total = log_add(total, mass)
             edge += sign * width
             if highest < best - _NEGLIGIBLE:
                 break
@@ -259,7 +253,7 @@ def integrate_common_range(
             modes[k, 5] = -math.inf
             if modes[k, 1] > modes[best, 1] - _NEGLIGIBLE:
                 modes[k, 5] = _integrate(modes[k], modes[best, 1], seen, scene)
-            total = _add(total, modes[k, 5])
+            total = log_add(total, modes[k, 5])
         constant = seen.shape[0] * log_top(read) + empty
         out[i] = total + constant
         tops[i, 0], tops[i, 2] = modes[best, 0], modes[best, 2]

@@ -24,6 +24,7 @@ __all__ = [
     "falls_off",
     "find_modes",
     "frame_log_likelihood",
+    "log_add",
 ]
 
 Array = NDArray[np.float64]
@@ -262,7 +263,7 @@ def _panel(
 
 
 @compiled
-def _add(first: float, second: float) -> float:
+def log_add(first: float, second: float) -> float:
     """Return log(exp(first) + exp(second))."""
     large, small = max(first, second), min(first, second)
     return large + math.log1p(math.exp(small - large)) if small > -math.inf else large
@@ -309,7 +310,7 @@ def _march(
                 half = 0.5 * sign * width
                 near, high1 = _panel(edge, half, frame, scene)
                 far, high2 = _panel(edge + half, half, frame, scene)
-                both = _add(near, far)
+                both = log_add(near, far)
                 error = abs(math.expm1(both - mass)) if mass > -math.inf else 0.0
                 mass, highest = both, max(high1, high2)
                 # a log mass of a million nats is itself known to no better than its rounding, and a
@@ -317,7 +318,7 @@ def _march(
                 if error <= allowed + 1e-14 * abs(mass) or abs(half) < 1e-14 * (1.0 + abs(edge)):
                     break
                 width, mass, highest, last = 0.5 * width, near, high1, False
-            total = _add(total, mass)
+            total = log_add(total, mass)
             edge += sign * width
             if last or highest < best - _NEGLIGIBLE:
                 break
@@ -361,5 +362,5 @@ def frame_log_likelihood(
             else:
                 mass = _march(modes[j], best, frame, scene)
         modes[j, 5] = mass
-        total = _add(total, mass)
+        total = log_add(total, mass)
     return log_top(scene[6]) + total

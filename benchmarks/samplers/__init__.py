@@ -1,0 +1,1 @@
+"""Samplers on one density in one run."""

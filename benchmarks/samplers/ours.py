@@ -1,0 +1,54 @@
+"""This project's sampler, and the reference that a long run of it leads to."""
+
+import dataclasses
+import math
+import time
+
+import numpy as np
+
+from benchmarks.samplers.outcome import Outcome, enough, equal, judged
+from inference.posterior import fold
+from inference.posterior.importance import draw_weighted
+from inference.posterior.job import chains
+from inference.posterior.proposal import Proposal, mixture_of
+from inference.posterior.transport import fit_map
+
+
+def ours(job, cap):  # type: ignore[no-untyped-def]
+    begin = time.process_time()
+    checkpoint, earlier = fold.start(job), ""
+    while time.process_time() - begin < cap:
+        tasks = fold.tasks(job, checkpoint)
+        if not tasks:
+            break
+        checkpoint = fold.merge(job, checkpoint, [fold.run(task) for task in tasks])
+        if not earlier and enough(checkpoint.ess or 0.0, checkpoint.r_hat or math.inf):
+            earlier = f"ESS and R-hat after {time.process_time() - begin:.1f} s"
+    posterior = fold.summarise(job, checkpoint, 0.0, 0.0)
+    seconds = time.process_time() - begin
+    note = "; ".join(filter(None, [earlier, *posterior.verdict.reasons]))
+    if not checkpoint.ensembles or checkpoint.ensembles[0].steps < 4:
+        empty = np.empty((0, len(job.density().parameters)))
+        return Outcome(seconds, False, 0.0, math.inf, empty, np.empty(0), note), checkpoint
+    kept = chains(job, checkpoint).z
+    ess, r_hat = judged(kept)
+    return Outcome(seconds, posterior.verdict.converged, ess, r_hat, *equal(kept), note), checkpoint
+
+
+def reference(job, density, optima, cap):  # type: ignore[no-untyped-def]
+    """Mean and sd of every z, and what they rest on."""
+    long = job.settings.model_copy(update={"target_ess": 2000, "seed": job.seed + 1000})
+    outcome, _ = ours(dataclasses.replace(job, settings=long), cap)
+    rng = np.random.default_rng(job.seed + 2000)
+    pilot = outcome.z[rng.integers(0, len(outcome.z), 20_000)]
+    weighted = draw_weighted(
+        density, Proposal(mixture_of(optima), fit_map(pilot), 1.0), rng, 30_000
+    )
+    if weighted.k_hat < 0.7:
+        z, w = weighted.z, weighted.weights
+        basis = f"importance sampling, k-hat {weighted.k_hat:.2f}, ESS {weighted.ess:.0f}"
+    else:
+        z, w = outcome.z, outcome.weights
+        basis = f"a run of ours of {outcome.seconds:.0f} s (importance k-hat {weighted.k_hat:.2f})"
+    mean = w @ z
+    return mean, np.sqrt(w @ (z - mean) ** 2), basis

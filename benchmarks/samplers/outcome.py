@@ -1,0 +1,39 @@
+"""What a sampler reached, judged for all by the same functions."""
+
+import dataclasses
+
+import numpy as np
+
+from inference.posterior.diagnostics import effective_sample_size, split_r_hat
+
+TARGET_ESS = 400
+TARGET_R_HAT = 1.01
+
+
+@dataclasses.dataclass
+class Outcome:
+    """What a sampler reached: cost, and weighted draws of the globals in z."""
+
+    seconds: float
+    reached: bool
+    ess: float
+    r_hat: float
+    z: np.ndarray
+    weights: np.ndarray
+    note: str = ""
+
+
+def judged(z):  # type: ignore[no-untyped-def]
+    """Least effective sample size and largest R-hat of (chains, walkers, steps, d)."""
+    columns = np.moveaxis(z, -1, 0)
+    sizes = [effective_sample_size(x) for x in columns]
+    return float(np.nan_to_num(min(sizes))), float(max(split_r_hat(x) for x in columns))
+
+
+def equal(z):  # type: ignore[no-untyped-def]
+    flat = z.reshape(-1, z.shape[-1])
+    return flat, np.full(len(flat), 1 / len(flat))
+
+
+def enough(ess, r_hat):  # type: ignore[no-untyped-def]
+    return ess >= TARGET_ESS and r_hat <= TARGET_R_HAT
