@@ -16,59 +16,10 @@ from simulator.scene import Background, ObjectTerm, Scene, Shadow, Stroke, check
 from simulator.sensor import parse_sensor
 from simulator.trajectories import RadialTrajectory, SampledTrajectory
 from simulator.validated import parse
+from tests.simulator.documents import LAWS, SCENES, SENSORS, WALL
 from tests.simulator.pointers import leads_somewhere
 
 NOISE: dict[str, Any] = {"read": [1e-6, 1e-6]}
-SENSORS: dict[str, dict[str, Any]] = {
-    "pulsed": {
-        "kind": "pulsed",
-        "pulse_width_s": 1e-7,
-        "gain": 1.0,
-        "noise": {"read": [1e-6, 1e-6], "shot": 0.0, "relative": 0.0},
-    },
-    "sine_wave": {
-        "kind": "sine_wave",
-        "frequency_hz": 5e6,
-        "phase_offset_rad": 0.0,
-        "gain": 1.0,
-        "noise": {"read": [1e-6, 1e-6], "derivative": [1e-5, 1e-5]},
-        "full_scale": [1.0, 2.0],
-    },
-}
-LAWS: dict[str, dict[str, Any]] = {
-    "uniform": {"prior": "uniform", "low": 0.02, "high": 5.0},
-    "loguniform": {"prior": "loguniform", "low": 0.02, "high": 5.0},
-    "normal": {"prior": "normal", "mean": 1.0, "sd": 0.1},
-    "halfnormal": {"prior": "halfnormal", "sd": 1.0},
-    "lognormal": {"prior": "lognormal", "median": 0.1, "sigma": 1.0},
-    "truncated_normal": {
-        "prior": "truncated_normal",
-        "mean": 1.0,
-        "sd": 0.1,
-        "low": 0.5,
-        "high": 2.0,
-    },
-}
-WALL: dict[str, Any] = {"strength": 0.8, "distance_m": 3.0}
-SCENES: list[dict[str, Any]] = [
-    {},
-    {
-        "object": {"c0": 0.0769, "c1": -0.123, "c2": LAWS["lognormal"]},
-        "crosstalk": [0.02, 0.5],
-        "background": WALL | {"shadow": {"c0": 0.056, "c1": 0.013}},
-        "range_m": LAWS["uniform"],
-        "motion": "radial",
-        "discrepancy": 0.05,
-    },
-    *({"object": {"c0": law, "c1": law, "c2": law}, "range_m": law} for law in LAWS.values()),
-    {"crosstalk": [LAWS["normal"], 0]},
-    {"crosstalk": {"values": [LAWS["normal"], 0.5], "optional": True}},
-    {"background": WALL | {"shadow": "object", "optional": True}, "motion": "tangential"},
-    {"background": {"strength": LAWS["lognormal"], "distance_m": LAWS["uniform"]}},
-    {"background": WALL | {"shadow": {"c1": LAWS["halfnormal"]}}, "motion": "static"},
-    {"range_m": {"prior": "stroke", "low": 0.1, "high": 3.0}},
-    {"range_m": {"prior": "reference", "low": 0.1, "high": 3.0}},
-]
 
 
 @pytest.mark.parametrize("document", SENSORS.values(), ids=SENSORS)
@@ -337,82 +288,6 @@ def test_a_wrong_column_or_trajectory(model: Any, document: Any, pointer: str) -
     with pytest.raises(InvalidInputError) as caught:
         parse(model, document)
     assert _pointers(caught.value) == [pointer]
-
-
-NAMES = sorted(
-    {name for law in LAWS.values() for name in law}
-    | set(SENSORS["pulsed"])
-    | set(SENSORS["sine_wave"])
-    | set(Scene.model_fields)
-    | set(ObjectTerm.model_fields)
-    | set(Background.model_fields)
-    | {"values", "read", "shot", "a/b", "~"}
-)
-WORDS = [*LAWS, *SENSORS, "stroke", "reference", "object", "radial"]
-numbers = st.floats() | st.integers(-(2**70), 2**70) | st.just(10**400)
-scalars = st.none() | st.booleans() | numbers | st.text(max_size=4) | st.sampled_from(WORDS)
-anything = st.recursive(
-    scalars,
-    lambda inner: (
-        st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(NAMES), inner, max_size=4)
-    ),
-    max_leaves=10,
-)
-examples = st.sampled_from([*SCENES, *SENSORS.values()])
-
-
-def _places(value: Any, way: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    children: Any = []
-    if isinstance(value, dict):
-        children = value.items()
-    elif isinstance(value, list):
-        children = enumerate(value)
-    return [way, *(place for key, child in children for place in _places(child, (*way, key)))]
-
-
-@st.composite
-def spoiled(draw: st.DrawFn) -> Any:
-    """Draw a valid document with one part replaced, or with one member more."""
-    document = copy.deepcopy(draw(examples))
-    way = draw(st.sampled_from(_places(document)))
-    if not way:
-        return draw(anything)
-    here: Any = document
-    for key in way[:-1]:
-        here = here[key]
-    last = way[-1]
-    if isinstance(here, dict) and draw(st.booleans()):
-        last = draw(st.sampled_from(NAMES))
-    here[last] = draw(anything)
-    return document
-
-
-@settings(deadline=None)
-@given(spoiled() | anything, st.sampled_from([parse_scene, parse_sensor]))
-def test_any_json_is_valid_or_named(document: Any, parse_one: Any) -> None:
-    problems: tuple[Problem, ...] = ()
-    try:
-        assert parse_one(document).model_dump()
-    except InvalidInputError as error:
-        problems = error.problems
-    else:
-        return
-    assert problems
-    for problem in problems:
-        assert problem.message
-        assert leads_somewhere(problem.pointer, document), problem
-
-
-@settings(deadline=None)
-@given(spoiled())
-def test_any_scene_passes_the_check_or_is_named(document: Any) -> None:
-    for kind in SENSORS:
-        problems: tuple[Problem, ...] = ()
-        try:
-            check_scene(parse_sensor(SENSORS[kind]), parse_scene(document))
-        except InvalidInputError as error:
-            problems = error.problems
-        assert all(leads_somewhere(problem.pointer, document) for problem in problems)
 
 
 def test_errors_say_where_and_what() -> None:
