@@ -40,8 +40,8 @@ calibrate: $(READY) ## Simulation-based calibration: goes on where it stopped, t
 coverage: $(READY) ## Intervals against exact optics and recorded photons: goes on where it stopped
 	$(BIN)/python -m benchmarks.coverage --workers 2
 
-# two workers on two cores: a library that starts threads of its own only makes them wait
-test fast: export OPENBLAS_NUM_THREADS = 1
+# two processes on two cores: a library that starts threads of its own only makes them wait
+calibrate coverage test fast: export OPENBLAS_NUM_THREADS = 1
 
 test: $(READY) ## Run every test
 	$(BIN)/python -m pytest -n 2 --dist loadgroup

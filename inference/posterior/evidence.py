@@ -8,6 +8,7 @@ dimension: priors normalised, joint truncations included.
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -188,7 +189,9 @@ def resample(weighted: WeightedDraws, rng: np.random.Generator, n: int) -> NDArr
     return chosen
 
 
-def weigh(density: CollapsedDensity, rng: np.random.Generator) -> Weighed:
+def weigh(
+    density: CollapsedDensity, rng: np.random.Generator, fitted: Sequence[Optimum] = ()
+) -> Weighed:
     """Estimate the evidence of a model.
 
     Parameters
@@ -197,6 +200,8 @@ def weigh(density: CollapsedDensity, rng: np.random.Generator) -> Weighed:
         Its collapsed density.
     rng : numpy.random.Generator
         Source of randomness.
+    fitted : sequence of Optimum
+        Maxima of the density that are known beforehand.
 
     Returns
     -------
@@ -208,7 +213,7 @@ def weigh(density: CollapsedDensity, rng: np.random.Generator) -> Weighed:
         value = float(density(np.empty((1, 0)))[0])
         return Weighed(Evidence(value, 0.0, None), np.empty((1, 0)), np.zeros(1), None, 1)
     constant, constant_error = _constant(density.parameters, rng)
-    optima = find_optima(density, rng)
+    optima = [*find_optima(density, rng), *fitted]
     population = temper(density, rng, _POPULATION)
     calls = population.calls
     if len(population.z):

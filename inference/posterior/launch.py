@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from inference.posterior.checks import check_best_fit
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.ensemble import Ensemble, new_ensemble
+from inference.posterior.fitted import fitted_optima
 from inference.posterior.importance import MAX_K_HAT, WeightedDraws, draw_weighted
 from inference.posterior.job import Checkpoint, Job
 from inference.posterior.proposal import Proposal, mixture_of
@@ -62,6 +63,8 @@ def start(job: Job) -> Checkpoint:
             raise RefusedError("no range allowed by the scene explains every frame")
         return Checkpoint("importance", None, None, calls=1, verdict=known, finished=True)
     optima = find_optima(density, job.stream(0))
+    for fitted in fitted_optima(job, density):
+        optima = _with(optima, fitted)
     tempered, calls = tempered_walkers(_thinned(density), job.stream(1), WALKERS)
     if len(tempered):
         optima = _with(optima, refine(density, climb(density, tempered[0])[0]))

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Checkpoint, Job
 from inference.posterior.selection import (
     Candidate,
@@ -81,8 +82,10 @@ def run_assessment(task: AssessTask) -> Candidate:
     """Assess one candidate."""
     job = task.job
     terms = candidate_terms(job.scene)[task.index]
-    density = dataclasses.replace(job, scene=reduced(job.scene, terms)).density()
-    return assess(terms, density, job.stream(_STREAM + task.index))
+    job = dataclasses.replace(job, scene=reduced(job.scene, terms))
+    density = job.density()
+    fitted = fitted_optima(job, density) if len(density.parameters) else []
+    return assess(terms, density, job.stream(_STREAM + task.index), fitted)
 
 
 def take_in(job: Job, checkpoint: Checkpoint, candidates: tuple[Candidate, ...]) -> Checkpoint:

@@ -17,6 +17,7 @@ from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.cross_validation import cross_validate
 from inference.posterior.evidence import weigh
 from inference.posterior.leave_one_out import MAX_K_HAT, standard_error
+from inference.posterior.start import Optimum
 from simulator.scene import Crosstalk, Scene
 
 __all__ = [
@@ -181,7 +182,10 @@ def reduced(scene: Scene, terms: Sequence[str]) -> Scene:
 
 
 def assess(
-    terms: tuple[str, ...], density: CollapsedDensity, rng: np.random.Generator
+    terms: tuple[str, ...],
+    density: CollapsedDensity,
+    rng: np.random.Generator,
+    fitted: Sequence[Optimum] = (),
 ) -> Candidate:
     """Assess one candidate.
 
@@ -193,12 +197,14 @@ def assess(
         Of the scene that `reduced` makes with them.
     rng : numpy.random.Generator
         Source of randomness.
+    fitted : sequence of Optimum
+        Maxima of the density that are known beforehand.
 
     Returns
     -------
     Candidate
     """
-    weighed = weigh(density, rng)
+    weighed = weigh(density, rng, fitted)
     predicted, calls = cross_validate(density, weighed, rng)
     return Candidate(
         terms,

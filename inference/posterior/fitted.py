@@ -1,0 +1,53 @@
+"""Optima of the fit over all frames as starting points of a posterior.
+
+The fit (`inference.multiframe`) knows no priors, but its multistart guesses ranges as well as
+unknowns and finds its way where the readings lie a million times above their noise: the screen of
+the prior then sees only false valleys, which can lie thousands of nats below the true one.
+"""
+
+import numpy as np
+
+from inference.multiframe.multistart import find_optima
+from inference.multiframe.problem import fit_problem
+from inference.posterior.collapsed import CollapsedDensity
+from inference.posterior.job import Job
+from inference.posterior.start import Optimum, climb, refine
+
+__all__ = ["fitted_optima"]
+
+_MOST = 3
+_DEVIANCE = 100.0  # above the best: what priors could make up for
+_FARTHEST = 6.0  # standard deviations of a prior at which a climb starts
+
+
+def fitted_optima(job: Job, density: CollapsedDensity) -> list[Optimum]:
+    """Find maxima of the collapsed density from the optima of the fit over all frames.
+
+    Parameters
+    ----------
+    job : Job
+        What was read, by what, of what.
+    density : CollapsedDensity
+        Of the same.
+
+    Returns
+    -------
+    list of Optimum
+        Not sorted, some of them perhaps the same; empty where the fit has other unknowns, as for an
+        object at rest or ranges whose law is unknown.
+    """
+    names = density.parameters.names
+    if job.scene.motion != "radial":
+        return []
+    problem = fit_problem(job.sensor, job.scene, job.frames.select(job.usable))
+    if problem.names != names:
+        return []
+    fits = find_optima(problem)
+    found = []
+    for fit in fits[:_MOST]:
+        if not fit.deviance < fits[0].deviance + _DEVIANCE:
+            break
+        z = density.parameters.standard(problem.natural(fit.x)[None])[0]
+        start = np.clip(np.nan_to_num(z), -_FARTHEST, _FARTHEST)
+        found.append(refine(density, climb(density, start)[0]))
+    return [optimum for optimum in found if optimum is not None]
