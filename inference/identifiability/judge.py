@@ -26,8 +26,9 @@ _HELP = 2.0  # a term is to blame where the scale would be known so many times b
 _ALIKE = (
     ": {term} and an error of the object's flux of {error:.2g}, as stated by `discrepancy`, look "
     "alike in these frames and leave it open by {spread:.2g} of itself, more than the error of the "
-    "flux; were {term} known, it would be known to {known:.2g}"
+    "flux; were {term} known{how}, it would be known to {known:.2g}"
 )
+_STATIC = {"crosstalk": ", as frames without the object tell it", "background": ""}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -128,13 +129,13 @@ def _left_open(experiment: Experiment, spread: Spread, prediction: Prediction | 
     error = experiment.discrepancy
     if error is None or prediction is None or not spread.scale > error:
         return None
-    for term in ("crosstalk", "background"):
+    for term, how in _STATIC.items():
         group = tuple(name for name in experiment.parameters.names if name.startswith(term))
         if not group:
             continue
         known = predict(dataclasses.replace(experiment, known=group)).scale_sd
         if _HELP * known < prediction.scale_sd:
-            return _ALIKE.format(term=term, error=error, spread=spread.scale, known=known)
+            return _ALIKE.format(term=term, how=how, error=error, spread=spread.scale, known=known)
     return None
 
 
