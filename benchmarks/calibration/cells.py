@@ -107,7 +107,7 @@ def _cells() -> Mapping[str, Cell]:
             elif scene == HARDEST:
                 # a hundred effective draws came so soon there that tails were not yet drawn: a true
                 # quantile of 0.93 ranked 99 of 99
-                cells.append(Cell(kind, scene, 1000.0, 12, 100, 400, 4))
+                cells.append(Cell(kind, scene, 1000.0, 12, 50, 400, 4))
             else:
                 cells.append(Cell(kind, scene, 1000.0, 12, 50, 100, 4))
     return {cell.slug: cell for cell in cells}

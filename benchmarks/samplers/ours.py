@@ -11,6 +11,7 @@ from inference.posterior import fold
 from inference.posterior.importance import draw_weighted
 from inference.posterior.job import chains
 from inference.posterior.proposal import Proposal, mixture_of
+from inference.posterior.shear import shear_of
 from inference.posterior.transport import fit_map
 
 
@@ -42,7 +43,7 @@ def reference(job, density, optima, cap):  # type: ignore[no-untyped-def]
     rng = np.random.default_rng(job.seed + 2000)
     pilot = outcome.z[rng.integers(0, len(outcome.z), 20_000)]
     weighted = draw_weighted(
-        density, Proposal(mixture_of(optima), fit_map(pilot), 1.0), rng, 30_000
+        density, Proposal(mixture_of(optima), fit_map(pilot, shear_of(density)), 1.0), rng, 30_000
     )
     if weighted.k_hat < 0.7:
         z, w = weighted.z, weighted.weights

@@ -14,6 +14,7 @@ from inference.posterior.importance import WeightedDraws
 from inference.posterior.population import Population
 from inference.posterior.proposal import Mixture, Proposal
 from inference.posterior.selection import Candidate, Decision, Selection
+from inference.posterior.shear import Shear
 from inference.posterior.transport import TriangularMap
 from inference.posterior.verdict import Verdict
 from simulator.frames import Frames
@@ -64,6 +65,7 @@ _PARTS = {
         Population,
         Proposal,
         Selection,
+        Shear,
         TriangularMap,
         Verdict,
         WeightedDraws,

@@ -58,7 +58,7 @@ def _predict(
     n = int(np.clip(_MOST_EVALUATIONS / len(density.frames), _LEAST_DRAWS, _DRAWS))
     best, k_hat, calls = -np.inf, np.inf, 0
     for _ in range(_ROUNDS):
-        weighted = draw_weighted(others, adapt(laplace, pilot), rng, n)
+        weighted = draw_weighted(others, adapt(laplace, pilot, others), rng, n)
         calls += n
         if weighted.k_hat < k_hat:
             inside = weighted.weights > 0

@@ -20,6 +20,7 @@ from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.importance import WeightedDraws, draw_weighted
 from inference.posterior.population import Population, carried
 from inference.posterior.proposal import Mixture, Proposal, mixture_of
+from inference.posterior.shear import shear_of
 from inference.posterior.start import Optimum, climb, find_optima, refine
 from inference.posterior.tempering import temper
 from inference.posterior.transport import fit_map
@@ -146,7 +147,7 @@ def _distinct(optima: list[Optimum]) -> list[Optimum]:
     return kept
 
 
-def adapt(laplace: Mixture, pilot: Array) -> Mixture | Proposal:
+def adapt(laplace: Mixture, pilot: Array, density: CollapsedDensity) -> Mixture | Proposal:
     """Adapt a proposal to pilot draws, of which many may be equal.
 
     Parameters
@@ -155,6 +156,8 @@ def adapt(laplace: Mixture, pilot: Array) -> Mixture | Proposal:
         Laplace approximations at the optima, which keep a share.
     pilot : ndarray, shape (n, d)
         Draws.
+    density : CollapsedDensity
+        Whose unknowns may be confounded.
 
     Returns
     -------
@@ -163,7 +166,7 @@ def adapt(laplace: Mixture, pilot: Array) -> Mixture | Proposal:
     """
     if len(np.unique(pilot, axis=0)) < 10 * (pilot.shape[1] + 1):
         return laplace
-    return Proposal(laplace, fit_map(pilot), 1.0)
+    return Proposal(laplace, fit_map(pilot, shear_of(density)), 1.0)
 
 
 def resample(weighted: WeightedDraws, rng: np.random.Generator, n: int) -> NDArray[np.intp]:
@@ -240,7 +243,7 @@ def weigh(
         return _by_importance(
             weighted, laplace, (constant, math.hypot(constant_error, apart)), calls
         )
-    weighted = draw_weighted(density, adapt(laplace, members), rng, _MAPPED_DRAWS)
+    weighted = draw_weighted(density, adapt(laplace, members, density), rng, _MAPPED_DRAWS)
     calls += _MAPPED_DRAWS
     if _trusted(weighted):
         return _by_importance(weighted, laplace, (constant, constant_error), calls)
@@ -281,7 +284,7 @@ def _by_bridge(
         halves = [(z[part], at[part]) for part in (order[::2], order[1::2])]
     values, errors = [], []
     for k, (z, at) in enumerate(halves):
-        proposal = adapt(laplace, halves[1 - k][0])
+        proposal = adapt(laplace, halves[1 - k][0], density)
         drawn = draw_weighted(density, proposal, rng, _BRIDGE_DRAWS)
         value, error = bridge(z, at, proposal, drawn.z, drawn.log_density)
         values.append(value)

@@ -45,6 +45,7 @@ from inference.posterior.selecting import (
     take_in,
 )
 from inference.posterior.selection import Candidate
+from inference.posterior.shear import shear_of
 from inference.posterior.transport import fit_map
 from inference.posterior.verdict import Chains, Verdict, judge
 
@@ -246,7 +247,7 @@ def _set_out(job: Job, checkpoint: Checkpoint) -> Checkpoint:
     count = job.settings.ensembles
     starts = [np.empty((0, len(density.parameters)))] * count
     if arrived:
-        transport = fit_map(np.concatenate(arrived))
+        transport = fit_map(np.concatenate(arrived), shear_of(density))
         proposal = dataclasses.replace(proposal, transport=transport, share=_MAP_SHARE)
         for k in range(count - 1):
             members = arrived[k % len(arrived)]
@@ -277,7 +278,7 @@ def _adapt(checkpoint: Checkpoint, kept: Chains) -> Checkpoint:
         return dataclasses.replace(begun, ensembles=(), populations=(None,) * POPULATIONS)
     flat = kept.z.reshape(-1, kept.z.shape[-1])
     pilot = flat[np.linspace(0, len(flat) - 1, min(len(flat), _PILOT_DRAWS)).astype(int)]
-    new = dataclasses.replace(old, transport=fit_map(pilot))
+    new = dataclasses.replace(old, transport=fit_map(pilot, old.transport.shear))
     return dataclasses.replace(
         begun,
         proposal=new,

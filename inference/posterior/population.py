@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.proposal import log_student, student
+from inference.posterior.shear import shear_of
 from inference.posterior.tempering import next_power
 from inference.posterior.transport import TriangularMap, fit_map
 
@@ -24,13 +25,34 @@ __all__ = ["Population", "carried", "first_population", "temper"]
 
 Array = NDArray[np.float64]
 
-_SIZE = 384
 _SCREEN = 4  # times as many are drawn from the prior
 _REFIT = 4  # sweeps with one map
-_MOST_SWEEPS = 20
-_MOVES = 1.0  # accepted moves of a member at every temperature
-_LAST_MOVES = 3.0
-_LAST_SWEEPS = 40
+_SWEEPS = 20.0  # at most, for every accepted move that is wanted
+_LAST = 3.0  # times as many moves at the last temperature
+
+
+@dataclasses.dataclass(frozen=True)
+class _Effort:
+    """Members of a population, and accepted moves of each at every temperature."""
+
+    size: int
+    moves: float
+
+
+_EASY = _Effort(384, 1.0)
+
+
+def _effort(density: CollapsedDensity) -> _Effort:
+    """Return what a scene takes.
+
+    Where crosstalk and background are confounded, the ends of the sheet that hold a third of the
+    posterior are a hundredth of it at higher temperatures: a small population loses them, and one
+    that hardly moves does not find them again. Half of it is enough for a whole quadratic map.
+    """
+    if shear_of(density) is None:
+        return _EASY
+    d = len(density.parameters)
+    return _Effort(12 * d * (d + 1), 3.0)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -77,7 +99,7 @@ def first_population(density: CollapsedDensity, rng: np.random.Generator) -> Pop
     Population
         Empty where the likelihood is zero at nearly every draw.
     """
-    count = _SCREEN * _SIZE
+    count = _SCREEN * _effort(density).size
     z = density.parameters.sample(rng, count)
     likelihood = density.log_likelihood(z)
     finite = np.isfinite(likelihood)
@@ -88,7 +110,7 @@ def first_population(density: CollapsedDensity, rng: np.random.Generator) -> Pop
     return Population(z, likelihood, density.parameters.log_prior(z), 0.0, share, 0, count)
 
 
-def _resampled(population: Population, rng: np.random.Generator) -> Population:
+def _resampled(population: Population, size: int, rng: np.random.Generator) -> Population:
     """Raise the power as far as half of the population still counts, and resample."""
     likelihood = population.log_likelihood
     power = next_power(likelihood, population.power)
@@ -96,7 +118,7 @@ def _resampled(population: Population, rng: np.random.Generator) -> Population:
     step = power - population.power
     weights = np.exp(step * (likelihood - top))
     gain = step * top + math.log(float(weights.mean()))
-    positions = (rng.random() + np.arange(_SIZE)) / _SIZE
+    positions = (rng.random() + np.arange(size)) / size
     sums = np.cumsum(weights / weights.sum())
     index = np.minimum(np.searchsorted(sums, positions), len(weights) - 1)
     index = rng.permutation(index)  # copies of a member fall into both halves
@@ -184,13 +206,14 @@ def temper(
     Population
         Its power is 1 when it has arrived.
     """
-    population = _resampled(population, rng)
-    last = population.power == 1.0
-    halves = (slice(0, _SIZE // 2), slice(_SIZE // 2, _SIZE))
+    effort, shear = _effort(density), shear_of(density)
+    population = _resampled(population, effort.size, rng)
+    wanted = (_LAST if population.power == 1.0 else 1.0) * effort.moves
+    halves = (slice(0, effort.size // 2), slice(effort.size // 2, effort.size))
     moves = 0.0
-    for sweep in range(_LAST_SWEEPS if last else _MOST_SWEEPS):
+    for sweep in range(int(_SWEEPS * wanted)):
         if sweep % _REFIT == 0:
-            maps = [fit_map(population.z[half]) for half in halves]
+            maps = [fit_map(population.z[half], shear) for half in halves]
         for k in (0, 1):
             population, moved = _half_sweep(
                 density,
@@ -202,7 +225,7 @@ def temper(
                 jump=sweep % 2 == 0,
             )
             moves += 0.5 * moved
-        if moves > (_LAST_MOVES if last else _MOVES):
+        if moves > wanted:
             break
     return population
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from inference.posterior.shear import Shear
 from inference.posterior.triangular import update_factor
 from simulator.compiled import compiled
 
@@ -110,6 +111,8 @@ class TriangularMap:
         Coefficients of each coordinate's log scale, at most quadratic.
     cubic : int
         Widest coordinates that have cubic terms in the means.
+    shear : Shear or None
+        Applied before all of this; None where nothing is confounded.
     """
 
     centre: Array
@@ -118,6 +121,7 @@ class TriangularMap:
     means: Array
     scales: Array
     cubic: int
+    shear: Shear | None = None
 
     @property
     def _log_volume(self) -> float:
@@ -125,6 +129,8 @@ class TriangularMap:
 
     def unbend(self, z: Array) -> tuple[Array, Array]:
         """Return x of shape (n, d) and log |dx/dz| of shape (n,)."""
+        if self.shear is not None:
+            z = self.shear.forward(z)
         # the axes are orthogonal: their inverse is their transpose, rescaled
         inverse = self.axes / np.einsum("ij,ij->j", self.axes, self.axes)
         whitened = np.einsum("nj,jk->nk", z - self.centre, inverse)
@@ -146,7 +152,8 @@ class TriangularMap:
             self.scales,
             self.cubic,
         )
-        return self.centre + np.einsum("nk,jk->nj", whitened, self.axes), log_det
+        z = self.centre + np.einsum("nk,jk->nj", whitened, self.axes)
+        return (z if self.shear is None else self.shear.backward(z)), log_det
 
 
 def _features(w: Array, k: int, quadratic: bool, cubic: int) -> Array:
@@ -176,19 +183,23 @@ def _ridge(features: Array, target: Array, strength: float) -> Array:
     return np.asarray(linalg.solve_triangular(factor[:k, :k], factor[:k, k]) / scale)
 
 
-def fit_map(draws: Array) -> TriangularMap:
+def fit_map(draws: Array, shear: Shear | None = None) -> TriangularMap:
     """Fit the map that makes a sample nearly standard normal.
 
     Parameters
     ----------
     draws : ndarray, shape (n, d)
         n > d, not all equal; duplicates count as often as they stand there.
+    shear : Shear, optional
+        Coordinates that the map starts from.
 
     Returns
     -------
     TriangularMap
     """
     n, d = draws.shape
+    if shear is not None:
+        draws = shear.forward(draws)
     centre = draws.mean(axis=0)
     # singular values, not eigenvalues of the covariance: thin sheets keep their digits
     _, singular, rows = linalg.svd(draws - centre, full_matrices=False)
@@ -213,4 +224,4 @@ def fit_map(draws: Array) -> TriangularMap:
         means[k, : mean.size] = mean
         scales[k, : scale.size] = scale
     bounds = _BEYOND * np.array([whitened.min(axis=0), whitened.max(axis=0)])
-    return TriangularMap(centre, axes, bounds, means, scales, cubic)
+    return TriangularMap(centre, axes, bounds, means, scales, cubic, shear)
