@@ -14,6 +14,9 @@ from tests.posterior.scenes import example
 class _Prior:
     """Standard normal prior in three dimensions."""
 
+    names = ("a", "b", "c")
+    crosstalk = None
+
     def __len__(self) -> int:
         return 3
 
