@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.proposal import log_student, student
-from inference.posterior.shear import shear_of
+from inference.posterior.shear import Shear, shear_of
 from inference.posterior.tempering import next_power
 from inference.posterior.transport import TriangularMap, fit_map
 
@@ -42,16 +42,15 @@ class _Effort:
 _EASY = _Effort(384, 1.0)
 
 
-def _effort(density: CollapsedDensity) -> _Effort:
-    """Return what a scene takes.
+def _effort(shear: Shear | None, d: int) -> _Effort:
+    """Return what a scene of d unknowns takes.
 
-    Where crosstalk and background are confounded, the ends of the sheet that hold a third of the
+    Where crosstalk and background are confounded, the ends of the sheet that hold a quarter of the
     posterior are a hundredth of it at higher temperatures: a small population loses them, and one
     that hardly moves does not find them again. Half of it is enough for a whole quadratic map.
     """
-    if shear_of(density) is None:
+    if shear is None:
         return _EASY
-    d = len(density.parameters)
     return _Effort(12 * d * (d + 1), 3.0)
 
 
@@ -99,7 +98,7 @@ def first_population(density: CollapsedDensity, rng: np.random.Generator) -> Pop
     Population
         Empty where the likelihood is zero at nearly every draw.
     """
-    count = _SCREEN * _effort(density).size
+    count = _SCREEN * _effort(shear_of(density), len(density.parameters)).size
     z = density.parameters.sample(rng, count)
     likelihood = density.log_likelihood(z)
     finite = np.isfinite(likelihood)
@@ -206,7 +205,8 @@ def temper(
     Population
         Its power is 1 when it has arrived.
     """
-    effort, shear = _effort(density), shear_of(density)
+    shear = shear_of(density)
+    effort = _effort(shear, len(density.parameters))
     population = _resampled(population, effort.size, rng)
     wanted = (_LAST if population.power == 1.0 else 1.0) * effort.moves
     halves = (slice(0, effort.size // 2), slice(effort.size // 2, effort.size))

@@ -3,8 +3,8 @@
 Where both are unknown, readings tell the static light, crosstalk and bare background together, a
 thousand times better than either. Along such a sheet the crosstalk gives way to the product of the
 background's strength and a function of its distance, which no polynomial follows over many widths
-of the sheet: walkers and populations then end where the polynomial leaves it, and a third of the
-posterior was seen to be lost without a word. The sum itself as a coordinate needs no polynomial.
+of the sheet: walkers and populations then end where the polynomial leaves it, and a quarter of the
+posterior was seen to be lost without a word. The sum itself, as a coordinate, needs no polynomial.
 """
 
 import dataclasses
