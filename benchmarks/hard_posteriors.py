@@ -1,6 +1,6 @@
 """Time to a posterior where a background is unknown: curved posteriors of six to nine parameters.
 
-    python -m benchmarks.hard_posteriors [--seeds 1] [--kinds pulsed sine_wave] [--ensembles 4]
+    python -m benchmarks.hard_posteriors [--seeds 1] [--kinds sine_wave] [--scenes object]
 
 N = 40 frames log-uniform in 0.1-2 m, signal-to-noise 1000 at 1 m, two processes of one thread each,
 as the service has them. The baseline of the ratio is the scene without crosstalk or background in
@@ -98,6 +98,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--kinds", nargs="+", default=list(SENSORS), choices=list(SENSORS))
+    parser.add_argument("--scenes", nargs="+", default=list(SCENES), choices=list(SCENES))
     parser.add_argument("--ensembles", type=int, default=4)
     parser.add_argument("--max-seconds", type=float, default=120.0)
     arguments = parser.parse_args()
@@ -110,7 +111,7 @@ def main() -> None:
     with ProcessPoolExecutor(2, mp_context=context) as executor:
         for kind in arguments.kinds:
             base = None
-            for name in SCENES:
+            for name in arguments.scenes:
                 list(executor.map(_warm, [kind] * 2, [name] * 2))
                 _warm(kind, name)
                 for seed in range(arguments.seeds):

@@ -26,17 +26,18 @@ __all__ = ["Population", "carried", "first_population", "temper"]
 Array = NDArray[np.float64]
 
 _SCREEN = 4  # times as many are drawn from the prior
-_REFIT = 4  # sweeps with one map
+_REFIT = 4  # sweeps with one map, of which the last is differential evolution
 _SWEEPS = 20.0  # at most, for every accepted move that is wanted
 _LAST = 3.0  # times as many moves at the last temperature
+_HOT = 1e-2  # power up to which one move suffices: what is lost there are not the ends of a sheet
 
 
 @dataclasses.dataclass(frozen=True)
 class _Effort:
-    """Members of a population, and accepted moves of each at every temperature."""
+    """Members of a population, and accepted moves of each at a temperature."""
 
     size: int
-    moves: float
+    moves: float  # beyond `_HOT`
 
 
 _EASY = _Effort(384, 1.0)
@@ -115,12 +116,13 @@ def _resampled(population: Population, size: int, rng: np.random.Generator) -> P
     power = next_power(likelihood, population.power)
     top = float(likelihood.max())
     step = power - population.power
-    weights = np.exp(step * (likelihood - top))
+    # copies of a member must fall into one half: a map that has seen them does not move them freely
+    order = rng.permutation(len(likelihood))
+    weights = np.exp(step * (likelihood[order] - top))
     gain = step * top + math.log(float(weights.mean()))
     positions = (rng.random() + np.arange(size)) / size
     sums = np.cumsum(weights / weights.sum())
-    index = np.minimum(np.searchsorted(sums, positions), len(weights) - 1)
-    index = rng.permutation(index)  # copies of a member fall into both halves
+    index = order[np.minimum(np.searchsorted(sums, positions), len(weights) - 1)]
     return dataclasses.replace(
         population,
         z=population.z[index],
@@ -208,7 +210,9 @@ def temper(
     shear = shear_of(density)
     effort = _effort(shear, len(density.parameters))
     population = _resampled(population, effort.size, rng)
-    wanted = (_LAST if population.power == 1.0 else 1.0) * effort.moves
+    wanted = 1.0 if population.power < _HOT else effort.moves
+    if population.power == 1.0:
+        wanted *= _LAST
     halves = (slice(0, effort.size // 2), slice(effort.size // 2, effort.size))
     moves = 0.0
     for sweep in range(int(_SWEEPS * wanted)):
@@ -222,7 +226,7 @@ def temper(
                 halves[1 - k],
                 maps[1 - k],
                 rng,
-                jump=sweep % 2 == 0,
+                jump=sweep % _REFIT < _REFIT - 1,
             )
             moves += 0.5 * moved
         if moves > wanted:

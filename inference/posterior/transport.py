@@ -23,7 +23,8 @@ Array = NDArray[np.float64]
 
 _POINTS = 6  # of the sample for every term of a polynomial
 _BEYOND = 1.5  # times the reach of the sample: held to it, moves never widen a sheet too short
-_RIDGE = 1e-3  # times the root of the sample size: a term without evidence is left near zero
+_RIDGE = 1e-3  # times the root of the sample size: keeps terms apart that are nearly the same
+_DOUBT = 3.0  # squared standard errors below which a term counts as noise
 _MEAN_LOG_NORMAL = 0.635  # less the mean of log |x| of a standard normal
 
 
@@ -169,8 +170,14 @@ def _features(w: Array, k: int, quadratic: bool, cubic: int) -> Array:
     return np.column_stack(columns)
 
 
-def _ridge(features: Array, target: Array, strength: float) -> Array:
-    """Least squares with scaled columns, all but the constant drawn towards zero."""
+def _regression(features: Array, target: Array, strength: float, copies: float) -> Array:
+    """Least squares with scaled columns; terms that the sample does not show are left out.
+
+    Terms, in their order and freed of those before them, are shrunk as the non-negative garrote
+    does (Breiman 1995). Without it a map of eighty terms fits the noise of five hundred draws:
+    members of a population that it did not see lie in its tails, where they stay, and directions
+    that the readings leave open lost a third of their variance from the prior to the posterior.
+    """
     n, k = features.shape
     scale = np.sqrt(np.mean(features**2, axis=0))
     scale = np.where(scale > 0, scale, 1.0)
@@ -180,6 +187,9 @@ def _ridge(features: Array, target: Array, strength: float) -> Array:
     factor[0, 0] = factor[k, k] = 0.0
     # not LAPACK: the threads that it starts for so small a problem cost twice what they do
     update_factor(factor, rows, n)
+    along = factor[1:k, k]
+    noise = _DOUBT * copies * factor[k, k] ** 2 / max(n - k, 1)
+    along *= np.maximum(0.0, 1.0 - noise / np.maximum(along**2, 1e-300))
     return np.asarray(linalg.solve_triangular(factor[:k, :k], factor[:k, k]) / scale)
 
 
@@ -212,13 +222,15 @@ def fit_map(draws: Array, shear: Shear | None = None) -> TriangularMap:
     means = np.zeros((d, math.comb(d + 1, 2) + math.comb(cubic + 2, 3)))
     scales = np.zeros((d, math.comb(d + 1, 2)))
     strength = _RIDGE * math.sqrt(n)
+    times = np.unique(draws, axis=0, return_counts=True)[1]
+    copies = float((times**2).sum() / n)  # equal draws say as much as one of them
     for k in range(d):
         features = _features(whitened, k, True, cubic)
-        mean = _ridge(features, whitened[:, k], strength) if k else np.zeros(1)
+        mean = _regression(features, whitened[:, k], strength, copies) if k else np.zeros(1)
         residual = whitened[:, k] - features @ mean
         size = np.log(np.abs(residual) + 1e-3 * residual.std() + 1e-300) + _MEAN_LOG_NORMAL
         terms = _features(whitened, k, quadratic, 0)
-        scale = _ridge(terms, size, 3 * strength)
+        scale = _regression(terms, size, 3 * strength, copies)
         left = residual * np.exp(-terms @ scale)
         scale[0] += math.log(max(float(left.std()), 1e-300))
         means[k, : mean.size] = mean
