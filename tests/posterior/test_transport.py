@@ -79,3 +79,23 @@ def test_one_dimension() -> None:
     x, log_det = transport.unbend(draws)
     assert x.std() == pytest.approx(1.0, rel=1e-9)
     assert log_det == pytest.approx(-np.log(draws.std()), rel=1e-9)
+
+
+@pytest.mark.parametrize("copies", [1, 2])
+def test_a_normal_sample_is_not_bent(copies: int) -> None:
+    """What a map of 540 draws loses on draws that it has not seen, nine dimensions [nat].
+
+    A fitted normal law loses 54 parameters / (2 x 540) = 0.05 in the mean. A term of pure noise
+    that is held to three squared standard errors keeps 0.057 of its own in the mean: 675 of them
+    lose 0.04. Twice that where every draw stands there twice, and as much again where so few
+    distinct draws understate the residuals. Polynomials without that test lose 1.2 to 2.2.
+    """
+    losses = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        seen = np.repeat(rng.standard_normal((540 // copies, 9)), copies, axis=0)
+        fresh = rng.standard_normal((4000, 9))
+        x, log_det = fit_map(seen).unbend(fresh)
+        gaps = 0.5 * np.einsum("ij,ij->i", x, x) - 0.5 * np.einsum("ij,ij->i", fresh, fresh)
+        losses.append(float(np.mean(gaps - log_det)))
+    assert np.mean(losses) < 0.25 * copies
