@@ -44,7 +44,7 @@ def main() -> None:
             executor = stack.enter_context(ProcessPoolExecutor(given.workers, context))
         for term in given.term or TERMS:
             for slug, group in CLASSES.items():
-                if given.only and slug not in given.only:
+                if term not in group.terms or (given.only and slug not in given.only):
                     continue
                 work = functools.partial(class_row, group, term, version=version)
                 done = resume(_table(slug, term), COLUMNS, range(given.sets), work, executor)

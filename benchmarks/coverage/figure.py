@@ -11,10 +11,11 @@ from benchmarks.coverage.report import GOAL, Coverage
 
 __all__ = ["draw"]
 
-_COLOURS = {"without": "tab:red", "with": "tab:blue"}
+_COLOURS = {"without": "tab:red", "with": "tab:blue", "wide": "tab:green"}
 _LABELS = {
     "without": "without the term",
     "with": "discrepancy and reference prior of the ranges",
+    "wide": "the same, wider prior of c0",
 }
 
 
@@ -55,5 +56,5 @@ def draw(found: Sequence[Coverage], path: Path) -> None:
         right.tick_params(axis="x", which="minor", labelsize=7)
         right.set_xlabel("median relative width [%]")
         right.grid(axis="x", color="0.9")
-        figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=2)
+        figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=3)
         figure.savefig(path, dpi=110)

@@ -21,7 +21,7 @@ class Coverage:
     Attributes
     ----------
     name, term : str
-        Class of scenes; whether the scene has a discrepancy.
+        Class of scenes; what inference is told, a key of `TERMS`.
     sets : int
         Data sets, refused ones included; those hold nothing.
     inside, low, high : float
@@ -104,7 +104,8 @@ def report(found: Sequence[Coverage]) -> str:
         f"| {c.converged} | {c.refused} |"
         for c in found
     ]
-    missed = [f"{c.name}: {c.inside:.0%}" for c in found if c.term == "with" and not c.reached]
+    told = [c for c in found if c.term != "without" and not c.reached]
+    missed = [f"{c.name}, {c.term}: {c.inside:.1%}" for c in told]
     goal = f"{GOAL[0]:.0%} to {GOAL[1]:.0%} with the discrepancy term"
     lines += ["", f"outside {goal}: {'; '.join(missed) or 'none that was run'}"]
     few = [f"{c.name}, {c.term}: {c.sets}" for c in found if c.sets < SETS]

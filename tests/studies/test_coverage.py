@@ -24,6 +24,7 @@ def test_a_data_set_is_what_its_class_says(slug: str, number: int) -> None:
     assert data.range_m.shape == (FRAMES,)
     assert np.all((data.range_m > 0.05) & (data.range_m < 3.0))
     assert set(data.terms) == {name for name in ("crosstalk", "background") if getattr(group, name)}
+    assert ("wide" in group.terms) == (slug in ("crosstalk", "background"))
     for term in TERMS:
         check_scene(data.sensor, parse_scene(told(data, term)))
     # readings of light, far above their noise
@@ -85,7 +86,7 @@ def test_a_class_is_judged_over_data_sets() -> None:
     assert found.warned == 20
     assert found.inside_unwarned == 1.0
     assert not found.reached
-    assert "outside 80% to 97% with the discrepancy term: disks: 60%" in report([found])
+    assert "outside 80% to 97% with the discrepancy term: disks, with: 60.0%" in report([found])
     refused = coverage("disks", "with", [dict.fromkeys(COLUMNS, "")] * 3)
     assert (refused.inside, refused.refused) == (0.0, 3)
 
