@@ -55,7 +55,8 @@ class TechniqueResult:
     fit : mapping, optional
         How well a technique of many frames explains them: ``chi_square``, ``deviance``
         (-2 log likelihood relative to no residual under read noise alone; joint fits only),
-        ``degrees_of_freedom``, ``p_value``, ``misfit``, ``rank`` and ``optima``.
+        ``degrees_of_freedom``, ``p_value``, ``misfit``, ``rank``, ``widening`` (factor on all
+        standard deviations; joint fits only) and ``optima``.
     runtime_s : float
         Time that the technique took [s].
     """

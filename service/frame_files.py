@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from service.errors import MalformedError
-from service.strict_json import check_bulk, decode, escape
-from simulator.errors import InvalidInputError
+from service.strict_json import check_bulk, decode
+from simulator.errors import InvalidInputError, escape
 from simulator.frames import FrameColumns
 from simulator.validated import parse
 

@@ -43,8 +43,7 @@ from service.errors import (
     NotFoundError,
     UnsupportedMediaTypeError,
 )
-from service.strict_json import escape
-from simulator.errors import HybridTofError, InvalidInputError, Problem, RefusedError
+from simulator.errors import HybridTofError, InvalidInputError, Problem, RefusedError, escape
 
 __all__ = [
     "MEDIA_TYPE",

@@ -100,7 +100,7 @@ class FrameEstimate(pydantic.BaseModel):
 
 
 class FittedParameter(pydantic.BaseModel):
-    """An unknown that a technique of many frames found; sd is the Cramer-Rao bound."""
+    """An unknown that a technique of many frames found; sd is the bound times `widening`."""
 
     value: float | None
     sd: float | None

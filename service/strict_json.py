@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from service.errors import MalformedError
-from simulator.errors import InvalidInputError, Problem
+from simulator.errors import InvalidInputError, Problem, escape
 
-__all__ = ["MAX_DEPTH", "MAX_ENTRIES", "SHORT", "check_bulk", "decode", "escape"]
+__all__ = ["MAX_DEPTH", "MAX_ENTRIES", "SHORT", "check_bulk", "decode"]
 
 # no document of this project is nested deeper than about eight levels
 MAX_DEPTH = 32
@@ -17,7 +17,9 @@ MAX_DEPTH = 32
 SHORT = 64
 MAX_ENTRIES = 2_000_000
 
-_TOKENS = re.compile(rb'"(?:[^"\\]|\\.)*"|[\[\]{}]', re.DOTALL)
+# a string that is never closed ends with the document: searching on from each of its quotes would
+# take a time that grows with the square of its length
+_TOKENS = re.compile(rb'"(?:[^"\\]|\\.)*+"?|[\[\]{}]', re.DOTALL)
 # a longer text is no 64-bit integer: such a number is read as the float that it is close to
 _MAX_DIGITS = 20
 
@@ -46,11 +48,6 @@ def _members(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 _decoder = json.JSONDecoder(object_pairs_hook=_members, parse_int=_integer)
-
-
-def escape(name: str) -> str:
-    """Escape a member's name for a JSON pointer (RFC 6901)."""
-    return name.replace("~", "~0").replace("/", "~1")
 
 
 def _too_deep(raw: bytes) -> bool:

@@ -9,7 +9,7 @@
 
 from dataclasses import dataclass
 
-__all__ = ["HybridTofError", "InvalidInputError", "Problem", "RefusedError"]
+__all__ = ["HybridTofError", "InvalidInputError", "Problem", "RefusedError", "escape"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +26,11 @@ class Problem:
 
     pointer: str
     message: str
+
+
+def escape(name: str) -> str:
+    """Escape a member's name for a JSON pointer (RFC 6901)."""
+    return name.replace("~", "~0").replace("/", "~1")
 
 
 class HybridTofError(Exception):

@@ -12,7 +12,7 @@ from simulator.errors import InvalidInputError, Problem
 from simulator.sensor import Sensor
 from simulator.validated import Validated
 
-__all__ = ["FrameColumns", "Frames", "frames_from_columns"]
+__all__ = ["FrameColumns", "Frames", "check_frames", "frames_from_columns"]
 
 Array = NDArray[np.float64]
 # a bad column is answered by its first bad entry, not by one problem for each of a million
@@ -161,6 +161,44 @@ def frames_from_columns(
         gain=arrays.get("gain"),
         object_present=arrays.get("object_present"),
     )
+
+
+def check_frames(sensor: Sensor, frames: Frames) -> None:
+    """Check frames that did not come through `frames_from_columns`.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The sensor.
+    frames : Frames
+        As a caller made them.
+
+    Raises
+    ------
+    InvalidInputError
+        A pointer below /frames for each column that is empty, of another length, not finite, or
+        (gain) not positive.
+    """
+    first, second = sensor.columns
+    readings = np.asarray(frames.readings)
+    if readings.ndim != 2 or readings.shape[1] != 2:
+        raise InvalidInputError.at("/frames", "readings must be of shape (n, 2)")
+    columns = {
+        first: readings[:, 0],
+        second: readings[:, 1],
+        "time_s": frames.time_s,
+        "gain": frames.gain,
+        "object_present": frames.object_present,
+    }
+    if frames.derivatives is not None:
+        slopes = np.asarray(frames.derivatives)
+        if slopes.ndim != 2 or slopes.shape[1] != 2:
+            raise InvalidInputError.at("/frames", "derivatives must be of shape (n, 2)")
+        columns |= {f"d{first}_dt": slopes[:, 0], f"d{second}_dt": slopes[:, 1]}
+    try:
+        frames_from_columns(sensor, columns)
+    except InvalidInputError as error:
+        raise error.below("/frames") from None
 
 
 def _as_column(name: str, values: ArrayLike) -> tuple[NDArray[Any], str | None]:

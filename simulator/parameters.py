@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from simulator.errors import RefusedError
 from simulator.range_law import RangePrior, range_laws, range_prior, stroke_unknowns
-from simulator.scene import Scene, Stroke, check_scene
+from simulator.scene import Reference, Scene, Stroke, check_scene
 from simulator.sensor import PulsedSensor, Sensor
 from simulator.unknowns import Unknown, Values, add_quantity, add_reflectance, add_shape
 
@@ -21,6 +21,7 @@ __all__ = ["Parameters", "Terms", "Unknown", "parameters_of"]
 Array = NDArray[np.float64]
 
 _MOST_REJECTIONS = 1_000_000
+_FAR = 4.0  # standard deviations of a prior of the ranges that `Parameters.reach_m` takes in
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,6 +68,15 @@ class Parameters:
     def names(self) -> tuple[str, ...]:
         """Scene paths of the unknowns."""
         return tuple(unknown.name for unknown in self.unknowns)
+
+    @property
+    def reach_m(self) -> tuple[float, float]:
+        """Ranges between which practically all of their prior lies [m]; the first may be 0."""
+        law = self.range_prior
+        if isinstance(law, Stroke | Reference):
+            return law.low, law.high
+        low, high = (float(x) for x in law.from_normal(np.array([-_FAR, _FAR])))
+        return max(low, 0.0), high if math.isfinite(high) else law.high
 
     def __len__(self) -> int:
         return len(self.unknowns)

@@ -14,9 +14,10 @@ import pydantic
 from numpy.typing import NDArray
 from scipy import special
 
-from simulator.validated import Validated
+from simulator.validated import Number, Positive, Validated
 
 __all__ = [
+    "LEAST_LOG_MASS",
     "Distribution",
     "HalfNormal",
     "LogNormal",
@@ -28,7 +29,8 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-Positive = Annotated[float, pydantic.Field(gt=0)]
+
+LEAST_LOG_MASS = -700.0  # of a law inside its support: a share of 1e-304, below are no numbers
 
 _HALF_LOG_2PI = 0.5 * math.log(2 * math.pi)
 
@@ -212,15 +214,13 @@ class Uniform(Validated):
     """Constant density on [low, high]."""
 
     prior: Literal["uniform"] = "uniform"
-    low: float
-    high: float
+    low: Number
+    high: Number
 
     @pydantic.model_validator(mode="after")
     def _ordered(self) -> "Uniform":
         if not self.low < self.high:
             raise ValueError("low must be below high")
-        if not math.isfinite(self.high - self.low):
-            raise ValueError("high - low is beyond what a number can hold")
         return self
 
     def distribution(self) -> Distribution:
@@ -250,7 +250,7 @@ class Normal(Validated):
     """Normal law of given mean and standard deviation."""
 
     prior: Literal["normal"] = "normal"
-    mean: float
+    mean: Number
     sd: Positive
 
     def distribution(self) -> Distribution:
@@ -274,7 +274,7 @@ class LogNormal(Validated):
 
     prior: Literal["lognormal"] = "lognormal"
     median: Positive
-    sigma: Positive
+    sigma: Annotated[Positive, pydantic.Field(le=100)]
 
     def distribution(self) -> Distribution:
         """Return the distribution."""
@@ -285,16 +285,17 @@ class TruncatedNormal(Validated):
     """Normal law cut to [low, high] and renormalised."""
 
     prior: Literal["truncated_normal"] = "truncated_normal"
-    mean: float
+    mean: Number
     sd: Positive
-    low: float
-    high: float
+    low: Number
+    high: Number
 
     @pydantic.model_validator(mode="after")
     def _ordered(self) -> "TruncatedNormal":
         if not self.low < self.high:
             raise ValueError("low must be below high")
-        if not math.isfinite(self.distribution().log_mass()):  # nan: nothing over nothing
+        whole = Distribution("normal", False, self.mean, self.sd, -math.inf, math.inf)
+        if not whole.log_mass(self.low, self.high) > LEAST_LOG_MASS:
             raise ValueError("the law has no mass between low and high that a number can hold")
         return self
 

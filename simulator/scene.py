@@ -7,9 +7,9 @@ import pydantic
 
 from simulator.discrepancy import DISCREPANCY_SD
 from simulator.errors import InvalidInputError, Problem
-from simulator.priors import Prior
+from simulator.priors import LEAST_LOG_MASS, Prior
 from simulator.sensor import PulsedSensor, Sensor
-from simulator.validated import Validated, parse
+from simulator.validated import Number, Positive, Validated, parse
 
 __all__ = [
     "Background",
@@ -26,8 +26,6 @@ __all__ = [
     "parse_scene",
 ]
 
-Positive = Annotated[float, pydantic.Field(gt=0)]
-
 
 def _kind_of_quantity(value: object) -> str:
     # anything that is not an object is read as a number, so that the message speaks of numbers
@@ -35,7 +33,7 @@ def _kind_of_quantity(value: object) -> str:
 
 
 Quantity = Annotated[
-    Annotated[float, pydantic.Tag("known")] | Annotated[Prior, pydantic.Tag("unknown")],
+    Annotated[Number, pydantic.Tag("known")] | Annotated[Prior, pydantic.Tag("unknown")],
     pydantic.Discriminator(_kind_of_quantity),
 ]
 Motion = Literal["radial", "tangential", "static"]
@@ -122,7 +120,8 @@ class _Support(Validated):
 
     @pydantic.model_validator(mode="after")
     def _ordered(self) -> Self:
-        if not self.low < self.high:
+        # numbers apart whose logarithms are one leave no room for a law of log r
+        if not math.log(self.low) < math.log(self.high):
             raise ValueError("low must be below high")
         return self
 
@@ -261,7 +260,7 @@ def _check_support(value: Quantity | None, low: float, high: float, where: str) 
             wanted = f"above {low:g}" if high == math.inf else f"between {low:g} and {high:g}"
             return [Problem(where, f"must be {wanted}, is {value:g}")]
         return []
-    if not math.isfinite(float(value.distribution().log_mass(low, high))):
+    if not float(value.distribution().log_mass(low, high)) > LEAST_LOG_MASS:
         return [Problem(where, f"the prior has no mass between {low:g} and {high:g}")]
     return []
 

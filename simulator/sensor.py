@@ -7,12 +7,10 @@ import pydantic
 from scipy.constants import speed_of_light
 
 from simulator.errors import InvalidInputError
-from simulator.validated import Validated, problems_of
+from simulator.validated import NonNegative, Number, Positive, Validated, problems_of
 
 __all__ = ["Noise", "PulsedSensor", "Sensor", "SineWaveSensor", "instrument", "parse_sensor"]
 
-Positive = Annotated[float, pydantic.Field(gt=0)]
-NonNegative = Annotated[float, pydantic.Field(ge=0)]
 # JSON arrays arrive as lists; the elements stay strict
 PositivePair = Annotated[tuple[Positive, Positive], pydantic.Strict(False)]
 
@@ -98,7 +96,7 @@ class SineWaveSensor(_AnySensor):
 
     kind: Literal["sine_wave"] = "sine_wave"
     frequency_hz: Positive
-    phase_offset_rad: float = 0.0
+    phase_offset_rad: Number = 0.0
 
     @property
     def wave_number(self) -> float:

@@ -7,12 +7,13 @@ import numpy as np
 import pydantic
 from numpy.typing import NDArray
 
-from simulator.validated import Validated
+from simulator.validated import Positive, Validated
 
 __all__ = ["RadialTrajectory", "SampledTrajectory", "Trajectory"]
 
-Positive = Annotated[float, pydantic.Field(gt=0)]
 MAX_FRAMES = 1_000_000
+# of columns, which are long: their sizes are judged by what comes of them
+_Entry = Annotated[float, pydantic.Field(gt=0)]
 _BOUNDS = pydantic.Field(min_length=1, max_length=MAX_FRAMES, fail_fast=True)
 T = TypeVar("T", list[float] | None, list[bool] | None)
 
@@ -33,9 +34,9 @@ class SampledTrajectory(Validated):
         False where the scene is empty.
     """
 
-    range_m: Annotated[list[Positive], _BOUNDS]
+    range_m: Annotated[list[_Entry], _BOUNDS]
     time_s: Annotated[list[float], _BOUNDS] | None = None
-    amplitude: Annotated[list[Positive], _BOUNDS] | None = None
+    amplitude: Annotated[list[_Entry], _BOUNDS] | None = None
     object_present: Annotated[list[bool], _BOUNDS] | None = None
 
     @pydantic.field_validator("time_s", "amplitude", "object_present")

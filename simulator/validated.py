@@ -1,15 +1,33 @@
 """Frozen, strictly validated types, and errors that name the field by its JSON pointer."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import pydantic
 
-from simulator.errors import InvalidInputError, Problem
+from simulator.errors import InvalidInputError, Problem, escape
 
-__all__ = ["Validated", "parse", "problems_of"]
+__all__ = ["NonNegative", "Number", "Positive", "Validated", "parse", "problems_of"]
 
 T = TypeVar("T", bound="Validated")
+
+# products and squares of any six of them are numbers, too; no unit of anything needs more
+_LARGEST = 1e50
+
+
+def _of_size(value: float) -> float:
+    if value != 0 and not 1 / _LARGEST <= abs(value) <= _LARGEST:
+        raise ValueError(
+            f"must lie between {1 / _LARGEST:g} and {_LARGEST:g} in magnitude, is {value:g}; state "
+            "it in another unit"
+        )
+    return value
+
+
+_SIZE = pydantic.AfterValidator(_of_size)
+Number = Annotated[float, _SIZE]
+Positive = Annotated[float, pydantic.Field(gt=0), _SIZE]
+NonNegative = Annotated[float, pydantic.Field(ge=0), _SIZE]
 
 
 class Validated(pydantic.BaseModel):
@@ -36,7 +54,7 @@ def _pointer(location: Sequence[int | str], data: object, missing: bool) -> str:
             here = here[part]
         elif not (missing and position == len(location) - 1):
             continue
-        parts.append(str(part).replace("~", "~0").replace("/", "~1"))
+        parts.append(escape(str(part)))
     return "".join("/" + part for part in parts)
 
 

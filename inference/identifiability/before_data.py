@@ -7,18 +7,18 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.identifiability.experiment import Experiment
+from inference.identifiability.experiment import STEP, Experiment
 from inference.identifiability.information import Information
 from inference.identifiability.judge import Spread, judge
 from inference.identifiability.prediction import Prediction, predict
 from inference.identifiability.reasons import Diagnosis
 from inference.identifiability.status import Identifiability
-from simulator.errors import InvalidInputError, Problem, RefusedError
+from simulator.errors import InvalidInputError, Problem, RefusedError, escape
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
-__all__ = ["Foresight", "identifiability"]
+__all__ = ["Foresight", "check_discrepancy", "identifiability"]
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,6 @@ _JUST_ENOUGH = (
     "; the distinct ranges are just as many as the unknowns need, and such systems can have "
     "several exact solutions: one more would tell them apart"
 )
-_DIFFERENCE = 1e-5  # of z, in which every prior has unit scale
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -76,10 +75,10 @@ class Foresight:
     def posterior_sd(self) -> dict[str, float]:
         """Predicted posterior standard deviations of all unknowns, in SI units."""
         e = self.experiment
-        steps = _DIFFERENCE * np.eye(e.z.size)
+        steps = STEP * np.eye(e.z.size)
         with np.errstate(over="ignore", invalid="ignore"):
             change = e.parameters.natural(e.z + steps) - e.parameters.natural(e.z - steps)
-            slopes = change.T / (2 * _DIFFERENCE)  # the unknowns along z
+            slopes = change.T / (2 * STEP)  # the unknowns along z
             sd = np.linalg.norm(slopes @ self.prediction.factor, axis=1).tolist()
         return dict(zip(e.parameters.names, sd, strict=True))
 
@@ -108,7 +107,7 @@ def _reference(parameters: Parameters, at: Mapping[str, float] | None) -> Array:
     """Return z of the values given, the medians of the priors elsewhere."""
     given = {} if at is None else dict(at)
     problems = [
-        Problem(f"/at/{name}", "is not an unknown of the scene")
+        Problem(f"/at/{escape(name)}", "is not an unknown of the scene")
         for name in given
         if name not in parameters.names
     ]
@@ -124,11 +123,31 @@ def _reference(parameters: Parameters, at: Mapping[str, float] | None) -> Array:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             z[j] = parameters.standard(values)[0, j]
         if not math.isfinite(z[j]):
-            problems.append(Problem(f"/at/{name}", "lies outside its prior"))
+            problems.append(Problem(f"/at/{escape(name)}", "lies outside its prior"))
             z[j] = 0.0
     if problems:
         raise InvalidInputError(*problems)
     return z
+
+
+def check_discrepancy(scene: Scene) -> None:
+    """Refuse a discrepancy that nothing can tell.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+
+    Raises
+    ------
+    RefusedError
+        Where the object is stated not to move.
+    """
+    if scene.motion == "static" and scene.discrepancy is not None:
+        raise RefusedError(
+            "an object at rest has one range, at which a discrepancy of its flux is no different "
+            "from another c2; leave `discrepancy` out, and give `object.c2` a wider prior"
+        )
 
 
 def _check_ranges(experiment: Experiment, scene: Scene) -> None:
@@ -145,8 +164,8 @@ def _check_ranges(experiment: Experiment, scene: Scene) -> None:
         if experiment.terms.background is not None and low == -experiment.terms.background[0, 3]:
             message += " (nearer, a shadow with a negative c1 would be negative)"
         raise InvalidInputError.at(f"/ranges_m/{outside[0]}", message)
-    still = present.any() and np.ptp(experiment.log_r[present]) > 1e-9
-    if scene.motion == "static" and still:
+    moves = present.any() and np.ptp(experiment.log_r[present]) > 1e-9
+    if scene.motion == "static" and moves:
         message = "differ, and the scene states an object that does not move"
         raise InvalidInputError.at("/ranges_m", message)
 
@@ -184,12 +203,13 @@ def identifiability(
         With pointers relative to the request: "/scene/...", "/ranges_m/i", "/object_present",
         "/at/...".
     RefusedError
-        For tangential motion, and where a number overflows.
+        For tangential motion, a discrepancy of an object at rest, and where a number overflows.
     """
     try:
         parameters = parameters_of(sensor, scene)
     except InvalidInputError as error:
         raise error.below("/scene") from None
+    check_discrepancy(scene)
     if scene.motion == "tangential":
         raise RefusedError(
             "in tangential motion every frame has an amplitude of its own, and the information is "

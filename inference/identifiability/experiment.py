@@ -12,15 +12,20 @@ from inference.identifiability.sensitivity import (
     COORDINATES,
     Sensitivity,
     sensitivity,
+    term_changes,
     whiteners,
 )
 from simulator.discrepancy import discrepancy_basis
 from simulator.parameters import Parameters, Terms
 from simulator.sensor import Sensor
 
-__all__ = ["Experiment", "information"]
+__all__ = ["STEP", "Experiment", "information"]
 
 Array = NDArray[np.float64]
+
+# the maps from z are smooth: a central difference errs by 1e-10 of itself, and an error of the map
+# from the left multiplies the information, it is not added to it
+STEP = 1e-5
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -158,7 +163,20 @@ class Experiment:
         with np.errstate(over="ignore"):
             # sums of squares of all of them must not overflow either
             sizes = [float(np.square(part).sum()) for part in (by_term, along, by_error, units)]
+            sizes.append(float(np.square(self.change).sum()))
         return bool(np.isfinite(sizes).all() and np.isfinite(self.z).all())
+
+    @functools.cached_property
+    def neighbours(self) -> tuple[Terms, Terms]:
+        """Physical values a step of `STEP` above and below z along each unknown."""
+        steps = STEP * np.eye(self.z.size)
+        return self.parameters.terms(self.z + steps), self.parameters.terms(self.z - steps)
+
+    @functools.cached_property
+    def change(self) -> Array:
+        """Derivatives of the coordinates of `sensitivity.COORDINATES` along z, shape (9, d)."""
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
+            return term_changes(self.terms, *self.neighbours) / (2 * STEP)
 
     @functools.cached_property
     def by_error(self) -> Array:
@@ -169,8 +187,7 @@ class Experiment:
         n = self.log_r.size
         if self.discrepancy is None:
             return np.empty((n, 2, 0))
-        low, high = (float(bound) for bound in self.terms.ranges[0, 6:8])
-        basis = discrepancy_basis(low, high)
+        basis = discrepancy_basis(*self.parameters.reach_m)
         present = np.isfinite(self.log_r)
         derivatives = np.zeros((n, 2, basis.size))
         functions = self.discrepancy * basis.values(self.log_r[present])

@@ -114,7 +114,8 @@ def judge(
             text += _LEANING.format(expected)
         elif status != "identified" and prediction is not None:
             text += ": " + _cause(diagnosis, name, value, expected)
-        contraction = 1 - (value / unit) ** 2 if math.isfinite(value) else 0.0
+        # a law so narrow that it has no width leaves nothing to contract
+        contraction = 1 - (value / unit) ** 2 if math.isfinite(value) and unit > 0 else 0.0
         rows.append(Identifiability(name, status, contraction, text))
     return tuple(rows)
 

@@ -7,18 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from inference.identifiability.experiment import Experiment
-from inference.identifiability.sensitivity import term_changes, whiteners
+from inference.identifiability.experiment import STEP, Experiment
+from inference.identifiability.sensitivity import whiteners
 from simulator.parameters import Parameters
 from simulator.scene import Reference, Stroke
 
 __all__ = ["Prediction", "log_range_spread", "predict"]
 
 Array = NDArray[np.float64]
-
-# the maps from z are smooth: a central difference errs by 1e-10 of itself, and an error of the map
-# from the left multiplies the information, it is not added to it
-_DIFFERENCE = 1e-5
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -56,6 +52,8 @@ def log_range_spread(parameters: Parameters) -> float:
 
 def _limited(sd: Array, limit: float) -> Array:
     """Combine a standard deviation with that of a prior which has no curvature to add."""
+    if limit == 0.0:  # a law so narrow that its ends are one number
+        return np.zeros_like(sd)
     with np.errstate(divide="ignore"):
         return np.asarray(1 / np.sqrt(1 / sd**2 + 1 / limit**2))
 
@@ -78,17 +76,15 @@ def predict(experiment: Experiment, whitener: Array | None = None) -> Prediction
         except that no range is known worse than by its prior.
     """
     p = experiment.parameters
-    z, d, n = experiment.z, len(p), experiment.log_r.size
-    steps = _DIFFERENCE * np.eye(d)
-    plus, minus = p.terms(z + steps), p.terms(z - steps)
-    change = term_changes(experiment.terms, plus, minus) / (2 * _DIFFERENCE)
+    d, n = len(p), experiment.log_r.size
+    plus, minus = experiment.neighbours
     of = experiment.readings
     with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
         if whitener is None:
             whitener = whiteners(experiment.sensor, of)
         k = experiment.by_error.shape[2]
         jacobian = np.zeros((n, 3, d + k))
-        jacobian[:, :2, :d] = np.einsum("nij,njk->nik", whitener, of.by_term) @ change
+        jacobian[:, :2, :d] = np.einsum("nij,njk->nik", whitener, of.by_term) @ experiment.change
         jacobian[:, :2, [p.names.index(name) for name in experiment.known]] = 0.0
         jacobian[:, :2, d:] = np.einsum("nij,njk->nik", whitener, experiment.by_error)
         along = np.zeros((n, 3))
@@ -99,7 +95,7 @@ def predict(experiment: Experiment, whitener: Array | None = None) -> Prediction
     along[present, 2] = np.sqrt(law[5] ** 2 + (r * law[3]) ** 2)
     extra = [np.eye(d + k)]
     if isinstance(p.range_prior, Stroke):
-        centre = (plus.ranges[:, 4] - minus.ranges[:, 4]) / (2 * _DIFFERENCE)
+        centre = (plus.ranges[:, 4] - minus.ranges[:, 4]) / (2 * STEP)
         jacobian[present, 2, :d] = -centre * law[5]
         spread = _spread_row(along[present], plus.ranges, minus.ranges, law[5])
         extra.append(np.append(spread, np.zeros(k))[None])
@@ -165,7 +161,7 @@ def _spread_row(along: Array, plus: Array, minus: Array, inverse: float) -> Arra
     A log range read with variance s^2 is normal with variance v = w^2 + s^2, whose information on
     w is (dv/dw)^2 / (2 v^2) = 2 w^2 / v^2.
     """
-    rate = (1 / plus[:, 5] - 1 / minus[:, 5]) / (2 * _DIFFERENCE)  # dw / dz
+    rate = (1 / plus[:, 5] - 1 / minus[:, 5]) / (2 * STEP)  # dw / dz
     w = 1 / inverse
     with np.errstate(divide="ignore"):
         own = 1 / (along[:, 0] ** 2 + along[:, 1] ** 2)

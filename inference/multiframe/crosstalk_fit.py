@@ -73,17 +73,17 @@ def _fit(
         used = usable & np.isfinite(unit).all(axis=1) & (spread < _NARROW)
         if int((used & ~empty).sum()) <= int(free.sum()):
             return dataclasses.replace(fit, rank=0)
-        v = covariances(sensor, frames.readings, x[2] * unit)
-        along = x[2] * spread[:, None] * slope
-        v = v + along[:, :, None] * along[:, None, :]
+        own = covariances(sensor, frames.readings, np.zeros_like(unit))
+        common = np.stack([sensor.noise.relative * x[2] * unit, x[2] * spread[:, None] * slope])
+        used &= np.isfinite(own).all(axis=(1, 2)) & np.isfinite(common).all(axis=(0, 2))
         # linear in the range about the fitted one
         expected = unit - shift[:, None] * slope
         design = np.zeros((n, 2, 3))
         design[:, 0, 0] = design[:, 1, 1] = 1.0
         design[:, :, 2] = expected
-        root = np.linalg.cholesky(v[used])
-        matrix = np.linalg.solve(root, design[used])
-        target = np.linalg.solve(root, frames.readings[used][:, :, None])[:, :, 0]
+        whitener = _whitener(own[used], common[:, used])
+        matrix = np.einsum("nij,njk->nik", whitener, design[used])
+        target = np.einsum("nij,nj->ni", whitener, frames.readings[used])
         target = target - matrix[:, :, ~free] @ x[~free]
         flat = matrix[:, :, free].reshape(-1, int(free.sum()))
         solution, factor, rank = solve_weighted(flat, target.ravel())
@@ -95,7 +95,8 @@ def _fit(
             break
         miss = frames.readings - x[:2] - x[2] * expected
         pull = np.zeros((n, 2))
-        pull[used] = np.linalg.solve(v[used], miss[used][:, :, None])[:, :, 0]
+        white = np.einsum("nij,nj->ni", whitener, miss[used])
+        pull[used] = np.einsum("nji,nj->ni", whitener, white)
         gain = x[2] * spread**2 * np.einsum("ni,ni->n", slope, pull)
         shift = np.where(used, np.clip(gain, -3 * _NARROW, 3 * _NARROW), 0.0)
         better = _best_roots(task, roots, x)
@@ -106,6 +107,22 @@ def _fit(
         ):
             break
     return fit
+
+
+def _whitener(own: Array, common: Array) -> Array:
+    """Return W with W^T W the inverse of own + the sum of a a^T over a of common, (n, 2, 2).
+
+    The range's part may be a million times the rest: it is never added to it.
+    """
+    result = np.linalg.inv(np.linalg.cholesky(own))
+    for along in common:
+        w = np.einsum("nij,nj->ni", result, along)
+        root = np.hypot(1.0, np.hypot(w[:, 0], w[:, 1]))
+        # (I + w w^T)^(-1/2) = I - w w^T / (root (1 + root))
+        shrunk = w / root[:, None] / (1.0 + root)[:, None]
+        across = np.einsum("nj,nji->ni", w, result)
+        result = result - shrunk[:, :, None] * across[:, None, :]
+    return np.asarray(result)
 
 
 def _best_roots(task: Task, roots: Array, x: Array) -> NDArray[np.intp]:

@@ -34,14 +34,14 @@ def _solve_as(name: str, task: Task) -> TechniqueResult:
             "no values of the unknowns give the readings a likelihood that can be computed; check "
             "gain, noise and range_m"
         )
-    for _ in range(_WALKS):
+    for walk in range(_WALKS + 1):
         top = optima[0]
         _, facts = residuals_and_information(problem, top.x, top.positions)
         if facts.rank < len(problem):
             wider = 1.0
             break
         wider, better = widening(problem, top, facts)
-        if better is None:
+        if better is None or walk == _WALKS:
             break
         # the old one lies in the same valley, on the way to this
         optima[0] = better

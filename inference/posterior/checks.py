@@ -3,10 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.identifiability.before_data import check_discrepancy
 from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.gaussian import log_top
 from simulator.errors import InvalidInputError, RefusedError
-from simulator.frames import Frames, frames_from_columns
+from simulator.frames import Frames
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import Scene
 from simulator.sensor import Sensor
@@ -15,7 +16,6 @@ __all__ = [
     "MOST_FRAMES",
     "MOST_UNKNOWNS",
     "check_best_fit",
-    "check_frames",
     "check_scene_for_posterior",
 ]
 
@@ -30,39 +30,6 @@ _PRIOR_DRAWS = 256
 # wrong misses by less than the signal, which no sensor reads a million times above its noise; and
 # a log density of 1e12 a reading has rounding errors that a sampler takes for structure
 _MOST_MISFIT = 1e6
-
-
-def check_frames(sensor: Sensor, frames: Frames) -> None:
-    """Check frames that did not come through `simulator.frames.frames_from_columns`.
-
-    Parameters
-    ----------
-    sensor : Sensor
-        The sensor.
-    frames : Frames
-        As a caller made them.
-
-    Raises
-    ------
-    InvalidInputError
-        A pointer below /frames for each column that is empty, of another length, not finite, or
-        (gain) not positive.
-    """
-    first, second = sensor.columns
-    readings = np.asarray(frames.readings)
-    if readings.ndim != 2 or readings.shape[1] != 2:
-        raise InvalidInputError.at("/frames", "readings must be of shape (n, 2)")
-    columns = {
-        first: readings[:, 0],
-        second: readings[:, 1],
-        "time_s": frames.time_s,
-        "gain": frames.gain,
-        "object_present": frames.object_present,
-    }
-    try:
-        frames_from_columns(sensor, columns)
-    except InvalidInputError as error:
-        raise error.below("/frames") from None
 
 
 def check_scene_for_posterior(sensor: Sensor, scene: Scene, frames: Frames) -> None:
@@ -86,11 +53,7 @@ def check_scene_for_posterior(sensor: Sensor, scene: Scene, frames: Frames) -> N
         parameters = parameters_of(sensor, scene)
     except InvalidInputError as error:
         raise error.below("/scene") from None
-    if scene.motion == "static" and scene.discrepancy is not None:
-        raise RefusedError(
-            "an object at rest has one range, at which a discrepancy of its flux is no different "
-            "from another c2; leave `discrepancy` out, and give `object.c2` a wider prior"
-        )
+    check_discrepancy(scene)
     if len(parameters) > MOST_UNKNOWNS:
         raise RefusedError(
             f"the scene has {len(parameters)} unknowns, and posteriors were tested up to "
@@ -137,12 +100,20 @@ def check_best_fit(density: CollapsedDensity, z: Array) -> None:
 def _check_priors(parameters: Parameters) -> None:
     """Refuse priors that exclude one another, or every range."""
     # the effort is bounded; it refuses on its own where c0 and c1 exclude one another
-    draws = parameters.sample(np.random.default_rng(0), _PRIOR_DRAWS)
-    if not np.isfinite(parameters.terms(draws).ranges[:, 0]).any():
+    terms = parameters.terms(parameters.sample(np.random.default_rng(0), _PRIOR_DRAWS))
+    if terms.background is None or np.isfinite(terms.ranges[:, 0]).any():
+        return
+    nearer = terms.background[:, 1] <= parameters.reach_m[0]
+    if nearer.all():
         raise RefusedError(
-            "the shadow's c1 is so far below zero that the background would be negative at every "
-            "range in `range_m`; raise `background.shadow.c1`, or widen `range_m`"
+            "the background lies nearer than every range in `range_m`, and an object stands before "
+            "its background; raise `background.distance_m`, or lower `range_m`"
         )
+    also = " where the background is not nearer than every range" if nearer.any() else ""
+    raise RefusedError(
+        "the shadow's c1 is so far below zero that the background would be negative at every "
+        f"range in `range_m`{also}; raise `background.shadow.c1`, or widen `range_m`"
+    )
 
 
 def _check_empty(parameters: Parameters) -> None:

@@ -1,7 +1,6 @@
 """The collapsed density where the object's flux may differ smoothly from the model's."""
 
 import dataclasses
-import math
 from typing import Any
 
 import numpy as np
@@ -13,14 +12,11 @@ from inference.posterior.discrepancy_integral import integrate_flux_error
 from inference.posterior.gaussian import Pair
 from inference.posterior.rows import row_of
 from simulator.discrepancy import DiscrepancyBasis, discrepancy_basis
-from simulator.parameters import Parameters, Terms
-from simulator.scene import Reference, Stroke
+from simulator.parameters import Terms
 
-__all__ = ["DiscrepantDensity", "basis_of", "with_discrepancy"]
+__all__ = ["DiscrepantDensity", "with_discrepancy"]
 
 Array = NDArray[np.float64]
-
-_FAR = 4.0  # standard deviations of a prior of the ranges that the basis reaches
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -154,15 +150,6 @@ class DiscrepantDensity(CollapsedDensity):
         return out, centres
 
 
-def basis_of(parameters: Parameters) -> DiscrepancyBasis:
-    """Return the basis that reaches over the prior of the ranges."""
-    law = parameters.range_prior
-    if isinstance(law, Stroke | Reference):
-        return discrepancy_basis(law.low, law.high)
-    low, high = (float(x) for x in law.from_normal(np.array([-_FAR, _FAR])))
-    return discrepancy_basis(max(low, 0.0), high if math.isfinite(high) else law.high)
-
-
 def with_discrepancy(density: CollapsedDensity, discrepancy: float) -> DiscrepantDensity:
     """Give a density a smooth relative error of the object's flux.
 
@@ -177,5 +164,6 @@ def with_discrepancy(density: CollapsedDensity, discrepancy: float) -> Discrepan
     -------
     DiscrepantDensity
     """
+    basis = discrepancy_basis(*density.parameters.reach_m)
     fields = {f.name: getattr(density, f.name) for f in dataclasses.fields(CollapsedDensity)}
-    return DiscrepantDensity(**fields, discrepancy=discrepancy, basis=basis_of(density.parameters))
+    return DiscrepantDensity(**fields, discrepancy=discrepancy, basis=basis)

@@ -219,7 +219,7 @@ def merge(
     done = checkpoint.adaptations
     # a parameter that does not move has no finite time
     if done < len(_SLOW) and not _slowest(kept) < _SLOW[done]:
-        return _adapt(checkpoint, kept)
+        return _adapt(job, checkpoint, kept)
     verdict = judge(kept, job.settings.target_ess)
     columns = np.moveaxis(kept.z, -1, 0)
     least = min(effective_sample_size(draws) for draws in columns)
@@ -269,16 +269,20 @@ def _slowest(kept: Chains) -> float:
     return max(autocorrelation_time(x.reshape(-1, steps).T) for x in np.moveaxis(kept.z, -1, 0))
 
 
-def _adapt(checkpoint: Checkpoint, kept: Chains) -> Checkpoint:
-    """Fit the map to what was drawn so far, and forget the draws; or call for populations."""
+def _adapt(job: Job, checkpoint: Checkpoint, kept: Chains) -> Checkpoint:
+    """Fit the map to what was drawn so far, and forget the draws; or call for populations.
+
+    Populations are called for once: those that died on the way would die again.
+    """
     pending = Verdict(False, ("the proposal was still being adapted",))
     begun = dataclasses.replace(checkpoint, adaptations=checkpoint.adaptations + 1, verdict=pending)
     old = checkpoint.proposal
-    if old is None or old.transport is None:
+    if old is None or (old.transport is None and not checkpoint.populations):
         return dataclasses.replace(begun, ensembles=(), populations=(None,) * POPULATIONS)
     flat = kept.z.reshape(-1, kept.z.shape[-1])
     pilot = flat[np.linspace(0, len(flat) - 1, min(len(flat), _PILOT_DRAWS)).astype(int)]
-    new = dataclasses.replace(old, transport=fit_map(pilot, old.transport.shear))
+    transport = fit_map(pilot, shear_of(job.density()))
+    new = dataclasses.replace(old, transport=transport, share=_MAP_SHARE)
     return dataclasses.replace(
         begun,
         proposal=new,

@@ -128,4 +128,5 @@ def draw_weighted(
     if not math.isfinite(total):
         return WeightedDraws(z, log_density, np.full(n, 1 / n), math.inf, -math.inf)
     weights = np.exp(log_weights - total)
+    weights /= weights.sum()  # logs of 1e12 have rounding errors of 1e-4
     return WeightedDraws(z, log_density, weights, k_hat, total - math.log(n))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
-from inference.posterior.checks import check_frames, check_scene_for_posterior
+from inference.posterior.checks import check_scene_for_posterior
 from inference.posterior.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.discrepant import with_discrepancy
 from inference.posterior.ensemble import Ensemble
@@ -19,7 +19,7 @@ from inference.posterior.settings import SamplerSettings
 from inference.posterior.static import with_common_range
 from inference.posterior.verdict import Chains, Verdict, chains_of
 from simulator.errors import RefusedError
-from simulator.frames import Frames
+from simulator.frames import Frames, check_frames
 from simulator.parameters import parameters_of
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor, parse_sensor
@@ -68,7 +68,7 @@ class Job:
         arrays: dict[str, NDArray[Any]] = {}
         meta = {
             "sensor": self.sensor.model_dump(mode="json"),
-            "scene": self.scene.model_dump(mode="json", exclude_unset=True),
+            "scene": self.scene.model_dump(mode="json", exclude_none=True),
             "settings": self.settings.model_dump(mode="json"),
             "frames": pack_parts(self.frames, "frames", arrays),
         }

@@ -27,6 +27,7 @@ POPULATIONS = 2  # independent of one another, so that they can disagree
 _TEMPERED_FRAMES = 200  # at most; the walkers then start the wider, the more frames there are
 _IMPORTANCE_DRAWS = 2000
 _MOST_IMPORTANCE_DRAWS = 200_000
+_MOST_IMPORTANCE_FRAMES = 8_000_000  # draws times frames: ten seconds that nothing interrupts
 _TRIAL_DRAWS = 400
 _FITTING = 0.5  # effective share of the trial above which jumps are mostly accepted
 _MISFITTING = 0.1  # and below which the Laplace shapes are given up
@@ -142,12 +143,13 @@ def _importance(
     density: CollapsedDensity, proposal: Proposal, job: Job
 ) -> tuple[WeightedDraws, int]:
     """Draw until the effective sample size is reached, if that is in sight."""
-    count = max(_IMPORTANCE_DRAWS, 2 * job.settings.target_ess)
+    most = min(_MOST_IMPORTANCE_DRAWS, _MOST_IMPORTANCE_FRAMES // len(density.frames))
+    count = min(max(_IMPORTANCE_DRAWS, 2 * job.settings.target_ess), most)
     weighted = draw_weighted(density, proposal, job.stream(2), count)
     used = count
     if weighted.k_hat < MAX_K_HAT and weighted.ess < job.settings.target_ess:
         wanted = int(1.5 * count * job.settings.target_ess / max(weighted.ess, 1.0))
-        count = min(wanted, _MOST_IMPORTANCE_DRAWS)
+        count = min(wanted, most)
         weighted = draw_weighted(density, proposal, job.stream(2), count)
         used += count
     return weighted, used

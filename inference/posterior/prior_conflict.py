@@ -180,7 +180,9 @@ def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
     if not (near[0].any() or near[1].any()):
         return ()
     farthest = density.r0 if density.wave is None else 2 * math.pi / density.wave[0]
-    high = max(min(_BEYOND * float(ends[1]), farthest), distribution.high)
+    high = min(_BEYOND * float(ends[1]), farthest)
+    if math.isfinite(distribution.high):
+        high = max(high, distribution.high)
     wide = dataclasses.replace(
         density,
         parameters=dataclasses.replace(

@@ -239,7 +239,8 @@ class _Comparison:
     @property
     def words(self) -> str:
         if not math.isfinite(self.evidence):
-            return "without it no parameters within their priors explain the frames"
+            with_or_not = "without" if self.evidence > 0 else "with"
+            return f"{with_or_not} it no parameters within their priors explain the frames"
         spread = "" if math.isnan(self.predictive_error) else f" +- {self.predictive_error:.1f}"
         text = (
             f"with it the log evidence changes by {self.evidence:+.1f} +- {self.evidence_error:.1f}"
@@ -261,6 +262,8 @@ def _compare(larger: Candidate, smaller: Candidate) -> _Comparison:
         # without the term no parameters explain the frames; without both nothing is demanded
         gain = 0.0 if not math.isfinite(larger.log_evidence) else math.inf
         return _Comparison(gain, 0.0, gain, 0.0, True)
+    if not math.isfinite(larger.log_evidence):
+        return _Comparison(-math.inf, 0.0, -math.inf, 0.0, True)
     with np.errstate(invalid="ignore"):
         gains = larger.log_predictive - smaller.log_predictive
     total = float(gains.sum())

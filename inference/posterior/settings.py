@@ -23,9 +23,9 @@ class SamplerSettings(Validated):
         Effective sample size wanted for every parameter.
     max_seconds : float
         Wall time [s] after which no chunk begins and an unfinished run is summarised as it is. What
-        has begun is ended first: a chunk of about a second, or the search for starting points,
-        which takes a second of processor time for 100 frames and half a minute for the most frames
-        and nine unknowns.
+        has begun is ended first: a chunk of about a second, importance sampling of ten seconds at
+        most, or the search for starting points, which takes a second of processor time for 100
+        frames and half a minute for the most frames and nine unknowns.
     seed : int, optional
         Left out: drawn, and returned with the answer.
     """

@@ -23,7 +23,6 @@ _CLIMBS = 10  # of which the best, spread out, are climbed
 _ITERATIONS = 60
 _FOLLOWED = 4  # of them, the best, that are climbed on where they are not at the top
 _MORE_ITERATIONS = 340  # the valleys of readings a million times above their noise are long
-_SAME = 0.05  # Mahalanobis distance, in a tenth of a standard deviation, of one optimum
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -4,12 +4,10 @@ from typing import Annotated, Literal
 
 import pydantic
 
-from simulator.validated import Validated
+from simulator.validated import NonNegative, Positive, Validated
 
 __all__ = ["Observables", "TrackingSettings"]
 
-Positive = Annotated[float, pydantic.Field(gt=0)]
-NonNegative = Annotated[float, pydantic.Field(ge=0)]
 Share = Annotated[float, pydantic.Field(gt=0, lt=1)]
 Observables = Literal["readings", "w1", "w2", "derivatives"]
 

@@ -29,7 +29,7 @@ from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
 from inference.tracking.tracker import Tracker, tracker
 from simulator.errors import InvalidInputError
-from simulator.frames import Frames
+from simulator.frames import Frames, check_frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
@@ -129,11 +129,14 @@ def step(
     Raises
     ------
     InvalidInputError
-        At "/frames/time_s" where times are missing, repeated or go back; at "/frames/dw1_dt" and
-        its like where derivatives are tracked and missing; at "/state" for another tracker's state.
+        At "/frames/..." for a column of another length, or not finite, and for a gain that is not
+        positive; at "/frames/time_s" where times are missing, repeated or go back; at
+        "/frames/dw1_dt" and its like where derivatives are tracked and missing; at "/state" for
+        another tracker's state.
     """
     if state.signature != model.first.signature:
         raise InvalidInputError.at("/state", "belongs to another tracker")
+    check_frames(model.sensor, frames)
     times = _times(frames, float(state.numbers[TIME]))
     kinds = np.zeros(len(frames), dtype=np.uint8)
     if model.sensor.full_scale is not None:

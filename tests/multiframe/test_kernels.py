@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from inference.multiframe.coordinates import bounds_of, chain, physical
-from inference.multiframe.multistart import optimum_from
 from inference.multiframe.polish import _Profile
 from inference.multiframe.problem import FitProblem, fit_problem
 from inference.multiframe.slopes import SLOTS, frame_slopes
@@ -155,9 +154,3 @@ def test_gradient_of_the_profile_is_exact(kind: str, noise: dict[str, float]) ->
         step = h * np.eye(x.size)[j]
         slope = (profile(x + step)[0] - profile(x - step)[0]) / (2 * h)
         assert slope / sizes[j] == pytest.approx(gradient[j] / sizes[j], rel=2e-3, abs=3e-3)
-
-
-def test_a_start_without_likelihood_is_no_optimum() -> None:
-    problem = problem_of("pulsed", {}, {"object": OBJECT})
-    found = optimum_from(problem, np.array([800.0, 0.0, 800.0]))
-    assert found.deviance == np.inf or np.isfinite(found.x).all()

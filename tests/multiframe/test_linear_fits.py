@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from scipy import special
 
 from inference.estimate import estimate
 from inference.estimates import Status, TechniqueResult
+from inference.multiframe.crosstalk_fit import _whitener
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
 from simulator.scene import parse_scene
@@ -190,3 +192,22 @@ def test_obstacles_name_what_is_missing() -> None:
     assert "not linear" in reasons({"object": OBJECT, "background": wall})["shadow_fit"]
     few = frames.select(np.arange(3))
     assert "at least 4" in reasons({}, few)["object_fit"]
+
+
+@pytest.mark.parametrize("noise", [1e-13, 1e-9, 1e-5])
+def test_weights_where_the_range_is_far_less_certain_than_the_readings(noise: float) -> None:
+    """Against the covariance inverted with fifty digits; its parts are never added in doubles."""
+    rng = np.random.default_rng(1)
+    own = noise**2 * np.array([[[1.0, 0.3], [0.3, 2.0]]])
+    common = rng.standard_normal((2, 1, 2)) * np.array([noise, 1e-3])[:, None, None]
+    found = _whitener(own, common)[0]
+    with mpmath.workdps(50):
+        total = mpmath.matrix(own[0].tolist())
+        for part in common[:, 0]:
+            column = mpmath.matrix(part.tolist())
+            total += column * column.T
+        inverse = total**-1
+        expected = np.array(inverse.tolist(), dtype=float)
+        # a unit of the whitened readings in the last place of the largest weight
+        allowed = 100 * np.finfo(float).eps * float(max(abs(x) for x in inverse))
+    assert np.abs(found.T @ found - expected).max() <= allowed

@@ -8,16 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from inference.posterior import fold
+from inference.posterior import fold, launch
+from inference.posterior.importance import WeightedDraws, draw_weighted
 from inference.posterior.infer import infer
 from inference.posterior.posterior import Posterior
 from inference.posterior.settings import SamplerSettings
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
-from simulator.scene import parse_scene
+from simulator.scene import Scene, Stroke, parse_scene
 from simulator.sensor import parse_sensor
 from tests.posterior.scenes import OBJECT, data, example, sensor_of
 
+WIDE_HALF = {"prior": "halfnormal", "sd": 1.3}
 QUICK = SamplerSettings(seed=7, target_ess=50, max_seconds=60)
 
 
@@ -201,3 +203,65 @@ def test_importance_agrees_with_ensembles(kind: str) -> None:
         # five parameters, two kinds: a false alarm once in 5e4 runs
         assert abs(summary.mean - other.mean) < 4.9 * error
         assert other.rhat is None
+
+
+@pytest.mark.parametrize("law", [{"prior": "lognormal", "median": 1.0, "sigma": 0.7}, WIDE_HALF])
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+def test_a_law_of_the_ranges_may_have_no_end(kind: str, law: dict[str, Any]) -> None:
+    """Some frames lie in its outer twentieth, where the prior's doing is looked into."""
+    sensor = sensor_of(kind)
+    frames = data(sensor, frames=8, span=(0.1, 2.9)).frames
+    settings = SamplerSettings(method="importance", seed=1, target_ess=50)
+    posterior = infer(sensor, parse_scene({"object": OBJECT, "range_m": law}), frames, settings)
+    assert np.isfinite(posterior.range_m.mean).all()
+    assert posterior.verdict.converged
+
+
+def test_populations_that_die_are_not_called_for_again() -> None:
+    """A background's prior lies before nearly all ranges: the map is fitted to the draws then."""
+    sensor = sensor_of("pulsed")
+    strength = {"prior": "lognormal", "median": 0.02, "sigma": 1.0}
+    wall = {"strength": 0.017, "distance_m": 6.0, "shadow": {"c0": 0.056, "c1": 0.02}}
+    near = {"prior": "lognormal", "median": 1.0, "sigma": 0.5}
+    scene = {
+        "range_m": {"prior": "uniform", "low": 3.2, "high": 4.4},
+        "background": {"strength": strength, "distance_m": near},
+    }
+    frames = data(sensor, {"background": wall}, frames=6, span=(3.3, 4.2)).frames
+    job = fold.prepare(sensor, parse_scene(scene), frames, SamplerSettings(seed=1, ensembles=2))
+    checkpoint = fold.start(job)
+    for _ in range(2):
+        pieces = [fold.run(task) for task in fold.tasks(job, checkpoint)]
+        checkpoint = fold.merge(job, checkpoint, pieces)
+    assert [len(population.z) for population in checkpoint.populations if population] == [0, 0]
+    assert checkpoint.ensembles
+    assert checkpoint.proposal is not None
+    assert checkpoint.proposal.transport is not None
+
+
+def test_a_scene_made_in_python_is_stored_whole() -> None:
+    """Members that were never stated, as the tag of a prior, belong to what is stored."""
+    sensor, _, frames = example("pulsed", crosstalk=False)
+    scene = Scene(range_m=Stroke(low=0.1, high=3.0))
+    job = fold.prepare(sensor, scene, frames, SamplerSettings(seed=1))
+    assert fold.Job.from_bytes(job.to_bytes()).scene == scene
+
+
+def test_importance_sampling_is_bounded_whatever_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    counts: list[int] = []
+
+    def counting(*arguments: Any) -> WeightedDraws:
+        counts.append(arguments[-1])
+        return draw_weighted(*arguments)
+
+    monkeypatch.setattr(launch, "draw_weighted", counting)
+    monkeypatch.setattr(launch, "_MOST_IMPORTANCE_FRAMES", 60_000)
+    job = fold.prepare(
+        *example("pulsed", crosstalk=False),
+        SamplerSettings(seed=1, method="importance", target_ess=1_000_000),
+    )
+    checkpoint = fold.start(job)
+    assert counts == [3000] * len(counts)
+    assert not checkpoint.verdict.converged

@@ -94,7 +94,11 @@ def test_a_term_without_which_nothing_explains_the_frames_stays() -> None:
     nothing = candidate((), -math.inf, -math.inf, k_hat=-math.inf)
     (decision,) = decide(ONE, [nothing, candidate(("crosstalk",), -50.0, -60.0)])
     assert decision.kept
-    assert "no parameters" in decision.reason
+    assert "without it no parameters" in decision.reason
+    impossible = candidate(("crosstalk",), -math.inf, -math.inf, k_hat=-math.inf)
+    (decision,) = decide(ONE, [candidate((), -50.0, -60.0), impossible])
+    assert not decision.kept
+    assert "with it no parameters" in decision.reason
 
 
 @pytest.mark.parametrize(

@@ -41,6 +41,21 @@ BODIES: tuple[dict[str, Any], ...] = (
         },
         "frames": FRAMES | {"dw1_dt": [0.1, 0.2], "dw2_dt": [0.3, 0.4], "gain": [1.0, 2.0]},
     },
+    {  # every technique of many frames
+        "sensor": SENSOR | {"noise": {"read": [1e-6, 1e-6], "derivative": [1e-5, 1e-5]}},
+        "scene": {
+            "object": {"c0": 0.08, "c1": 0.0},
+            "crosstalk": [{"prior": "normal", "mean": 0.0, "sd": 0.1}] * 2,
+        },
+        "frames": {
+            "time_s": [0.0, 0.1, 0.2, 0.3],
+            "w1": [0.0147, 0.0119, 0.0099, 0.0085],
+            "w2": [0.441, 0.297, 0.212, 0.159],
+            "dw1_dt": [-0.033, -0.024, -0.017, -0.012],
+            "dw2_dt": [-1.76, -1.13, -0.67, -0.42],
+        },
+        "techniques": ["crosstalk_fit", "joint_fit", "iterative_differential", "object_fit"],
+    },
     {
         "sensor": SINE_WAVE,
         "scene": SCENE | {"background": {"strength": 0.8, "distance_m": 3.0, "shadow": "object"}},

@@ -60,6 +60,12 @@ def test_depth() -> None:
             decode(raw)
 
 
+def test_a_string_that_is_never_closed_is_looked_at_once() -> None:
+    """A million quotes, each of which might close it: a search from each would take an hour."""
+    with pytest.raises(MalformedError, match="not JSON"):
+        decode(b"[" + b"[]," * 2 * MAX_DEPTH + b'"' + b'\\"' * 10**6)
+
+
 @pytest.mark.parametrize(
     ("raw", "pointer"),
     [(b'{"a": 1, "a": 1}', "/a"), (b'{"x/": [0, {"b": 1, "c": 2, "b": 3}]}', "/x~1/1/b")],

@@ -172,12 +172,10 @@ def test_a_law_of_the_logarithm_below_zero() -> None:
 
 def test_extreme_laws_overflow_without_a_warning() -> None:
     z = np.array([-3.0, 0.0, 3.0])
-    assert LogNormal(median=1e300, sigma=1e3).distribution().from_normal(z).tolist() == [
-        0.0,
-        pytest.approx(1e300, rel=1e-12),
-        math.inf,
-    ]
-    assert Normal(mean=1.7e308, sd=1e308).distribution().from_normal(3.0) == math.inf
-    narrow = TruncatedNormal(mean=0.0, sd=1e-320, low=-1.0, high=1.0).distribution()
+    wide = Distribution("normal", True, math.log(1e300), 1e3, 0.0, math.inf)
+    assert wide.from_normal(z).tolist() == [0.0, pytest.approx(1e300, rel=1e-12), math.inf]
+    far = Distribution("normal", False, 1.7e308, 1e308, -math.inf, math.inf)
+    assert far.from_normal(3.0) == math.inf
+    narrow = Distribution("normal", False, 0.0, 1e-320, -1.0, 1.0)
     assert np.all(np.isfinite(narrow.from_normal(z)))
     assert float(narrow.log_density(0.5)) == -math.inf

@@ -1,5 +1,6 @@
 """Objects that come and go, gaps, saturation, drifting crosstalk, uncertain scenes, bad input."""
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,6 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from inference.estimates import Status
-from inference.posterior.rows import law_of
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import state_from_bytes
 from inference.tracking.track import step, track
@@ -288,6 +288,24 @@ def test_times_are_needed_and_must_increase() -> None:
         step(model, state, frames_of(readings))
 
 
+def test_bad_frames_are_named() -> None:
+    sensor, scene = sensor_of(SNR_100), scene_of(PLATE)
+    readings = read(sensor, scene, np.full(3, 0.7), np.random.default_rng(1))
+    good = frames_of(readings)
+    spoilt = readings.copy()
+    spoilt[1, 0] = np.nan
+    gains = (np.array([1.0, 0.0, 1.0]), np.array([1.0, np.nan, 1.0]), np.ones(2))
+    first = sensor.columns[0]
+    for frames, column in (
+        (dataclasses.replace(good, readings=spoilt), first),
+        (dataclasses.replace(good, readings=readings[:0], time_s=np.empty(0)), first),
+        *((dataclasses.replace(good, gain=gain), "gain") for gain in gains),
+        (dataclasses.replace(good, object_present=np.ones(2, dtype=bool)), "object_present"),
+    ):
+        with pytest.raises(InvalidInputError, match=f"/frames/{column}"):
+            track(sensor, scene, frames)
+
+
 def test_a_state_belongs_to_its_tracker() -> None:
     sensor = sensor_of(SNR_100)
     one, other = tracker(sensor, scene_of(PLATE)), tracker(sensor, scene_of(FOLDED))
@@ -347,8 +365,6 @@ def test_a_stroke_is_a_support_and_a_static_object_stands_still() -> None:
     stroke = scene_of(PLATE, range_m={"prior": "stroke", "low": 0.2, "high": 2.0})
     model = tracker(sensor, stroke)
     assert np.exp(model.curve.start) == pytest.approx(0.2)
-    law = parameters_of(sensor, scene_of(PLATE)).terms(np.zeros((1, 0))).ranges
-    assert len(law_of(law, 0)) == 8
     static = scene_of(PLATE, motion="static")
     readings = read(sensor, static, np.full(100, 0.7), np.random.default_rng(1))
     result = track(sensor, static, frames_of(readings), TrackingSettings(visit_s=1e6))
