@@ -244,12 +244,6 @@ class Information:
         shared = self.sd_of(mean, of_errors)[0]
         return float(np.sqrt(own + shared**2))
 
-    def correlation(self) -> Array:
-        """Correlations of the bound, shape (d, d); nan for what is not identifiable."""
-        covariance = self.factor @ self.factor.T
-        sd = np.where(np.isfinite(self.sd), np.sqrt(np.diag(covariance)), np.nan)
-        return np.asarray(covariance / np.outer(sd, sd))
-
 
 def _triangle(matrix: Array) -> Array:
     """Return R of a QR decomposition with rows sorted by size, which is stable for each row."""

@@ -39,16 +39,6 @@ class LeaveOneOut:
     k_hat: Array
 
     @property
-    def total(self) -> float:
-        """Sum over the frames."""
-        return float(self.log_predictive.sum())
-
-    @property
-    def error(self) -> float:
-        """Standard error of the sum, from the frames' own spread; nan for a single frame."""
-        return standard_error(self.log_predictive)
-
-    @property
     def worst_k_hat(self) -> float:
         """Largest k-hat."""
         return float(self.k_hat.max())

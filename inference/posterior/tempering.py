@@ -49,8 +49,6 @@ class Population:
         Points, some of them equal.
     log_likelihood, log_prior : ndarray, shape (n,)
         Of every point; the prior up to the constant of `Parameters.log_prior`.
-    log_evidence : float
-        Log of the mean likelihood over the prior, as the temperatures' weights estimate it.
     calls : int
         Density evaluations.
     """
@@ -58,13 +56,10 @@ class Population:
     z: Array
     log_likelihood: Array
     log_prior: Array
-    log_evidence: float
     calls: int
 
 
-def temper(
-    density: CollapsedDensity, rng: np.random.Generator, count: int, sweeps: int = _SWEEPS
-) -> Population:
+def temper(density: CollapsedDensity, rng: np.random.Generator, count: int) -> Population:
     """Bring a population from the prior to the posterior.
 
     Parameters
@@ -75,22 +70,19 @@ def temper(
         Source of randomness.
     count : int
         Size of the population; four times as many are drawn from the prior at first.
-    sweeps : int
-        Moves of the whole population at each temperature.
 
     Returns
     -------
     Population
-        Empty, of evidence zero, where fewer than four draws of the prior explain the frames at all.
+        Empty where fewer than four draws of the prior explain the frames at all.
     """
     z = density.parameters.sample(rng, 4 * count)
     likelihood = density.log_likelihood(z)
     calls = len(z)
     finite = np.isfinite(likelihood)
-    log_evidence = float(np.log(max(finite.mean(), 1e-300)))
     z, likelihood = z[finite][:count], likelihood[finite][:count]
     if len(z) < 4:
-        return Population(z[:0], likelihood[:0], likelihood[:0], -np.inf, calls)
+        return Population(z[:0], likelihood[:0], likelihood[:0], calls)
     count, d = z.shape
     prior = density.parameters.log_prior(z)
     power = 0.0
@@ -98,13 +90,12 @@ def temper(
     for _ in range(_MOST_TEMPERATURES):
         new_power = next_power(likelihood, power)
         weights = np.exp((new_power - power) * (likelihood - likelihood.max()))
-        log_evidence += (new_power - power) * float(likelihood.max()) + np.log(weights.mean())
         weights /= weights.sum()
         power = new_power
         positions = (rng.random() + np.arange(count)) / count
         index = np.minimum(np.searchsorted(np.cumsum(weights), positions), count - 1)
         z, likelihood, prior = z[index], likelihood[index], prior[index]
-        for sweep in range(_LAST_SWEEPS if power == 1.0 else sweeps):
+        for sweep in range(_LAST_SWEEPS if power == 1.0 else _SWEEPS):
             a, b = rng.permutation(count), rng.permutation(count)
             scale = 1.0 if sweep % 4 == 3 else jump * np.exp(0.3 * rng.standard_normal((count, 1)))
             spread = z.std(axis=0)
@@ -120,7 +111,7 @@ def temper(
             likelihood = np.where(accept, trial_likelihood, likelihood)
         if power == 1.0:
             break
-    return Population(z, likelihood, prior, float(log_evidence), calls)
+    return Population(z, likelihood, prior, calls)
 
 
 def tempered_walkers(

@@ -209,7 +209,6 @@ def test_leave_one_out_of_draws_of_equal_weight_and_weighted_ones() -> None:
         assert plain.log_predictive[j] == pytest.approx(wanted, abs=0.08)
         assert weighted.log_predictive[j] == pytest.approx(wanted, abs=0.08)
     assert plain.worst_k_hat < 0.5
-    assert plain.error == pytest.approx(math.sqrt(n) * plain.log_predictive.std(ddof=1))
 
 
 def test_a_frame_without_density_under_some_draw_has_no_k_hat() -> None:
