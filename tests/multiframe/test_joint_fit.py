@@ -11,8 +11,9 @@ from scipy import special
 from inference.estimate import estimate
 from inference.estimates import Status, TechniqueResult
 from inference.identifiability.experiment import Experiment, information
+from inference.multiframe import joint_fit
 from inference.multiframe.information import residuals_and_information
-from inference.multiframe.multistart import find_optima, optimum_from
+from inference.multiframe.multistart import Optimum, find_optima, optimum_from
 from inference.multiframe.problem import fit_problem
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
@@ -290,3 +291,19 @@ def test_settings_of_the_joint_fit_give_its_answer() -> None:
         one, other = found.results
         assert one.parameters == other.parameters
         np.testing.assert_array_equal(one.roots_m, other.roots_m)
+
+
+def test_walks_without_end_leave_an_answer_in_one_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every walk meets a better optimum: values, bounds and optima are those of the same one."""
+
+    def restless(_: Any, top: Optimum, __: Any) -> tuple[float, Optimum]:
+        return 1.0, dataclasses.replace(top, x=top.x * (1 + 1e-4), deviance=top.deviance - 1.0)
+
+    monkeypatch.setattr(joint_fit, "widening", restless)
+    sensor = sensor_of("pulsed")
+    result = fitted(sensor, {}, data(sensor, {"object": OBJECT}, path(16)))
+    assert result.parameters is not None
+    assert result.fit is not None
+    for name, value in result.fit["optima"][0]["parameters"].items():
+        assert result.parameters[name]["value"] == value
+    assert result.fit["optima"][0]["excess_deviance"] == 0.0
