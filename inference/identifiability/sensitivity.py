@@ -14,7 +14,14 @@ from simulator.object_model import quadratic_minimum
 from simulator.parameters import Terms
 from simulator.sensor import Noise, PulsedSensor, Sensor
 
-__all__ = ["COORDINATES", "Sensitivity", "sensitivity", "term_changes", "whiteners"]
+__all__ = [
+    "COORDINATES",
+    "Sensitivity",
+    "sensitivity",
+    "term_changes",
+    "whitener_of",
+    "whiteners",
+]
 
 Array = NDArray[np.float64]
 
@@ -202,10 +209,6 @@ def whiteners(sensor: Sensor, of: Sensitivity) -> Array:
     ndarray, shape (n, 2, 2)
         Lower triangular [1 / reading units].
 
-    Notes
-    -----
-    The parts are those of `simulator.readings.noise_parts`; the determinant is a sum of squares,
-    so that nothing cancels where a common relative error is far above the read noise.
     """
     noise: Noise = sensor.noise
     unit = noise.read[1]
@@ -216,13 +219,34 @@ def whiteners(sensor: Sensor, of: Sensitivity) -> Array:
     shared = shot.min(axis=1) if sensor.kind == "pulsed" else np.zeros(len(mean))
     own1, own2 = (own + shot - shared[:, None]).T
     s1, s2 = noise.relative * signal.T
+    return whitener_of(own1, own2, shared, s1, s2) / unit
+
+
+def whitener_of(own1: Array, own2: Array, shared: Array, s1: Array, s2: Array) -> Array:
+    """Return W with W^T W the inverse covariance of two readings, given the noise's parts.
+
+    Parameters
+    ----------
+    own1, own2, shared, s1, s2 : ndarray, shape (n,)
+        Those of `simulator.readings.noise_parts`.
+
+    Returns
+    -------
+    ndarray, shape (n, 2, 2)
+        Lower triangular.
+
+    Notes
+    -----
+    The determinant is a sum of squares, so that nothing cancels where a common relative error is
+    far above the read noise.
+    """
     first = own1 + shared + s1 * s1
     cross = shared + s1 * s2
     determinant = own1 * own2 + shared * (own1 + own2) + own2 * s1**2 + own1 * s2**2
     determinant = determinant + shared * (s1 - s2) ** 2
     root, area = np.sqrt(first), np.sqrt(determinant)
-    whitener = np.zeros((len(mean), 2, 2))
+    whitener = np.zeros((len(root), 2, 2))
     whitener[:, 0, 0] = 1 / root
     whitener[:, 1, 0] = -cross / root / area
     whitener[:, 1, 1] = root / area
-    return np.asarray(whitener / unit)
+    return whitener

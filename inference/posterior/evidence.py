@@ -141,8 +141,7 @@ def _distinct(optima: list[Optimum]) -> list[Optimum]:
     """Drop optima that lie within half a standard deviation of a better one."""
     kept: list[Optimum] = []
     for optimum in sorted(optima, key=lambda o: -o.log_density):
-        steps = [np.linalg.solve(other.factor, optimum.z - other.z) for other in kept]
-        if all(np.linalg.norm(step) >= 0.5 for step in steps):
+        if not any(other.is_near(optimum.z) for other in kept):
             kept.append(optimum)
     return kept
 

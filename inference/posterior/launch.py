@@ -131,10 +131,8 @@ def _with(optima: list[Optimum], found: Optimum | None) -> list[Optimum]:
     """Add an optimum that is not among those found before, and drop what it makes negligible."""
     if found is None:
         return optima
-    for other in optima:
-        step = np.linalg.solve(other.factor, found.z - other.z)
-        if np.linalg.norm(step) < 0.5:
-            return optima
+    if any(other.is_near(found.z) for other in optima):
+        return optima
     every = sorted([*optima, found], key=lambda optimum: -optimum.log_density)
     return [o for o in every if o.log_density > every[0].log_density - 20.0]
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.identifiability.sensitivity import whitener_of
 from inference.posterior.collapsed import CollapsedDensity, empty_frame_log_likelihood
 from inference.posterior.curve_table import integration_bounds, tabulate
 from inference.posterior.discrepant import DiscrepantDensity
@@ -173,22 +174,6 @@ class Linearisation:
     jacobian: Array
 
 
-def _whitener(parts: Array) -> Array:
-    """Return W with W^T W = inverse covariance, shape (frames, 2, 2)."""
-    own1, own2, shared, s1, s2 = parts.T
-    first = own1 + shared + s1 * s1
-    cross = shared + s1 * s2
-    # the determinant as a sum of squares (`inference.posterior.integrand`)
-    determinant = own1 * own2 + shared * (own1 + own2) + own2 * s1**2 + own1 * s2**2
-    determinant = determinant + shared * (s1 - s2) ** 2
-    whitener = np.zeros((parts.shape[0], 2, 2))
-    root = np.sqrt(first)
-    whitener[:, 0, 0] = 1 / root
-    whitener[:, 1, 1] = root / np.sqrt(determinant)
-    whitener[:, 1, 0] = -cross / root / np.sqrt(determinant)
-    return whitener
-
-
 def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearisation:
     """Linearise the readings in z, ranges eliminated (variable projection).
 
@@ -219,7 +204,7 @@ def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearis
         warps = np.column_stack([basis @ coefficients, slope @ coefficients])
     everything: list[Any] = [*arguments[:3], positions, density.frames, *arguments[6:], warps]
     _moments(means, slopes, parts, *everything)
-    whitener = _whitener(parts)
+    whitener = whitener_of(*parts.T)
     residual = np.einsum("nij,nj->ni", whitener, density.frames[:, :2] - means[0])
     change = (means[1 : d + 1] - means[d + 1 :]) / (2 * _DIFFERENCE)
     jacobian = -np.einsum("nij,dnj->nid", whitener, change)

@@ -22,6 +22,7 @@ _SCREEN = 600  # points of the prior that are looked at
 _CLIMBS = 10  # of which the best, spread out, are climbed
 _ITERATIONS = 60
 _FOLLOWED = 4  # of them, the best, that are climbed on where they are not at the top
+_NEAR = 0.5  # standard deviations within which two optima are one
 _MORE_ITERATIONS = 340  # the valleys of readings a million times above their noise are long
 
 
@@ -49,6 +50,11 @@ class Optimum:
         d = self.z.size
         logdet = float(np.log(np.diagonal(self.factor)).sum())
         return self.log_density + logdet + 0.5 * d * math.log(2 * math.pi)
+
+    def is_near(self, z: Array) -> bool:
+        """Tell whether z of shape (d,) lies within half a standard deviation."""
+        step = linalg.solve_triangular(self.factor, z - self.z, lower=True)
+        return bool(np.linalg.norm(step) < _NEAR)
 
 
 def _profile(density: CollapsedDensity, z: Array) -> tuple[Array, Array]:
@@ -234,24 +240,17 @@ def find_optima(density: CollapsedDensity, rng: np.random.Generator) -> list[Opt
     best = [climb(density, z, _MORE_ITERATIONS) for z, value in best if np.isfinite(value)]
     ends = sorted([*best, *others], key=lambda end: -end[1])
     optima: list[Optimum] = []
-    visited: list[tuple[Array, Array]] = []
+    visited: list[Optimum] = []
     for z, value in ends:
         if not np.isfinite(value) or value < ends[0][1] - 60.0:
             continue
-        if any(
-            np.linalg.norm(linalg.solve_triangular(f, z - y, lower=True)) < 0.5 for y, f in visited
-        ):
+        if any(one.is_near(z) for one in visited):
             continue
         optimum = refine(density, z)
         if optimum is None:
             continue
-        visited.append((z, optimum.factor))
-        visited.append((optimum.z, optimum.factor))
-        near = [
-            np.linalg.norm(linalg.solve_triangular(o.factor, optimum.z - o.z, lower=True)) < 0.5
-            for o in optima
-        ]
-        if not any(near):
+        visited += [dataclasses.replace(optimum, z=z), optimum]
+        if not any(one.is_near(optimum.z) for one in optima):
             optima.append(optimum)
     optima.sort(key=lambda optimum: -optimum.log_density)
     return [o for o in optima if o.log_density > optima[0].log_density - 20.0]
