@@ -7,6 +7,7 @@ from inference.estimates import LeftOut
 from inference.realtime.known import Known, known_of
 from inference.realtime.technique import Technique
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
+from simulator.errors import listed
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor, SineWaveSensor
@@ -30,10 +31,6 @@ class Plan:
 
     chosen: str | None
     left_out: tuple[LeftOut, ...]
-
-
-def _plural(paths: list[str]) -> str:
-    return paths[0] if len(paths) == 1 else ", ".join(paths[:-1]) + " and " + paths[-1]
 
 
 def obstacle(
@@ -84,7 +81,7 @@ def obstacle(
             )
     missing = [path for path in technique.needs if not known.has(path)]
     if missing:
-        return f"needs {_plural(missing)} as known numbers"
+        return f"needs {listed(missing)} as known numbers"
     if technique.obstacle is not None:
         return technique.obstacle(sensor, scene, known, frames)
     return None

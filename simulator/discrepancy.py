@@ -35,9 +35,9 @@ _NEGLECTED = 1e-4  # share of the variance: a hundredth of the error's size
 _LONGEST = 8.0  # e-folds; below exp(-8) of the largest range the error is taken as constant
 
 
-def matern(lag: Array) -> Array:
-    """Return the Matern 5/2 correlation at lags of log r."""
-    x = math.sqrt(5.0) * np.abs(lag) / DISCREPANCY_LENGTH
+def matern(lag: Array, length: float = DISCREPANCY_LENGTH) -> Array:
+    """Return the Matern 5/2 correlation of a length at lags of log r."""
+    x = math.sqrt(5.0) * np.abs(lag) / length
     return np.asarray((1.0 + x + x * x / 3.0) * np.exp(-x))
 
 

@@ -7,9 +7,10 @@
     └── RefusedError        valid input for which there is no answer, with the reason and the remedy
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-__all__ = ["HybridTofError", "InvalidInputError", "Problem", "RefusedError", "escape"]
+__all__ = ["HybridTofError", "InvalidInputError", "Problem", "RefusedError", "escape", "listed"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +32,11 @@ class Problem:
 def escape(name: str) -> str:
     """Escape a member's name for a JSON pointer (RFC 6901)."""
     return name.replace("~", "~0").replace("/", "~1")
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return "a", "a and b" or "a, b and c"."""
+    return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
 class HybridTofError(Exception):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from inference.identifiability.experiment import Experiment, information
 from inference.identifiability.information import Information
 from inference.identifiability.remedies import Remedy, remedies, span
+from simulator.errors import listed
 
 __all__ = ["Diagnosis"]
 
@@ -137,8 +138,7 @@ class Diagnosis:
         ]
         if not partners:
             return "the readings do not depend on it"
-        together = " and ".join(filter(None, [", ".join(partners[:-1]), partners[-1]]))
-        return f"the readings stay the same when it and {together} change together"
+        return f"the readings stay the same when it and {listed(partners)} change together"
 
     def _faint(self, parameter: str, sd: float) -> str:
         """Say what hides a parameter that noise-free readings would tell."""

@@ -1,7 +1,6 @@
 """Whether frames determine what is unknown, told after the fit with the reason and the remedy."""
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from scipy import special
@@ -10,15 +9,11 @@ from inference.identifiability.information import Information
 from inference.multiframe.multistart import Optimum
 from inference.multiframe.problem import FitProblem
 from inference.multiframe.report import FALSE_ALARM, describe
-from simulator.errors import RefusedError
+from simulator.errors import RefusedError, listed
 
 __all__ = ["LIMIT", "refuse_if_open"]
 
 LIMIT = 0.1  # relative standard deviation of the ranges that the unknowns share out
-
-
-def _words(paths: Sequence[str]) -> str:
-    return paths[0] if len(paths) == 1 else ", ".join(paths[:-1]) + " and " + paths[-1]
 
 
 def _still(problem: FitProblem) -> bool:
@@ -64,7 +59,7 @@ def refuse_if_open(problem: FitProblem, top: Optimum, facts: Information, wider:
             else "the frames do not tell them apart"
         )
         raise RefusedError(
-            f"{_words(names or list(problem.names))} cannot be determined (rank {facts.rank} of "
+            f"{listed(names or list(problem.names))} cannot be determined (rank {facts.rank} of "
             f"{len(problem)}): {cause}; move the object nearer and farther, add frames of the "
             "empty scene (object_present false), or state one of them as known"
         )
@@ -79,7 +74,7 @@ def refuse_if_open(problem: FitProblem, top: Optimum, facts: Information, wider:
         cause = (
             "the object does not move: all frames read the same but for noise"
             if still
-            else (f"{_words(open_ones or list(problem.names))} are too uncertain")
+            else (f"{listed(open_ones or list(problem.names))} are too uncertain")
         )
         raise RefusedError(
             f"the ranges would have a common relative standard deviation of {typical:.2g}, more "

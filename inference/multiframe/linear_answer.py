@@ -12,6 +12,7 @@ from scipy import special
 from inference.estimates import TechniqueResult
 from inference.multiframe.problem import fit_problem
 from inference.multiframe.ranges import Answer, frame_ranges
+from inference.multiframe.report import FALSE_ALARM, entry
 from inference.multiframe.weighted import LinearFit
 from inference.realtime.net import SATURATED, rule_out
 from inference.realtime.technique import Task
@@ -20,9 +21,6 @@ from simulator.errors import RefusedError
 __all__ = ["linear_answer", "not_identified", "without_warnings"]
 
 Array = NDArray[np.float64]
-
-_IDENTIFIED, _WEAK = 0.1, 1.0
-_FALSE_ALARM = 1e-3
 
 
 def not_identified(reason: str) -> dict[str, Any]:
@@ -50,13 +48,7 @@ def without_warnings(
 
 
 def _entry(value: float, sd: float, size: float) -> dict[str, Any]:
-    relative = sd / size if size > 0 else math.inf
-    status = "identified" if relative < _IDENTIFIED else "weak"
-    return {
-        "value": float(value),
-        "sd": sd if math.isfinite(sd) else None,
-        "status": status if relative < _WEAK else "not_identified",
-    }
+    return entry(float(value), float(sd), sd / size if size > 0 else math.inf)
 
 
 def linear_answer(
@@ -107,7 +99,7 @@ def linear_answer(
         "chi_square": fit.chi_square,
         "degrees_of_freedom": freedom,
         "p_value": p_value,
-        "misfit": p_value < _FALSE_ALARM,
+        "misfit": p_value < FALSE_ALARM,
         "rank": fit.rank,
         "optima": [],
     }

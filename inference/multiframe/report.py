@@ -13,7 +13,7 @@ from inference.multiframe.information import residuals_and_information
 from inference.multiframe.multistart import Optimum
 from inference.multiframe.problem import FitProblem
 
-__all__ = ["FALSE_ALARM", "describe", "fit_report"]
+__all__ = ["FALSE_ALARM", "describe", "entry", "fit_report"]
 
 Array = NDArray[np.float64]
 
@@ -62,13 +62,26 @@ def describe(
     )
     found: dict[str, Any] = {}
     for name, value, sd, size in zip(problem.names, values, sds, relative, strict=True):
-        status = "identified" if size < _IDENTIFIED else "weak"
-        found[name] = {
-            "value": float(value) if math.isfinite(value) else None,
-            "sd": float(sd) if math.isfinite(sd) else None,
-            "status": status if size < _WEAK else "not_identified",
-        }
+        found[name] = entry(float(value), float(sd), float(size))
     return found
+
+
+def entry(value: float, sd: float, relative: float) -> dict[str, Any]:
+    """Return ``value``, ``sd`` and ``status`` of an unknown that was fitted.
+
+    Parameters
+    ----------
+    value, sd : float
+        In SI or reading units; None in their place where they are not finite.
+    relative : float
+        Standard deviation of its logarithm, or of crosstalk against the light of the scene.
+    """
+    status = "identified" if relative < _IDENTIFIED else "weak"
+    return {
+        "value": value if math.isfinite(value) else None,
+        "sd": sd if math.isfinite(sd) else None,
+        "status": status if relative < _WEAK else "not_identified",
+    }
 
 
 def fit_report(

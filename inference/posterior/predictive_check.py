@@ -10,6 +10,7 @@ from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.fit_residuals import FitResiduals, fit_residuals
 from inference.posterior.job import Job
 from inference.posterior.posterior import Fit, FitCheck
+from simulator.discrepancy import matern
 
 __all__ = ["predictive_check"]
 
@@ -45,8 +46,7 @@ def _wander(of: FitResiduals) -> Array:
     """Square of the residuals under a Matern 5/2 kernel along log r: large where they wander."""
     if of.log_r.size < 3:
         return np.zeros(len(of.across))
-    s = math.sqrt(5.0) * np.abs(of.log_r[:, None] - of.log_r) / _LENGTH
-    kernel = (1.0 + s + s * s / 3.0) * np.exp(-s)
+    kernel = matern(of.log_r[:, None] - of.log_r, _LENGTH)
     return np.asarray(np.sum((of.across @ kernel) * of.across, axis=1))
 
 

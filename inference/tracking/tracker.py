@@ -25,6 +25,7 @@ from inference.tracking.tabulate import (
     means_over,
     scan_of,
 )
+from simulator.discrepancy import matern
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.parameters import Terms, parameters_of
 from simulator.scene import Reference, Scene, Stroke
@@ -301,7 +302,7 @@ def _columns(
 def discrepancy_shapes(positions: Array, sd: float) -> Array:
     """Return the principal shapes of a smooth relative error of the object's flux.
 
-    Its covariance is Matern 5/2 of length 1 in log r. The shapes hold all but a thousandth of its
+    Its covariance is `simulator.discrepancy.matern`. The shapes hold all but a thousandth of its
     variance.
 
     Parameters
@@ -316,8 +317,7 @@ def discrepancy_shapes(positions: Array, sd: float) -> Array:
     ndarray, shape (k, n)
     """
     nodes = np.linspace(positions[0], positions[-1], 200)
-    lag = math.sqrt(5.0) * np.abs(nodes[:, None] - nodes[None, :])
-    values, vectors = np.linalg.eigh((1.0 + lag + lag**2 / 3.0) * np.exp(-lag))
+    values, vectors = np.linalg.eigh(matern(nodes[:, None] - nodes))
     values, vectors = values[::-1], vectors[:, ::-1]
     kept = int(np.searchsorted(np.cumsum(values), 0.999 * values.sum())) + 1
     shapes = sd * np.sqrt(values[:kept]) * vectors[:, :kept]
