@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.priors import Distribution, LogNormal, LogUniform, Uniform
+from simulator.priors import Distribution, LogNormal, Uniform
 from simulator.scene import Reference, Scene, Stroke
 from simulator.sensor import PulsedSensor, Sensor
 from simulator.unknowns import Unknown, Values
@@ -28,7 +28,8 @@ def range_prior(sensor: Sensor, scene: Scene) -> RangePrior:
         high = min(sensor.max_range_m, _DEFAULT_RANGE[1], limit)
         # a sensor that sees less than 2 cm still has ranges
         low = _DEFAULT_RANGE[0] if high > _DEFAULT_RANGE[0] else high / 100
-        return LogUniform(low=low, high=high).distribution()
+        # not a `LogUniform`: sizes are asked of what is stated, not of what follows from it
+        return Distribution("uniform", True, 0.0, 1.0, low, high)
     if isinstance(scene.range_m, Stroke | Reference):
         return type(scene.range_m)(low=scene.range_m.low, high=min(scene.range_m.high, limit))
     return scene.range_m.distribution().truncated(0.0, limit)

@@ -294,7 +294,8 @@ def eliminate(
     if common_range and moves.any():
         direction = along / np.linalg.norm(along)
         shift = np.einsum("ni,nid->d", direction, both)
-        across = (both - direction[:, :, None] * shift)[moves].reshape(-1, d + k)
+        across = (both - direction[:, :, None] * shift)[moves]
+        across = across.reshape(2 * len(across), d + k)  # nothing may be unknown
         # the difference of two vectors: rounding is that of the larger, over all frames
         largest = np.linalg.norm(sizes[moves], axis=0) / np.sqrt(2 * moves.sum())
         before = np.maximum(np.repeat(sizes[moves], 2, axis=0), largest)

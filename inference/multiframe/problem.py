@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from inference.multiframe.climb import Instrument
 from inference.multiframe.coordinates import KNOWN, SAME, Layout, bounds_of, chain, physical
 from inference.multiframe.slopes import SLOTS
+from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import Quantity, Scene
@@ -230,6 +231,8 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
     ------
     InvalidInputError
         Where the scene breaks a rule.
+    RefusedError
+        Where a reading overflows in units of its noise.
     """
     parameters = parameters_of(sensor, scene)
     noise = sensor.noise
@@ -239,7 +242,14 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
     near, far = parameters.range_prior.low, min(parameters.range_prior.high, sensor.max_range_m)
     near = max(near, far * 1e-6)
     gain = np.ones(len(frames)) if frames.gain is None else frames.gain
-    readings = np.ascontiguousarray(np.column_stack([frames.readings / unit, gain]))
+    with np.errstate(over="ignore"):
+        scaled = frames.readings / unit
+    if not np.isfinite(scaled).all():
+        raise RefusedError(
+            "a reading is more times its noise than a number can hold; leave out frames that "
+            "something else has spoilt"
+        )
+    readings = np.ascontiguousarray(np.column_stack([scaled, gain]))
     loudest = max(float(np.abs(readings[:, :2]).max()), 1.0)
     low, high = _supports(sensor, scene, (near, far), loudest, unit)
     index, known = np.full(SLOTS, KNOWN, dtype=np.int64), np.zeros(SLOTS)

@@ -7,12 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.collapsed import CollapsedDensity
-from inference.posterior.job import Checkpoint, Job
+from inference.posterior.job import Job
 from inference.posterior.ranges import draw_ranges, replicate
-from inference.posterior.sample import Sample, sample_of
-from inference.posterior.selecting import sampled
+from inference.posterior.sample import Sample
 
-__all__ = ["Draws", "draw", "draws_of"]
+__all__ = ["Draws", "draws_of"]
 
 Array = NDArray[np.float64]
 
@@ -108,21 +107,3 @@ def draws_of(
         of_all_frames(readings),
         of_all_frames(likelihood),
     )
-
-
-def draw(job: Job, checkpoint: Checkpoint) -> tuple[Job, Draws]:
-    """Return the draws behind the answer of a job, the same as `summarise` makes it from.
-
-    Parameters
-    ----------
-    job, checkpoint : Job, Checkpoint
-        The job and where it stands.
-
-    Returns
-    -------
-    (Job, Draws)
-        The job with the terms that were kept, and its draws.
-    """
-    job = sampled(job, checkpoint)
-    density, rng = job.density(), job.stream(4)
-    return job, draws_of(density, job, sample_of(density, job, checkpoint, rng), rng)

@@ -28,13 +28,14 @@ from inference.posterior.diagnostics import (
     effective_sample_size,
     split_r_hat,
 )
-from inference.posterior.draws import draw
+from inference.posterior.draws import Draws, draws_of
 from inference.posterior.ensemble import Ensemble, advance, restart
 from inference.posterior.job import Checkpoint, Job, chains, prepare
 from inference.posterior.launch import POPULATIONS, WALKERS, new_ensembles, start
 from inference.posterior.population import Population, first_population, temper
 from inference.posterior.posterior import Posterior
 from inference.posterior.proposal import Proposal
+from inference.posterior.sample import sample_of
 from inference.posterior.selecting import (
     AssessTask,
     StartTask,
@@ -320,9 +321,33 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
     -------
     Posterior
     """
-    if awaits_start(checkpoint):
-        started = start(sampled(job, checkpoint))
-        checkpoint = dataclasses.replace(
-            started, selection=checkpoint.selection, calls=checkpoint.calls + started.calls
-        )
-    return summary.summarise(job, checkpoint, wall_s, cpu_s)
+    return summary.summarise(job, _started(job, checkpoint), wall_s, cpu_s)
+
+
+def draw(job: Job, checkpoint: Checkpoint) -> tuple[Job, Draws]:
+    """Return the draws behind the answer of a job, the same as `summarise` makes it from.
+
+    Parameters
+    ----------
+    job, checkpoint : Job, Checkpoint
+        The job and where it stands.
+
+    Returns
+    -------
+    (Job, Draws)
+        The job with the terms that were kept, and its draws.
+    """
+    checkpoint = _started(job, checkpoint)
+    job = sampled(job, checkpoint)
+    density, rng = job.density(), job.stream(4)
+    return job, draws_of(density, job, sample_of(density, job, checkpoint, rng), rng)
+
+
+def _started(job: Job, checkpoint: Checkpoint) -> Checkpoint:
+    """Return the checkpoint, with starting points where its terms were all there was time for."""
+    if not awaits_start(checkpoint):
+        return checkpoint
+    started = start(sampled(job, checkpoint))
+    return dataclasses.replace(
+        started, selection=checkpoint.selection, calls=checkpoint.calls + started.calls
+    )

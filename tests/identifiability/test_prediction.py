@@ -165,3 +165,13 @@ def test_what_cannot_be_foreseen_is_refused() -> None:
     with pytest.raises(InvalidInputError) as caught:
         identifiability(sensor_of("pulsed"), parse_scene({}), ranges, at={"a/b~c": 1.0})
     assert [problem.pointer for problem in caught.value.problems] == ["/at/a~1b~0c"]
+
+
+def test_a_known_object_at_rest_has_one_unknown_range() -> None:
+    """Frames add up: the bound of the common range falls with the root of their number."""
+    scene = {"object": {"c0": 0.0769, "c1": -0.123, "c2": 0.0957}, "motion": "static"}
+    one, four = (
+        identifiability(sensor_of("pulsed"), parse_scene(scene), [1.0] * n).information.range_sd
+        for n in (1, 4)
+    )
+    assert four == pytest.approx(np.full(4, one[0] / 2), rel=1e-12)

@@ -143,3 +143,13 @@ def test_settings_say_what_they_are_for() -> None:
     scene = {"background": WALL}
     assert "not immune" in refusal(sensor, scene, frames, "iterative_differential")
     assert '"shadow": "object"' in refusal(sensor, scene, frames, "iterative_background_cancelling")
+
+
+def test_a_reading_beyond_numbers_in_units_of_its_noise() -> None:
+    sensor = sensor_of("pulsed")
+    frames = data(sensor, {"object": OBJECT}, path(12))
+    frames.readings[3] = 1e306
+    found = estimate(sensor, parse_scene({}), frames, ["joint_fit"])
+    assert not found.results
+    reasons = {item.name: item.reason for item in found.left_out}
+    assert "times its noise" in reasons["joint_fit"]

@@ -17,7 +17,7 @@ from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene, Stroke, parse_scene
 from simulator.sensor import parse_sensor
-from tests.posterior.scenes import OBJECT, data, example, sensor_of
+from tests.posterior.scenes import OBJECT, UNKNOWN_CROSSTALK, data, example, sensor_of
 
 WIDE_HALF = {"prior": "halfnormal", "sd": 1.3}
 QUICK = SamplerSettings(seed=7, target_ess=50, max_seconds=60)
@@ -265,3 +265,16 @@ def test_importance_sampling_is_bounded_whatever_is_asked_for(
     checkpoint = fold.start(job)
     assert counts == [3000] * len(counts)
     assert not checkpoint.verdict.converged
+
+
+def test_draws_of_a_job_that_was_stopped_before_its_terms_were_decided() -> None:
+    """They are those of the answer: all terms kept, the starting points."""
+    sensor, _, frames = example("pulsed", crosstalk=True, frames=8)
+    scene = parse_scene({"crosstalk": {"values": UNKNOWN_CROSSTALK, "optional": True}})
+    job = fold.prepare(sensor, scene, frames, QUICK)
+    checkpoint = fold.start(job)
+    posterior = fold.summarise(job, checkpoint, 0.0, 0.0)
+    whole, draws = fold.draw(job, checkpoint)
+    assert whole.scene.crosstalk is not None
+    assert draws.names == posterior.draws.names
+    assert np.array_equal(draws.parameters, posterior.draws.parameters)

@@ -344,3 +344,9 @@ def test_ranges_behind_a_known_background_are_refused() -> None:
     with pytest.raises(InvalidInputError) as caught:
         parameters_of(PULSED, scene)
     assert [problem.pointer for problem in caught.value.problems] == ["/range_m"]
+
+
+def test_a_background_as_near_as_can_be_stated_leaves_ranges_before_it() -> None:
+    scene = parse_scene({"background": {"strength": 0.1, "distance_m": 1e-50}})
+    parameters = parameters_of(PULSED, scene)
+    assert parameters.reach_m == pytest.approx((1e-52, 1e-50), rel=1e-2)
