@@ -11,7 +11,7 @@ __all__ = ["NonNegative", "Number", "Positive", "Validated", "parse", "problems_
 
 T = TypeVar("T", bound="Validated")
 
-# products and squares of any six of them are numbers, too; no unit of anything needs more
+# products of any six of them are numbers, too; no unit of anything needs more
 _LARGEST = 1e50
 
 

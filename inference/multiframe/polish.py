@@ -134,7 +134,9 @@ def polish(problem: FitProblem, x: Array) -> tuple[Array, float, float, Array]:
                 change = np.clip(x - _DIFFERENCE * basis[:, k], low, high) - x
             other = profile(x + change)[1]
             along = _DIFFERENCE * np.sign(change @ basis[:, k])
-            columns.append(basis.T @ (other - gradient) / along)
+            # where the bounds leave no step either way this is nan, and the walk ends below
+            with np.errstate(invalid="ignore", divide="ignore"):
+                columns.append(basis.T @ (other - gradient) / along)
         hessian = np.array(columns)
         if not np.isfinite(hessian).all():
             break

@@ -20,6 +20,7 @@ __all__ = ["FitProblem", "fit_problem", "unknowns_of"]
 
 Array = NDArray[np.float64]
 
+_LOUDEST = 1e100  # times the noise: squares of readings, and bounds made from them, are numbers
 _WIDEST = 1e6  # of a square length against the ranges of the scene
 _CROSSTALK = (3, 4)
 _IN_READINGS = (3, 4, 5)
@@ -232,7 +233,7 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
     InvalidInputError
         Where the scene breaks a rule.
     RefusedError
-        Where a reading overflows in units of its noise.
+        Where squares of a reading in units of its noise would overflow.
     """
     parameters = parameters_of(sensor, scene)
     noise = sensor.noise
@@ -244,10 +245,10 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
     gain = np.ones(len(frames)) if frames.gain is None else frames.gain
     with np.errstate(over="ignore"):
         scaled = frames.readings / unit
-    if not np.isfinite(scaled).all():
+    if not (np.abs(scaled) < _LOUDEST).all():
         raise RefusedError(
-            "a reading is more times its noise than a number can hold; leave out frames that "
-            "something else has spoilt"
+            f"a reading is more than {_LOUDEST:g} times its noise; leave out frames that something "
+            "else has spoilt"
         )
     readings = np.ascontiguousarray(np.column_stack([scaled, gain]))
     loudest = max(float(np.abs(readings[:, :2]).max()), 1.0)

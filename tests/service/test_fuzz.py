@@ -41,7 +41,7 @@ BODIES: tuple[dict[str, Any], ...] = (
         },
         "frames": FRAMES | {"dw1_dt": [0.1, 0.2], "dw2_dt": [0.3, 0.4], "gain": [1.0, 2.0]},
     },
-    {  # every technique of many frames
+    {  # techniques of many frames
         "sensor": SENSOR | {"noise": {"read": [1e-6, 1e-6], "derivative": [1e-5, 1e-5]}},
         "scene": {
             "object": {"c0": 0.08, "c1": 0.0},
@@ -98,6 +98,7 @@ BODIES: tuple[dict[str, Any], ...] = (
     },
 )
 EXTREMES = [0.0, -0.0, 1.0, -1.0, 1e-320, 1e-300, 1e-30, 1e-12, 1e12, 1e30, 1e300, 1.8e308, -1e308]
+EXTREMES += [1e-50, -1e-50, 1e50, -1e50]  # the least and the largest that a scene may state
 numbers = st.sampled_from(EXTREMES) | st.floats(allow_nan=True) | st.integers(-(2**70), 2**70)
 scalars = st.none() | st.booleans() | numbers | st.text(max_size=8)
 names = st.sampled_from(
