@@ -247,8 +247,8 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
         scaled = frames.readings / unit
     if not (np.abs(scaled) < _LOUDEST).all():
         raise RefusedError(
-            f"a reading is more than {_LOUDEST:g} times its noise: check the units of the readings and "
-            "of the noise's `read`, or leave out frames that something else has spoilt"
+            f"a reading is more than {_LOUDEST:g} times its noise: check the units of the readings "
+            "and of the noise's `read`, or leave out frames that something else has spoilt"
         )
     readings = np.ascontiguousarray(np.column_stack([scaled, gain]))
     loudest = max(float(np.abs(readings[:, :2]).max()), 1.0)

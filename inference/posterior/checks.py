@@ -62,8 +62,8 @@ def check_scene_for_posterior(sensor: Sensor, scene: Scene, frames: Frames) -> N
     if len(frames) > MOST_FRAMES:
         raise RefusedError(
             f"{len(frames)} frames that are not saturated, and posteriors were tested up to "
-            f"{MOST_FRAMES}; send one frame in {-(-len(frames) // MOST_FRAMES)}, or several posteriors "
-            "of a part each"
+            f"{MOST_FRAMES}; send one frame in {-(-len(frames) // MOST_FRAMES)}, or several "
+            "posteriors of a part each"
         )
     _check_priors(parameters)
     if not frames.present.any():
