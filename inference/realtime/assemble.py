@@ -8,7 +8,15 @@ from numpy.typing import NDArray
 from inference.estimates import Status, TechniqueResult
 from inference.realtime.net import COMMON_REASONS, SATURATED
 
-__all__ = ["NOISE_BAND", "OUTSIDE", "Candidates", "Outcome", "assemble", "reasons_of"]
+__all__ = [
+    "DROWNED",
+    "NOISE_BAND",
+    "OUTSIDE",
+    "Candidates",
+    "Outcome",
+    "assemble",
+    "reasons_of",
+]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -20,12 +28,14 @@ AMBIGUOUS = len(COMMON_REASONS)
 FOLD = AMBIGUOUS + 1
 FILTERED = AMBIGUOUS + 2
 OUTSIDE = AMBIGUOUS + 3
+DROWNED = AMBIGUOUS + 4
 _SHARED_REASONS = (
     *COMMON_REASONS,
     "more than one range explains the readings",
     "noise has merged a pair of roots into none: the range is near a fold",
     "every solution needs a negative object, or a background below zero or above its strength",
     "every solution lies outside the ranges of the scene",
+    "the noise is so many times the signal that its standard deviation is no number",
 )
 
 
@@ -109,7 +119,11 @@ def assemble(
         count = np.count_nonzero(keep, axis=1)
         width = max(int(count.max(initial=0)), 1)
         roots = np.where(keep, candidates.roots, np.nan)
-        sd = np.where(keep & ~candidates.near & np.isfinite(candidates.sd), candidates.sd, np.nan)
+        linear = keep & ~candidates.near
+        sd = np.where(linear & np.isfinite(candidates.sd), candidates.sd, np.nan)
+        # readings are rounded, however little noise they have
+        sd = np.maximum(sd, np.finfo(float).eps * candidates.roots)
+        drowned = (linear & np.isnan(sd)).any(axis=1)
         if roots.shape[1] > 1:
             order = np.argsort(roots, axis=1, kind="stable")[:, :width]
             roots = np.take_along_axis(roots, order, axis=1)
@@ -117,7 +131,7 @@ def assemble(
     status = np.where(
         count == 1, Status.UNIQUE, np.where(count > 1, Status.AMBIGUOUS, Status.NONE)
     ).astype(np.uint8)
-    near = candidates.near_frame & (state == 0)
+    near = (candidates.near_frame | (keep & candidates.near).any(axis=1)) & (state == 0)
     # the most specific reason that holds: the technique's own, then what removed its solutions
     reason = np.zeros(state.size, dtype=np.uint8)
     none = count == 0
@@ -126,6 +140,7 @@ def assemble(
     reason[none & physical.any(axis=1)] = OUTSIDE
     own = none & (outcome.reason > 0) & ~found.any(axis=1) & (reason != FOLD)
     reason[own] = outcome.reason[own]
+    reason[(count == 1) & drowned] = DROWNED
     reason[count > 1] = AMBIGUOUS
     ruled_out = state > 0
     reason[ruled_out] = state[ruled_out]

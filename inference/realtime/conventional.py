@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from inference.estimates import Status, TechniqueResult
 from inference.realtime.assemble import (
+    DROWNED,
     NOISE_BAND,
     OUTSIDE,
     Candidates,
@@ -32,6 +33,7 @@ _REASONS = reasons_of(
     "no signal: i and q are zero",
     "the phase is below zero within its noise: at or near contact",
 )
+_ROUNDING = float(np.finfo(float).eps)
 _DARK, _CONTACT, _BEYOND, _SILENT, _WRAPPED = range(len(_REASONS) - 5, len(_REASONS))
 
 
@@ -116,6 +118,8 @@ def _pulsed(
         variance = var1 + first - shared + share * share * (var2 + second - shared)
         variance += (1.0 - share) * (1.0 - share) * shared
         sd = r0 * inverse * math.sqrt(variance)
+        # readings are rounded, however little noise they have
+        sd = max(sd, _ROUNDING * r)
         good = (
             (low <= r)
             & (r <= high)
@@ -139,12 +143,12 @@ def _explain(
     crosstalk: Pair,
     support: Pair,
     full: Pair,
-    codes: tuple[int, int, int, int, int, int],
+    codes: tuple[int, int, int, int, int, int, int],
     roots: Array,
     reason: NDArray[np.uint8],
 ) -> None:
     """Say of the frames marked why they have no range, or give it where only its sd overflows."""
-    dark, contact, beyond, outside, lost, saturated = codes
+    dark, contact, beyond, outside, lost, saturated, drowned = codes
     for i in range(roots.size):
         if reason[i] == 0:
             continue
@@ -166,7 +170,7 @@ def _explain(
         elif not support[0] <= r <= support[1]:
             reason[i] = outside
         else:
-            reason[i] = 0
+            reason[i] = drowned
             roots[i] = r
 
 
@@ -193,16 +197,17 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
     status.fill(Status.UNIQUE)
     near.fill(0)
     if bad:
-        codes = (_DARK, _CONTACT, _BEYOND, OUTSIDE, UNREPRESENTABLE, SATURATED)
+        codes = (_DARK, _CONTACT, _BEYOND, OUTSIDE, UNREPRESENTABLE, SATURATED, DROWNED)
         _explain(flat, sensor.r0, crosstalk, support, full, codes, roots, reason)
     if frames.object_present is not None:
         absent = ~frames.object_present & (reason != SATURATED)
         reason[absent], roots[absent], sds[absent] = ABSENT, np.nan, np.nan
         bad += int(np.count_nonzero(absent))
     if bad:
-        status[reason > 0] = Status.NONE
+        rootless = np.isnan(roots)
+        status[rootless] = Status.NONE
         status[reason == SATURATED] = Status.SATURATED
-        count[reason > 0] = 0
+        count[rootless] = 0
     return TechniqueResult(
         technique="conventional",
         status=status,

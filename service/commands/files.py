@@ -32,6 +32,20 @@ def naming(sources: Mapping[str, str]) -> Iterator[None]:
         raise InvalidInputError(*(_named(p, sources) for p in error.problems)) from None
 
 
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Let errors raised inside name the file."""
+    try:
+        with naming({"": str(path)}):
+            yield
+    except MalformedError as error:
+        raise MalformedError(f"{path}: {error}") from None
+    except OSError as error:
+        # a file that opens, but cannot be read, is not named
+        error.filename = error.filename or str(path)
+        raise
+
+
 def _named(problem: Problem, sources: Mapping[str, str]) -> Problem:
     for prefix, source in sources.items():
         if problem.pointer == prefix or problem.pointer.startswith(prefix + "/"):
@@ -60,7 +74,7 @@ def read_document(model: type[T], path: Path) -> T:
     InvalidInputError, MalformedError
         Naming the file.
     OSError
-        Where it cannot be opened.
+        Where it cannot be read, naming it.
     """
     with naming({"": str(path)}):
         return parse(model, read_data(path))
@@ -68,19 +82,13 @@ def read_document(model: type[T], path: Path) -> T:
 
 def read_data(path: Path) -> Any:
     """Read a JSON file as plain data; see `read_document` for what is raised."""
-    try:
-        with naming({"": str(path)}):
-            data = decode(path.read_bytes())
-            check_bulk(data)
-            return data
-    except MalformedError as error:
-        raise MalformedError(f"{path}: {error}") from None
+    with _reading(path):
+        data = decode(path.read_bytes())
+        check_bulk(data)
+        return data
 
 
 def read_columns(path: Path) -> FrameColumns:
     """Read a file of frames; see `read_frames` for what is raised, naming the file."""
-    try:
-        with naming({"": str(path)}):
-            return read_frames(path)
-    except MalformedError as error:
-        raise MalformedError(f"{path}: {error}") from None
+    with _reading(path):
+        return read_frames(path)

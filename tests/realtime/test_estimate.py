@@ -32,6 +32,10 @@ def sensor_of(kind: str, **more: Any) -> Sensor:
     return parse_sensor({"kind": kind, "noise": noise} | timing | more)
 
 
+def noise_of(noise: float) -> dict[str, list[float]]:
+    return {"read": [noise, noise], "derivative": [noise, noise]}
+
+
 PULSED, SINE = sensor_of("pulsed"), sensor_of("sine_wave")
 
 
@@ -243,7 +247,14 @@ SCENES = [
     st.lists(st.tuples(READING, READING), min_size=1, max_size=6),
     st.sampled_from(SCENES),
     st.sampled_from(
-        [PULSED, SINE, sensor_of("pulsed", gain=1e-12), sensor_of("sine_wave", gain=1e12)]
+        [
+            PULSED,
+            SINE,
+            sensor_of("pulsed", gain=1e-12),
+            sensor_of("sine_wave", gain=1e12),
+            *(sensor_of(kind, noise=noise_of(1e-50)) for kind in ("pulsed", "sine_wave")),
+            *(sensor_of(kind, noise=noise_of(1e50)) for kind in ("pulsed", "sine_wave")),
+        ]
     ),
     st.booleans(),
 )
@@ -277,8 +288,17 @@ def test_any_finite_reading_has_a_status_and_only_finite_roots(
             assert (roots[: count[i]] > 0).all()
             assert (np.diff(roots[: count[i]]) >= 0).all()
             assert np.isnan(roots[count[i] :]).all()
-            assert not np.isinf(result.roots_sd_m[i]).any()
-            assert (result.reason[i] > 0) == (status[i] != Status.UNIQUE)
+            sds = result.roots_sd_m[i, : count[i]]
+            # readings are rounded: no root is more certain than that
+            assert (sds[np.isfinite(sds)] >= 1e-16 * roots[: count[i]][np.isfinite(sds)]).all()
+            assert not np.isinf(sds).any()
+            said = bool(result.reason[i] > 0)
+            if status[i] != Status.UNIQUE:
+                assert said
+            elif np.isnan(sds).any():
+                assert said or result.near_fold[i]
+            else:
+                assert not said
     if sensor.kind == "pulsed" and "crosstalk" not in data:
         alone = conventional_range(sensor, frames)
         assert not np.isinf(alone).any()

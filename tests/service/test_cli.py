@@ -42,6 +42,18 @@ def test_estimate(capsys: pytest.CaptureFixture[str], scene: Path, frames: Path)
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".ndjson", ".json"])
+def test_a_file_that_opens_but_cannot_be_read_is_named(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path, suffix: str
+) -> None:
+    path = tmp_path / f"frames{suffix}"
+    path.symlink_to("/proc/self/mem")  # its first page cannot be read
+    code, out, err = run(capsys, "estimate", path, "--scene", scene)
+    assert (code, out) == (2, "")
+    assert str(path) in err
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".ndjson", ".json"])
 def test_simulate_then_estimate(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path, suffix: str
 ) -> None:
