@@ -11,9 +11,9 @@ import time
 
 import numpy as np
 
-from inference.posterior.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.discrepant import with_discrepancy
-from inference.posterior.start import find_optima
+from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.density.discrepant import with_discrepancy
+from inference.posterior.sampling.start import find_optima
 from simulator.discrepancy import DISCREPANCY_SD
 from simulator.scene import parse_scene
 from tests.posterior.scenes import UNKNOWN_CROSSTALK, data, sensor_of

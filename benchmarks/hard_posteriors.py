@@ -18,10 +18,10 @@ from concurrent.futures import Executor, ProcessPoolExecutor
 import numpy as np
 
 from inference.posterior import fold
+from inference.posterior.answer.posterior import Posterior
 from inference.posterior.infer import infer
-from inference.posterior.posterior import Posterior
+from inference.posterior.sampling.verdict import MAX_R_HAT
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.verdict import MAX_R_HAT
 from service.worker import THREAD_VARIABLES
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor

@@ -16,8 +16,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.posterior.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.start import find_optima
+from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.posterior.sampling.start import find_optima
 from simulator.sensor import PulsedSensor
 from tests.posterior.reference import Case, random_case, reference
 from tests.posterior.scenes import example

@@ -15,8 +15,8 @@ import time
 
 import numpy as np
 
-from inference.posterior.collapsed import collapsed_density
-from inference.posterior.selection import (
+from inference.density.collapsed import collapsed_density
+from inference.posterior.selection.selection import (
     EVIDENCE_MARGIN,
     PREDICTIVE_MARGIN,
     Selection,

@@ -8,9 +8,9 @@ import dataclasses
 from typing import TypeVar
 
 from inference.posterior import fold
-from inference.posterior.posterior import Posterior
+from inference.posterior.answer.posterior import Posterior
+from inference.posterior.sampling.verdict import MAX_R_HAT
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.verdict import MAX_R_HAT
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor

@@ -20,11 +20,11 @@ import time
 import numpy as np
 from scipy import stats
 
-from inference.posterior.cross_check import false_branch, moments_disagree
-from inference.posterior.diagnostics import autocorrelation_time, effective_sample_size
-from inference.posterior.importance import draw_weighted
-from inference.posterior.prior_conflict import parameter_conflicts
-from inference.posterior.verdict import judge
+from inference.posterior.criticism.cross_check import false_branch, moments_disagree
+from inference.posterior.criticism.prior_conflict import parameter_conflicts
+from inference.posterior.sampling.diagnostics import autocorrelation_time, effective_sample_size
+from inference.posterior.sampling.importance import draw_weighted
+from inference.posterior.sampling.verdict import judge
 from tests.posterior.surrogate import (
     DISTANCE,
     LAWS,

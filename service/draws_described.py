@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.posterior.draws import Draws
+from inference.posterior.answer.draws import Draws
 from inference.posterior.job import Job
 
 __all__ = ["DescribedDraws", "describe_draws", "unit_of"]

@@ -9,8 +9,8 @@ from benchmarks.calibration.cells import Cell
 from benchmarks.calibration.truth import Truth, draw_truth
 from benchmarks.resumable import Row
 from benchmarks.sampling import Sampled, sample
+from inference.posterior.sampling.verdict import MAX_R_HAT
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.verdict import MAX_R_HAT
 from simulator.errors import RefusedError
 from simulator.parameters import parameters_of
 

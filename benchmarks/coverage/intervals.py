@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from benchmarks.resumable import Row
 from benchmarks.sampling import sample
+from inference.posterior.sampling.verdict import MAX_R_HAT
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.verdict import MAX_R_HAT
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.scene import parse_scene

@@ -39,7 +39,7 @@ from benchmarks.samplers.ours import ours, reference
 from benchmarks.samplers.outcome import TARGET_ESS, TARGET_R_HAT
 from benchmarks.samplers.plain_emcee import plain_emcee
 from benchmarks.samplers.scenes import FRAMES, SCENES, problem
-from inference.posterior.start import find_optima
+from inference.posterior.sampling.start import find_optima
 
 PEERS = ("numpyro", "jax", "dynesty")
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from benchmarks.samplers.outcome import Outcome, enough, equal, judged
 from inference.posterior import fold
-from inference.posterior.importance import draw_weighted
 from inference.posterior.job import chains
-from inference.posterior.proposal import Proposal, mixture_of
-from inference.posterior.shear import shear_of
-from inference.posterior.transport import fit_map
+from inference.posterior.sampling.importance import draw_weighted
+from inference.posterior.sampling.proposal import Proposal, mixture_of
+from inference.posterior.sampling.shear import shear_of
+from inference.posterior.sampling.transport import fit_map
 
 
 def ours(job, cap):  # type: ignore[no-untyped-def]

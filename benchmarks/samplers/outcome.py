@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from inference.posterior.diagnostics import effective_sample_size, split_r_hat
+from inference.posterior.sampling.diagnostics import effective_sample_size, split_r_hat
 
 TARGET_ESS = 400
 TARGET_R_HAT = 1.01

@@ -9,10 +9,10 @@ import numpy as np
 
 from benchmarks.samplers.outcome import Outcome, enough, equal, judged
 from benchmarks.samplers.scenes import FRAMES
-from inference.posterior.integrand import log_integrand
-from inference.posterior.profile import best_ranges
-from inference.posterior.proposal import mixture_of
-from inference.posterior.rows import background_of, crosstalk_of, law_of
+from inference.density.integrand import log_integrand
+from inference.density.profile import best_ranges
+from inference.density.rows import background_of, crosstalk_of, law_of
+from inference.posterior.sampling.proposal import mixture_of
 
 
 @numba.njit  # type: ignore[untyped-decorator]

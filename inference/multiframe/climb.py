@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.density.gaussian import Pair, log_top
+from inference.density.integrand import log_integrand, slope_and_curvature
+from inference.density.profile import fill_best_ranges
+from inference.density.rows import background_of, crosstalk_of, law_of
 from inference.multiframe.coordinates import Layout, bounds_of, chain, physical
 from inference.multiframe.linearisation import linearise
 from inference.multiframe.slopes import SLOTS
 from inference.multiframe.triangle import damped_step, triangularise
-from inference.posterior.gaussian import Pair, log_top
-from inference.posterior.integrand import log_integrand, slope_and_curvature
-from inference.posterior.profile import fill_best_ranges
-from inference.posterior.rows import background_of, crosstalk_of, law_of
 from simulator.compiled import compiled
 
 __all__ = ["Instrument", "climb", "deviance", "profile_slopes"]
@@ -26,7 +26,7 @@ _LONGEST = 1.5  # of a step in a logarithm: a factor of 4.5
 _ENOUGH = 1e-4  # deviance that a whole Newton step would still gain
 _TRIES = 12
 _SETTLED = 1e-7  # deviance that a range may lack of its best value
-_KNOTS = 0.04  # about their distance in `inference.posterior.frame_integral`
+_KNOTS = 0.04  # about their distance in `inference.density.frame_integral`
 
 
 @compiled
@@ -104,7 +104,7 @@ def deviance(
     Parameters
     ----------
     best : ndarray, shape (1, frames, 3)
-        Filled by `inference.posterior.profile`: log r, log density, standard deviation.
+        Filled by `inference.density.profile`: log r, log density, standard deviation.
     values : ndarray
         Physical values of the slots.
     shapes, crosstalks, backgrounds, laws : ndarray

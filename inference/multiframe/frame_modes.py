@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.density.curve_table import integration_bounds, tabulate
+from inference.density.frame_integral import find_modes
+from inference.density.gaussian import Pair
+from inference.density.rows import background_of, crosstalk_of, law_of
 from inference.multiframe.problem import FitProblem
-from inference.posterior.curve_table import integration_bounds, tabulate
-from inference.posterior.frame_integral import find_modes
-from inference.posterior.gaussian import Pair
-from inference.posterior.rows import background_of, crosstalk_of, law_of
 from simulator.compiled import compiled
 
 __all__ = ["MOST", "frame_modes"]

@@ -12,8 +12,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.density.gaussian import Pair
 from inference.multiframe.slopes import SLOTS, frame_slopes
-from inference.posterior.gaussian import Pair
 from simulator.compiled import compiled
 from simulator.readings import noise_parts
 
@@ -39,7 +39,7 @@ def _whiten(
     own1, own2, shared, s1, s2 = noise_parts(read, shot, relative, pulsed, mean, signal)
     first = own1 + shared + s1 * s1
     cross = shared + s1 * s2
-    # the determinant as a sum of squares: nothing cancels (`inference.posterior.integrand`)
+    # the determinant as a sum of squares: nothing cancels (`inference.density.integrand`)
     determinant = own1 * own2 + shared * (own1 + own2) + own2 * s1 * s1 + own1 * s2 * s2
     determinant += shared * (s1 - s2) ** 2
     root = math.sqrt(first)

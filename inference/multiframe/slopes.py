@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.posterior.gaussian import Pair
+from inference.density.gaussian import Pair
 from simulator.background import shadow
 from simulator.compiled import compiled
 from simulator.object_model import quadratic

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.posterior.ensemble import Ensemble
-from inference.posterior.importance import WeightedDraws
-from inference.posterior.population import Population
-from inference.posterior.proposal import Mixture, Proposal
-from inference.posterior.selection import Candidate, Decision, Selection
-from inference.posterior.shear import Shear
-from inference.posterior.transport import TriangularMap
-from inference.posterior.verdict import Verdict
+from inference.posterior.sampling.ensemble import Ensemble
+from inference.posterior.sampling.importance import WeightedDraws
+from inference.posterior.sampling.population import Population
+from inference.posterior.sampling.proposal import Mixture, Proposal
+from inference.posterior.sampling.shear import Shear
+from inference.posterior.sampling.transport import TriangularMap
+from inference.posterior.sampling.verdict import Verdict
+from inference.posterior.selection.selection import Candidate, Decision, Selection
 from simulator.frames import Frames
 
 __all__ = ["pack", "pack_parts", "unpack", "unpack_parts"]

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.density.collapsed import CollapsedDensity
+from inference.density.gaussian import log_top
 from inference.identifiability.before_data import check_discrepancy
-from inference.posterior.collapsed import CollapsedDensity
-from inference.posterior.gaussian import log_top
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.parameters import Parameters, parameters_of

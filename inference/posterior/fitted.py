@@ -7,11 +7,11 @@ the prior then sees only false valleys, which can lie thousands of nats below th
 
 import numpy as np
 
+from inference.density.collapsed import CollapsedDensity
 from inference.multiframe.multistart import find_optima
 from inference.multiframe.problem import fit_problem
-from inference.posterior.collapsed import CollapsedDensity
 from inference.posterior.job import Job
-from inference.posterior.start import Optimum, climb, refine
+from inference.posterior.sampling.start import Optimum, climb, refine
 
 __all__ = ["fitted_optima"]
 

@@ -22,20 +22,23 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.posterior import summary
-from inference.posterior.diagnostics import (
+from inference.posterior.answer import summary
+from inference.posterior.answer.draws import Draws, draws_of
+from inference.posterior.answer.posterior import Posterior
+from inference.posterior.job import Checkpoint, Job, chains, prepare
+from inference.posterior.launch import POPULATIONS, WALKERS, new_ensembles, start
+from inference.posterior.sample import sample_of
+from inference.posterior.sampling.diagnostics import (
     autocorrelation_time,
     effective_sample_size,
     split_r_hat,
 )
-from inference.posterior.draws import Draws, draws_of
-from inference.posterior.ensemble import Ensemble, advance, restart
-from inference.posterior.job import Checkpoint, Job, chains, prepare
-from inference.posterior.launch import POPULATIONS, WALKERS, new_ensembles, start
-from inference.posterior.population import Population, first_population, temper
-from inference.posterior.posterior import Posterior
-from inference.posterior.proposal import Proposal
-from inference.posterior.sample import sample_of
+from inference.posterior.sampling.ensemble import Ensemble, advance, restart
+from inference.posterior.sampling.population import Population, first_population, temper
+from inference.posterior.sampling.proposal import Proposal
+from inference.posterior.sampling.shear import shear_of
+from inference.posterior.sampling.transport import fit_map
+from inference.posterior.sampling.verdict import Chains, Verdict, judge
 from inference.posterior.selecting import (
     AssessTask,
     StartTask,
@@ -45,10 +48,7 @@ from inference.posterior.selecting import (
     sampled,
     take_in,
 )
-from inference.posterior.selection import Candidate
-from inference.posterior.shear import shear_of
-from inference.posterior.transport import fit_map
-from inference.posterior.verdict import Chains, Verdict, judge
+from inference.posterior.selection.selection import Candidate
 
 __all__ = [
     "Checkpoint",

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from typing import Any, TypeVar
 
+from inference.posterior.answer.posterior import Posterior
 from inference.posterior.fold import merge, prepare, run, start, summarise, tasks
-from inference.posterior.posterior import Posterior
 from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames
 from simulator.scene import Scene

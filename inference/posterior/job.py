@@ -6,18 +6,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.density.discrepant import with_discrepancy
+from inference.density.static import with_common_range
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.posterior.checks import check_scene_for_posterior
-from inference.posterior.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.discrepant import with_discrepancy
-from inference.posterior.ensemble import Ensemble
-from inference.posterior.importance import WeightedDraws
-from inference.posterior.population import Population
-from inference.posterior.proposal import Mixture, Proposal
-from inference.posterior.selection import Selection
+from inference.posterior.sampling.ensemble import Ensemble
+from inference.posterior.sampling.importance import WeightedDraws
+from inference.posterior.sampling.population import Population
+from inference.posterior.sampling.proposal import Mixture, Proposal
+from inference.posterior.sampling.verdict import Chains, Verdict, chains_of
+from inference.posterior.selection.selection import Selection
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.static import with_common_range
-from inference.posterior.verdict import Chains, Verdict, chains_of
 from simulator.errors import RefusedError
 from simulator.frames import Frames, check_frames
 from simulator.parameters import parameters_of

@@ -5,17 +5,17 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.density.collapsed import CollapsedDensity
 from inference.posterior.checks import check_best_fit
-from inference.posterior.collapsed import CollapsedDensity
-from inference.posterior.ensemble import Ensemble, new_ensemble
 from inference.posterior.fitted import fitted_optima
-from inference.posterior.importance import MAX_K_HAT, WeightedDraws, draw_weighted
 from inference.posterior.job import Checkpoint, Job
-from inference.posterior.proposal import Proposal, mixture_of
+from inference.posterior.sampling.ensemble import Ensemble, new_ensemble
+from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
+from inference.posterior.sampling.proposal import Proposal, mixture_of
+from inference.posterior.sampling.start import Optimum, climb, find_optima, refine
+from inference.posterior.sampling.tempering import tempered_walkers
+from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.selecting import begin
-from inference.posterior.start import Optimum, climb, find_optima, refine
-from inference.posterior.tempering import tempered_walkers
-from inference.posterior.verdict import Verdict
 from simulator.errors import RefusedError
 
 __all__ = ["POPULATIONS", "WALKERS", "new_ensembles", "start"]

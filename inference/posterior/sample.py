@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.posterior.collapsed import CollapsedDensity
-from inference.posterior.importance import WeightedDraws
+from inference.density.collapsed import CollapsedDensity
 from inference.posterior.job import Checkpoint, Job, chains
-from inference.posterior.verdict import Chains
+from inference.posterior.sampling.importance import WeightedDraws
+from inference.posterior.sampling.verdict import Chains
 
 __all__ = ["Sample", "sample_of"]
 

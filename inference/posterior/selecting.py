@@ -4,7 +4,8 @@ import dataclasses
 
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Checkpoint, Job
-from inference.posterior.selection import (
+from inference.posterior.sampling.verdict import Verdict
+from inference.posterior.selection.selection import (
     Candidate,
     Selection,
     assess,
@@ -12,7 +13,6 @@ from inference.posterior.selection import (
     decide,
     reduced,
 )
-from inference.posterior.verdict import Verdict
 
 __all__ = [
     "AssessTask",

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.posterior.posterior import Posterior
+from inference.posterior.answer.posterior import Posterior
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.parameters import Parameters, Terms
 

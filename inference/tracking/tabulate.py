@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.posterior.curve_table import integration_bounds
-from inference.posterior.integrand import Law, Quad, Triple, log_range_density
+from inference.density.curve_table import integration_bounds
+from inference.density.integrand import Law, Quad, Triple, log_range_density
 from inference.tracking.curve import GROUP
 from simulator.compiled import compiled
 from simulator.errors import RefusedError

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import Status
-from inference.posterior.posterior import Posterior
+from inference.posterior.answer.posterior import Posterior
 from inference.tracking.filter import EMPTY, EMPTY_SATURATED, SATURATED, TIME, run_filter
 from inference.tracking.report import (
     BEST,

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from inference.posterior.posterior import Posterior
-from inference.posterior.rows import law_of
+from inference.density.rows import law_of
+from inference.posterior.answer.posterior import Posterior
 from inference.tracking.curve import Curve, Places
 from inference.tracking.globals import Globals, globals_of
 from inference.tracking.motion import Rules

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from inference.density.collapsed import collapsed_density
 from inference.identifiability.before_data import identifiability
 from inference.identifiability.experiment import Experiment, information
 from inference.identifiability.prediction import log_range_spread, predict
-from inference.posterior.collapsed import collapsed_density
-from inference.posterior.start import refine
+from inference.posterior.sampling.start import refine
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.parameters import parameters_of

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, signal, special, stats
 
-from inference.posterior.collapsed import CollapsedDensity
-from inference.posterior.ensemble import advance, new_ensemble
-from inference.posterior.proposal import Mixture, Proposal
-from inference.posterior.verdict import Chains, chains_of
+from inference.density.collapsed import CollapsedDensity
+from inference.posterior.sampling.ensemble import advance, new_ensemble
+from inference.posterior.sampling.proposal import Mixture, Proposal
+from inference.posterior.sampling.verdict import Chains, chains_of
 
 Array = NDArray[np.float64]
 

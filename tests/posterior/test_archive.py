@@ -15,12 +15,12 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
-from inference.posterior.ensemble import Ensemble, new_ensemble
-from inference.posterior.importance import WeightedDraws
-from inference.posterior.population import Population
-from inference.posterior.proposal import Mixture, Proposal
-from inference.posterior.transport import fit_map
-from inference.posterior.verdict import Verdict
+from inference.posterior.sampling.ensemble import Ensemble, new_ensemble
+from inference.posterior.sampling.importance import WeightedDraws
+from inference.posterior.sampling.population import Population
+from inference.posterior.sampling.proposal import Mixture, Proposal
+from inference.posterior.sampling.transport import fit_map
+from inference.posterior.sampling.verdict import Verdict
 from simulator.frames import Frames
 
 JSON = st.recursive(

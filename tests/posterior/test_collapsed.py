@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from inference.posterior.collapsed import CollapsedDensity, collapsed_density
+from inference.density.collapsed import CollapsedDensity, collapsed_density
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor, parse_sensor

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.density.discrepant import DiscrepantDensity, with_discrepancy
+from inference.density.gaussian import log_top
+from inference.density.profile import best_ranges, linearise
 from inference.posterior import fold
-from inference.posterior.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.discrepant import DiscrepantDensity, with_discrepancy
-from inference.posterior.gaussian import log_top
-from inference.posterior.profile import best_ranges, linearise
-from inference.posterior.ranges import draw_ranges, replicate
+from inference.posterior.answer.ranges import draw_ranges, replicate
 from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames
 from simulator.scene import parse_scene

@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from inference.density.collapsed import collapsed_density
+from inference.density.discrepant import DiscrepantDensity, with_discrepancy
 from inference.identifiability.status import Identifiability
-from inference.posterior.collapsed import collapsed_density
-from inference.posterior.discrepancy_check import (
+from inference.posterior.answer.posterior import Fit
+from inference.posterior.answer.ranges import draw_ranges
+from inference.posterior.criticism.discrepancy_check import (
     LargerDiscrepancy,
     judge_fit,
     judge_scale,
     larger_discrepancy,
 )
-from inference.posterior.discrepant import DiscrepantDensity, with_discrepancy
-from inference.posterior.posterior import Fit
-from inference.posterior.ranges import draw_ranges
 from simulator.scene import parse_scene
 from tests.posterior.scenes import OBJECT, data, sensor_of
 

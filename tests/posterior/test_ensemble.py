@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from inference.posterior.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.ensemble import Ensemble, advance, new_ensemble, restart
-from inference.posterior.proposal import Proposal, mixture_of
-from inference.posterior.start import find_optima
-from inference.posterior.transport import fit_map
+from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.posterior.sampling.ensemble import Ensemble, advance, new_ensemble, restart
+from inference.posterior.sampling.proposal import Proposal, mixture_of
+from inference.posterior.sampling.start import find_optima
+from inference.posterior.sampling.transport import fit_map
 from tests.posterior.scenes import example
 
 

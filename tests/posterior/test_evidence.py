@@ -10,14 +10,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy import special
 
-from inference.posterior import evidence
-from inference.posterior.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.cross_validation import cross_validate
-from inference.posterior.evidence import log_prior_mass, weigh
-from inference.posterior.leave_one_out import leave_one_out
-from inference.posterior.population import Population
-from inference.posterior.start import find_optima
-from inference.posterior.static import with_common_range
+from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.density.static import with_common_range
+from inference.posterior.sampling.population import Population
+from inference.posterior.sampling.start import find_optima
+from inference.posterior.selection import evidence
+from inference.posterior.selection.cross_validation import cross_validate
+from inference.posterior.selection.evidence import log_prior_mass, weigh
+from inference.posterior.selection.leave_one_out import leave_one_out
 from simulator.parameters import parameters_of
 from simulator.scene import parse_scene
 from simulator.simulate import mean_readings

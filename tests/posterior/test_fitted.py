@@ -8,8 +8,8 @@ import pytest
 from inference.posterior import fold
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.launch import start
+from inference.posterior.sampling.start import find_optima
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.start import find_optima
 from simulator.scene import parse_scene
 from tests.posterior.scenes import OBJECT, data, sensor_of
 

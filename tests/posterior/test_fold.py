@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from inference.posterior import fold, launch
-from inference.posterior.importance import WeightedDraws, draw_weighted
+from inference.posterior.answer.posterior import Posterior
 from inference.posterior.infer import infer
-from inference.posterior.posterior import Posterior
+from inference.posterior.sampling.importance import WeightedDraws, draw_weighted
 from inference.posterior.settings import SamplerSettings
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames

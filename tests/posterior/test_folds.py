@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from inference.posterior.answer.folds import near_fold
 from inference.posterior.fold import prepare
-from inference.posterior.folds import near_fold
 from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames
 from simulator.scene import parse_scene

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import integrate, stats
 
-from inference.posterior.collapsed import collapsed_density
+from inference.density.collapsed import collapsed_density
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import PulsedSensor, Sensor, parse_sensor

@@ -10,16 +10,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from inference.posterior.collapsed import collapsed_density
-from inference.posterior.cross_check import false_branch, moments_disagree
-from inference.posterior.diagnostics import effective_sample_size
-from inference.posterior.importance import WeightedDraws, draw_weighted
+from inference.density.collapsed import collapsed_density
+from inference.posterior.criticism.cross_check import false_branch, moments_disagree
+from inference.posterior.criticism.prior_conflict import (
+    parameter_conflicts,
+    range_conflicts,
+    scores,
+)
 from inference.posterior.infer import infer
-from inference.posterior.prior_conflict import parameter_conflicts, range_conflicts, scores
-from inference.posterior.proposal import Mixture
-from inference.posterior.quadrature import lattice_moments
+from inference.posterior.sampling.diagnostics import effective_sample_size
+from inference.posterior.sampling.importance import WeightedDraws, draw_weighted
+from inference.posterior.sampling.proposal import Mixture
+from inference.posterior.sampling.quadrature import lattice_moments
+from inference.posterior.sampling.verdict import Chains, judge
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.verdict import Chains, judge
 from simulator.scene import parse_scene
 from tests.posterior.scenes import data, sensor_of
 from tests.posterior.surrogate import (

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy import special
 
-from inference.posterior.collapsed import collapsed_density
+from inference.density.collapsed import collapsed_density
+from inference.posterior.answer.posterior import Posterior
 from inference.posterior.infer import infer
-from inference.posterior.posterior import Posterior
 from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames
 from simulator.scene import parse_scene

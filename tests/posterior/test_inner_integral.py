@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inference.posterior.collapsed import collapsed_density
+from inference.density.collapsed import collapsed_density
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
 from tests.posterior.reference import FEW_TERMS, Case, random_case, reference

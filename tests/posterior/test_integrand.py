@@ -8,8 +8,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from inference.posterior.gaussian import _determinant, gaussian, precision_times
-from inference.posterior.integrand import log_integrand, slope_and_curvature
+from inference.density.gaussian import _determinant, gaussian, precision_times
+from inference.density.integrand import log_integrand, slope_and_curvature
 
 EPS = float(np.finfo(float).eps)
 CASES = 60

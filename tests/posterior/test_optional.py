@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from inference.density.collapsed import collapsed_density
 from inference.posterior import fold
-from inference.posterior.collapsed import collapsed_density
 from inference.posterior.infer import infer
-from inference.posterior.selection import (
+from inference.posterior.selection.selection import (
     Candidate,
     assess,
     candidate_terms,

@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from inference.posterior.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.population import Population, first_population, temper
+from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.posterior.sampling.population import Population, first_population, temper
 from tests.posterior.scenes import example
 
 

@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
+from inference.posterior.answer.posterior import Fit
+from inference.posterior.criticism.predictive_check import predictive_check
 from inference.posterior.job import prepare
-from inference.posterior.posterior import Fit
-from inference.posterior.predictive_check import predictive_check
+from inference.posterior.sampling.start import Optimum, refine
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.start import Optimum, refine
 from simulator.frames import Frames
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor

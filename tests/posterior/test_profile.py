@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from inference.posterior.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.profile import best_ranges, linearise
+from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.density.profile import best_ranges, linearise
 from simulator.frames import Frames
 from simulator.readings import background_readings, covariance, object_readings
 from simulator.scene import parse_scene

@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy import integrate, stats
 
-from inference.posterior.collapsed import collapsed_density
-from inference.posterior.ranges import draw_ranges, replicate
+from inference.density.collapsed import collapsed_density
+from inference.posterior.answer.ranges import draw_ranges, replicate
 from simulator.frames import Frames
 from simulator.readings import covariance
 from simulator.scene import parse_scene

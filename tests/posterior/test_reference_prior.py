@@ -8,10 +8,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy import integrate, stats
 
-from inference.posterior.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.discrepant import with_discrepancy
+from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.density.discrepant import with_discrepancy
+from inference.posterior.answer.ranges import draw_ranges
 from inference.posterior.infer import infer
-from inference.posterior.ranges import draw_ranges
 from inference.posterior.settings import SamplerSettings
 from simulator.errors import InvalidInputError
 from simulator.frames import Frames

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from inference.posterior.shares import resampled_share_error, share_error, weighted_share_error
+from inference.posterior.answer.shares import (
+    resampled_share_error,
+    share_error,
+    weighted_share_error,
+)
 
 Mask = NDArray[np.bool_]
 

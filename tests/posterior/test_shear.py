@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.archive import pack_parts, unpack_parts
-from inference.posterior.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.shear import Shear, shear_of
-from inference.posterior.transport import fit_map
+from inference.posterior.sampling.shear import Shear, shear_of
+from inference.posterior.sampling.transport import fit_map
 from simulator.scene import parse_scene
 from tests.posterior.scenes import KINDS, data, sensor_of
 

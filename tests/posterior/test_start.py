@@ -5,9 +5,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from inference.posterior.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.profile import best_ranges
-from inference.posterior.start import climb, find_optima, refine
+from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.density.profile import best_ranges
+from inference.posterior.sampling.start import climb, find_optima, refine
 from simulator.frames import Frames
 from simulator.readings import object_readings
 from simulator.scene import parse_scene

@@ -8,14 +8,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy import special
 
-from inference.posterior.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.gaussian import log_top
+from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.density.gaussian import log_top
+from inference.density.integrand import log_integrand, log_range_density
+from inference.density.profile import best_ranges, linearise
+from inference.density.static import with_common_range
+from inference.posterior.answer.ranges import draw_ranges
 from inference.posterior.infer import infer
-from inference.posterior.integrand import log_integrand, log_range_density
-from inference.posterior.profile import best_ranges, linearise
-from inference.posterior.ranges import draw_ranges
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.static import with_common_range
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import Sensor

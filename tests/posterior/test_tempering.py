@@ -7,12 +7,12 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from inference.posterior.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.importance import MAX_K_HAT, draw_weighted
+from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.launch import _thinned
-from inference.posterior.proposal import mixture_of
-from inference.posterior.start import find_optima
-from inference.posterior.tempering import tempered_walkers
+from inference.posterior.sampling.importance import MAX_K_HAT, draw_weighted
+from inference.posterior.sampling.proposal import mixture_of
+from inference.posterior.sampling.start import find_optima
+from inference.posterior.sampling.tempering import tempered_walkers
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import parse_scene
 from tests.posterior.scenes import KINDS, example, sensor_of

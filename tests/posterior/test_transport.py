@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from inference.posterior.transport import TriangularMap, fit_map
+from inference.posterior.sampling.transport import TriangularMap, fit_map
 
 
 def _banana(rng: np.random.Generator, n: int) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal, stats
 
-from inference.posterior.verdict import Chains, judge
+from inference.posterior.sampling.verdict import Chains, judge
 
 NAMES = ("a", "b", "c")
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import signal
 
-from inference.posterior.draws import Draws
+from inference.posterior.answer.draws import Draws
 from inference.posterior.job import Job, prepare
 from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames

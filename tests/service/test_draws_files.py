@@ -10,7 +10,7 @@ import h5netcdf
 import numpy as np
 import pytest
 
-from inference.posterior.diagnostics import split_r_hat
+from inference.posterior.sampling.diagnostics import split_r_hat
 from service.draws_described import DescribedDraws, describe_draws
 from service.draws_formats import accepted_format
 from service.draws_ndjson import to_ndjson

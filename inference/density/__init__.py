@@ -1,0 +1,1 @@
+"""The collapsed likelihood: frames with their ranges integrated, or maximised, out of them."""

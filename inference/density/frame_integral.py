@@ -1,0 +1,366 @@
+"""The inner integral: a frame's range integrated out, adaptively.
+
+Every local maximum of a frame's density on the table of the curve of mean readings is refined by
+a bracketed Gauss-Newton iteration and integrated on its own interval between valleys: by a short
+rule where the peak is narrow, interior and passes its checks, otherwise by Gauss-Legendre panels
+that march outward.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.density.gaussian import Pair, gaussian, log_top
+from inference.density.integrand import (
+    SceneArguments,
+    Triple,
+    log_integrand,
+    slope_and_curvature,
+)
+from simulator.compiled import compiled
+
+__all__ = [
+    "falls_off",
+    "find_modes",
+    "frame_log_likelihood",
+    "log_add",
+]
+
+Array = NDArray[np.float64]
+
+_NEGLIGIBLE = 30.0  # nats below the best: exp(-30) of a mass changes no digit that counts
+_STEP = 0.7  # of the trapezoidal rule, in standard deviations
+_HALF = 10  # its points on either side of the mode
+
+_FAR = 12.0  # standard deviations at which a peak must have vanished
+_MOST_PANELS = 300
+_NEARLY_GAUSSIAN = 3e-3  # standard deviation of log r
+
+_HERMITE_NODES, _HERMITE_WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+
+
+@compiled
+def _scan(
+    values: Array,
+    table: Array,
+    frame: Triple,
+    crosstalk: Pair | None,
+    pulsed: bool,
+    read: Pair,
+    shot: float | None,
+    relative: float | None,
+) -> None:
+    """Fill the frame's log density at every knot."""
+    first, second, gain = frame
+    c1, c2 = 0.0, 0.0
+    if crosstalk is not None:
+        c1, c2 = crosstalk[0], crosstalk[1]
+        first, second = first - c1, second - c2
+    if shot is not None or relative is not None:
+        for k in range(table.shape[1]):
+            m1, m2 = gain * table[4, k], gain * table[5, k]
+            values[k] = table[1, k] + gaussian(
+                (first - m1, second - m2),
+                (m1 + c1, m2 + c2),
+                (gain * table[2, k], gain * table[3, k]),
+                read,
+                shot,
+                relative,
+                pulsed,
+            )
+    else:
+        i1, i2 = 1.0 / read[0], 1.0 / read[1]
+        for k in range(table.shape[1]):
+            e1 = (first - gain * table[4, k]) * i1
+            e2 = (second - gain * table[5, k]) * i2
+            values[k] = table[1, k] - 0.5 * (e1 * e1 + e2 * e2)
+
+
+@compiled
+def find_modes(
+    modes: Array,
+    values: Array,
+    table: Array,
+    frame: Triple,
+    scene: SceneArguments,
+) -> int:
+    """Find the local maxima of a frame's density.
+
+    Parameters
+    ----------
+    modes : ndarray, shape (at least half of the knots, 6)
+        Filled with u, log density, standard deviation, left and right end of the mode's interval;
+        the last column is left for `frame_log_likelihood`.
+    values : ndarray, shape (knots,)
+        Work space.
+    table : ndarray, shape (6, knots)
+        From `tabulate`.
+    frame, scene
+        As for `log_integrand`.
+
+    Returns
+    -------
+    int
+        Number of modes; 0 where the density is nowhere finite.
+    """
+    _scan(values, table, frame, scene[1], scene[5] is None, scene[6], scene[7], scene[8])
+    n = values.size
+    best = -math.inf
+    for k in range(n):
+        best = max(best, values[k])
+    if not math.isfinite(best):
+        return 0
+    count = 0
+    valley = 0
+    for k in range(n):
+        if values[k] < values[valley]:
+            valley = k
+        rises = k == 0 or values[k] > values[k - 1]
+        falls = k == n - 1 or values[k] >= values[k + 1]
+        if not (rises and falls):
+            continue
+        modes[count, 0], modes[count, 1], modes[count, 2] = table[0, k], values[k], k
+        modes[count, 3], modes[count, 4] = table[0, valley], table[0, n - 1]
+        if count == 0:
+            modes[count, 3] = table[0, 0]
+        else:
+            modes[count - 1, 4] = table[0, valley]
+        count += 1
+        valley = k
+    for j in range(count):
+        k = int(modes[j, 2])
+        lower = table[0, max(k - 1, 0)]
+        upper = table[0, min(k + 1, n - 1)]
+        u = modes[j, 0]
+        density = modes[j, 1]
+        slope, curvature = slope_and_curvature(u, frame, *scene)
+        bend = curvature
+        moved = upper - lower
+        if len(scene[3]) == 9:  # decided at compile time
+            # the table holds the reference prior of the strongest frame under read and shot noise
+            density = log_integrand(u, frame, *scene)
+        for _ in range(100):
+            if slope > 0.0:
+                lower = u
+            else:
+                upper = u
+            trial = u + slope / bend if bend > 0.0 else u
+            # Gauss-Newton overshoots where residuals are large: steps must shrink, or halve
+            if not lower < trial < upper or abs(trial - u) > 0.7 * moved:
+                trial = 0.5 * (lower + upper)
+            moved = abs(trial - u)
+            if moved * math.sqrt(curvature) < 1e-3 or upper - lower < 1e-14 * (1.0 + abs(u)):
+                break
+            value = log_integrand(trial, frame, *scene)
+            if not value >= density:
+                # beyond a dip, as noise that grows with the signal makes them: the top lies nearer
+                if trial > u:
+                    upper = trial
+                else:
+                    lower = trial
+                continue
+            last_slope, last_u = slope, u
+            u, density = trial, value
+            slope, curvature = slope_and_curvature(u, frame, *scene)
+            bend = (last_slope - slope) / (u - last_u)
+            if not bend > 0.0:
+                bend = curvature
+        modes[j, 0], modes[j, 1] = u, density
+        modes[j, 2] = 1.0 / math.sqrt(curvature) if curvature > 0.0 else math.inf
+    return count
+
+
+@compiled
+def falls_off(
+    mode: Array,
+    frame: Triple,
+    scene: SceneArguments,
+) -> bool:
+    """Tell whether nothing is left beyond the reach of the short rules.
+
+    The density falls all the way to the valleys, but it may do so slowly over a long interval: it
+    is looked at once more farther out.
+    """
+    reach = _STEP * _HALF * mode[2]
+    for sign in (-1.0, 1.0):
+        length = mode[4] - mode[0] if sign > 0.0 else mode[0] - mode[3]
+        if length < reach:
+            return False
+        near = math.exp(min(log_integrand(mode[0] + sign * reach, frame, *scene) - mode[1], 1.0))
+        distance = min(_FAR * mode[2], length)
+        far = math.exp(min(log_integrand(mode[0] + sign * distance, frame, *scene) - mode[1], 1.0))
+        if not near * (distance - reach) + far * (length - distance) < 1e-6 * mode[2]:
+            return False
+    return True
+
+
+@compiled
+def _narrow(
+    mode: Array,
+    frame: Triple,
+    scene: SceneArguments,
+) -> float:
+    """Integrate a narrow interior peak, relative to its top; -1 where a check fails.
+
+    At a standard deviation below 0.003 of log r the skewness is of the same order, and seven
+    Gauss-Hermite nodes leave an error below 1e-7; their outer nodes find the exceptions.
+    """
+    u, top, sd = mode[0], mode[1], mode[2]
+    if not sd < 1.0 or not falls_off(mode, frame, scene):
+        return -1.0
+    if sd < _NEARLY_GAUSSIAN:
+        total, largest = 0.0, 0.0
+        for j in range(_HERMITE_NODES.size):
+            x = _HERMITE_NODES[j]
+            excess = log_integrand(u + x * sd, frame, *scene) - top + 0.5 * x * x
+            largest = max(largest, abs(excess))
+            total += _HERMITE_WEIGHTS[j] * math.exp(min(excess, 1.0))
+        if largest < 0.5:
+            return float(sd * total)
+    even, odd = 1.0, 0.0
+    for j in range(1, _HALF + 1):
+        for sign in (-1.0, 1.0):
+            excess = log_integrand(u + sign * j * _STEP * sd, frame, *scene) - top
+            value = math.exp(min(excess, 1.0))
+            if j % 2 == 0:
+                even += value
+            else:
+                odd += value
+    # the error of the whole rule is about the fourth power of this, but not across the kinks
+    # that shot noise has where a mean reading changes sign
+    allowed = 2e-3 if scene[7] is None else 1e-5
+    if not abs(even - odd) <= allowed * (even + odd):
+        return -1.0
+    return float(_STEP * sd * (even + odd))
+
+
+@compiled
+def _panel(
+    start: float,
+    width: float,
+    frame: Triple,
+    scene: SceneArguments,
+) -> Pair:
+    """Integrate from start over a signed width by 8 Gauss-Legendre nodes.
+
+    Returns
+    -------
+    (float, float)
+        Log integral and the highest log density met.
+    """
+    total = 0.0
+    highest = -math.inf
+    for j in range(_NODES.size):
+        value = log_integrand(start + width * 0.5 * (1.0 + _NODES[j]), frame, *scene)
+        if value > highest:
+            total *= math.exp(highest - value)
+            highest = value
+        if highest > -math.inf:
+            total += _WEIGHTS[j] * math.exp(value - highest)
+    return highest + math.log(0.5 * abs(width) * total), highest
+
+
+@compiled
+def log_add(first: float, second: float) -> float:
+    """Return log(exp(first) + exp(second))."""
+    large, small = max(first, second), min(first, second)
+    return large + math.log1p(math.exp(small - large)) if small > -math.inf else large
+
+
+@compiled
+def _march(
+    mode: Array,
+    best: float,
+    frame: Triple,
+    scene: SceneArguments,
+) -> float:
+    """Integrate a mode's interval by panels from the mode outward; the log of its mass."""
+    # halves of a smooth panel are 2^-16 of its error off
+    allowed = 1e-4 if scene[7] is None else 1e-8
+    total = -math.inf
+    for sign in (-1.0, 1.0):
+        end = mode[3] if sign < 0.0 else mode[4]
+        edge = mode[0]
+        width = min(1.7 * mode[2], 0.4, mode[4] - mode[3])
+        # at 1e20 nats the density is rounding noise, which never falls off: panels are bounded
+        for _ in range(_MOST_PANELS):
+            if not (end - edge) * sign > 0.0:
+                break
+            slope = slope_and_curvature(edge, frame, *scene)[0]
+            if abs(slope) * width > 8.0:
+                width = 8.0 / abs(slope)
+            # the slope may grow within the panel: it is looked at from the far end as well
+            while True:
+                width = min(max(width, 1e-15 * (1.0 + abs(edge))), (end - edge) * sign)
+                slope = slope_and_curvature(edge + sign * width, frame, *scene)[0]
+                if abs(slope) * width < 16.0 or width < 1e-13 * (1.0 + abs(edge)):
+                    break
+                width *= 0.5
+            last = (end - edge) * sign <= 1.25 * width
+            if last:
+                width = (end - edge) * sign
+            mass, highest = _panel(edge, sign * width, frame, scene)
+            # a panel can be wider than the peak, whose curvature says little of a flat top; and the
+            # variance of shot noise has a kink where a mean reading changes sign
+            for _ in range(30):
+                if mass < total - 20.0:
+                    break
+                half = 0.5 * sign * width
+                near, high1 = _panel(edge, half, frame, scene)
+                far, high2 = _panel(edge + half, half, frame, scene)
+                both = log_add(near, far)
+                error = abs(math.expm1(both - mass)) if mass > -math.inf else 0.0
+                mass, highest = both, max(high1, high2)
+                # a log mass of a million nats is itself known to no better than its rounding, and a
+                # panel of a few roundings is as short as it can be
+                if error <= allowed + 1e-14 * abs(mass) or abs(half) < 1e-14 * (1.0 + abs(edge)):
+                    break
+                width, mass, highest, last = 0.5 * width, near, high1, False
+            total = log_add(total, mass)
+            edge += sign * width
+            if last or highest < best - _NEGLIGIBLE:
+                break
+            width = min(1.6 * width, 0.7)
+    return total
+
+
+@compiled
+def frame_log_likelihood(
+    modes: Array,
+    count: int,
+    frame: Triple,
+    scene: SceneArguments,
+) -> float:
+    """Integrate a frame's density over its range, given its modes.
+
+    Parameters
+    ----------
+    modes : ndarray, shape (at least count, 6)
+        From `find_modes`; the last column is filled with the log of each mode's mass.
+    count : int
+        Number of modes.
+    frame, scene
+        As for `log_integrand`.
+
+    Returns
+    -------
+    float
+        log p(y | theta).
+    """
+    best = -math.inf
+    for j in range(count):
+        best = max(best, modes[j, 1])
+    total = -math.inf
+    for j in range(count):
+        mass = -math.inf
+        if modes[j, 1] > best - _NEGLIGIBLE:
+            narrow = _narrow(modes[j], frame, scene)
+            if narrow > 0.0:
+                mass = modes[j, 1] + math.log(narrow)
+            else:
+                mass = _march(modes[j], best, frame, scene)
+        modes[j, 5] = mass
+        total = log_add(total, mass)
+    return log_top(scene[6]) + total

@@ -1,0 +1,1 @@
+"""From draws to an answer that never averages over two modes."""

@@ -1,0 +1,109 @@
+"""The draws behind an answer: parameters, ranges, replicated readings."""
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.density.collapsed import CollapsedDensity
+from inference.posterior.answer.ranges import draw_ranges, replicate
+from inference.posterior.job import Job
+from inference.posterior.sample import Sample
+
+__all__ = ["Draws", "draws_of"]
+
+Array = NDArray[np.float64]
+
+_RANGE_DRAWS = 1000
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Draws:
+    """Draws from the posterior.
+
+    Ranges and readings are drawn for a few even steps of every walker.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters.
+    parameters : ndarray, shape (ensembles, walkers, steps, d)
+        In SI units; with importance sampling one ensemble of one walker, resampled by weight.
+    log_density : ndarray, shape (ensembles, walkers, steps)
+        Log posterior density in the prior's normal coordinates, ranges integrated out.
+    step : ndarray of int, shape (steps,)
+        Number of each step; the burn-in is counted, but left out.
+    accepted : ndarray of bool, shape (ensembles, walkers, steps)
+        Whether the walker moved in that step.
+    mode : ndarray of int, shape (ensembles, walkers, steps)
+        Index among `Posterior.modes` of the optimum that each draw belongs to.
+    thinned : ndarray of int, shape (t,)
+        Indices of the steps that have ranges.
+    range_m : ndarray, shape (ensembles, walkers, t, frames)
+        Ranges [m] given the parameters; nan where a frame holds no object or is saturated.
+    readings : ndarray, shape (ensembles, walkers, t, frames, 2)
+        Readings drawn anew at these parameters and ranges; nan for a saturated frame.
+    log_likelihood : ndarray, shape (ensembles, walkers, t, frames)
+        log p(readings of the frame | parameters), its range integrated out; nan likewise.
+    """
+
+    names: tuple[str, ...]
+    parameters: Array
+    log_density: Array
+    step: NDArray[np.intp]
+    accepted: NDArray[np.bool_]
+    mode: NDArray[np.intp]
+    thinned: NDArray[np.intp]
+    range_m: Array
+    readings: Array
+    log_likelihood: Array
+
+
+def draws_of(
+    density: CollapsedDensity, job: Job, sample: Sample, rng: np.random.Generator
+) -> Draws:
+    """Draw ranges and readings to a sample of the parameters.
+
+    Parameters
+    ----------
+    density : CollapsedDensity
+        The density of the job.
+    job : Job
+        The job.
+    sample : Sample
+        What it has drawn.
+    rng : numpy.random.Generator
+        Source of randomness.
+
+    Returns
+    -------
+    Draws
+    """
+    ensembles, walkers, steps = sample.log_density.shape
+    d, frames = sample.z.shape[-1], len(job.frames)
+    each = min(max(math.ceil(_RANGE_DRAWS / (ensembles * walkers)), 1), steps)
+    thinned = np.linspace(0, steps - 1, each).astype(np.intp)
+    z = sample.z[:, :, thinned].reshape(ensembles * walkers * each, d)
+    log_r = draw_ranges(density, z, rng)
+    readings = replicate(density, z, log_r, rng)
+    likelihood = density.frame_log_likelihoods(z)
+    usable = job.usable
+
+    def of_all_frames(values: Array) -> Array:
+        whole = np.full((ensembles, walkers, each, frames, *values.shape[2:]), np.nan)
+        whole[:, :, :, usable] = values.reshape(ensembles, walkers, each, *values.shape[1:])
+        return whole
+
+    return Draws(
+        density.parameters.names,
+        density.parameters.natural(sample.flat).reshape(sample.z.shape),
+        sample.log_density,
+        sample.step,
+        sample.accepted,
+        sample.mode,
+        thinned,
+        of_all_frames(np.exp(log_r)),
+        of_all_frames(readings),
+        of_all_frames(likelihood),
+    )

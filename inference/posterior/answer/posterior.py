@@ -1,0 +1,293 @@
+"""The answer: what is known of every parameter and every range, and whether to believe it."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.identifiability.status import Identifiability
+from inference.posterior.answer.draws import Draws
+from inference.posterior.sampling.verdict import Verdict
+from inference.posterior.selection.selection import SelectionSummary
+
+__all__ = [
+    "Fit",
+    "FitCheck",
+    "JointMode",
+    "LeftOutTerm",
+    "Mode",
+    "ParameterMode",
+    "ParameterSummary",
+    "Posterior",
+    "RangeSummary",
+    "Runtime",
+]
+
+Array = NDArray[np.float64]
+
+
+def _plain(value: Any) -> Any:
+    """Turn a value into plain JSON: nothing non-finite, no numpy types."""
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, np.bool_):
+        return bool(value)
+    if isinstance(value, np.ndarray):
+        return [_plain(item) for item in value.tolist()]
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return value
+
+
+@dataclasses.dataclass(frozen=True)
+class ParameterSummary:
+    """One parameter, in SI units.
+
+    Attributes
+    ----------
+    mean, sd : float
+        Of its draws; nan where they have several separate modes.
+    q05, q50, q95 : float
+        Quantiles of its draws, whatever their modes.
+    ess_bulk, ess_tail : float
+        Effective sample sizes; importance sample sizes with importance sampling.
+    rhat : float or None
+        None with importance sampling.
+    mcse_mean : float
+        Monte Carlo standard error of the mean; nan with the mean.
+    modes : tuple of ParameterMode
+        By ascending value.
+    """
+
+    mean: float
+    sd: float
+    q05: float
+    q50: float
+    q95: float
+    ess_bulk: float
+    ess_tail: float
+    rhat: float | None
+    mcse_mean: float
+    modes: tuple["ParameterMode", ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class ParameterMode:
+    """One of the separate modes of a parameter.
+
+    Attributes
+    ----------
+    value, sd, q05, q95 : float
+        Median, standard deviation and quantiles of the draws in this mode.
+    weight : float
+        Its share of the posterior.
+    weight_error : float or None
+        Standard error of the weight; None where no walker went from mode to mode.
+    """
+
+    value: float
+    weight: float
+    weight_error: float | None
+    sd: float
+    q05: float
+    q95: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Mode:
+    """One of the separate modes of a range.
+
+    Attributes
+    ----------
+    range_m, sd, q05, q95 : float
+        Median, standard deviation and quantiles of the draws in this mode [m].
+    weight : float
+        Its share of the posterior.
+    weight_error : float or None
+        Standard error of the weight; None where no walker went from mode to mode.
+    """
+
+    range_m: float
+    weight: float
+    weight_error: float | None
+    sd: float
+    q05: float
+    q95: float
+
+
+@dataclasses.dataclass(frozen=True)
+class JointMode:
+    """One optimum of all parameters together.
+
+    Attributes
+    ----------
+    parameters : dict of str to float
+        In SI units.
+    log_density : float
+        Log posterior density there, in the prior's normal coordinates, ranges integrated out, up to
+        a constant that the modes share.
+    weight : float or None
+        Share of the posterior nearer to this optimum than to any other; None where nothing was
+        drawn yet.
+    weight_error : float or None
+        Standard error of the weight; None where no walker went from mode to mode.
+    """
+
+    parameters: dict[str, float]
+    log_density: float
+    weight: float | None
+    weight_error: float | None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RangeSummary:
+    """Ranges of all frames [m]; nan where a frame holds no object or is saturated.
+
+    Attributes
+    ----------
+    q05, q50, q95 : ndarray, shape (frames,)
+        Quantiles of the draws, whatever their modes.
+    mean, sd : ndarray, shape (frames,)
+        Of the draws; nan where they have several separate modes.
+    near_fold : ndarray of bool, shape (frames,)
+        Whether noise like that of the frame makes two modes out of one, or one out of two.
+    modes : tuple of tuple of Mode
+        By ascending range, for every frame.
+    """
+
+    q05: Array
+    q50: Array
+    q95: Array
+    mean: Array
+    sd: Array
+    near_fold: NDArray[np.bool_]
+    modes: tuple[tuple[Mode, ...], ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class FitCheck:
+    """One of the checks of a fit.
+
+    Attributes
+    ----------
+    name : str
+        "total": chi-square of all frames; "worst_frame": its squared residual; "neighbours":
+        correlation of residuals along the range; "wander": their slow wandering along it.
+    statistic, expected : float
+        Of the frames, and the mean over replicates of them.
+    p_value : float
+        How rarely a replicate is as large.
+    """
+
+    name: str
+    statistic: float
+    expected: float
+    p_value: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Fit:
+    """Posterior predictive checks: is the model able to make such readings at all.
+
+    Attributes
+    ----------
+    p_value : float
+        Of all checks together.
+    misfit : bool
+        Whether it is below 1e-3, or the frames demand a larger discrepancy than was stated.
+    reasons : tuple of str
+        What misfits, in plain words.
+    chi_square, degrees_of_freedom : float
+        Of the frames at their best ranges, parameters fitted, and what is expected of it.
+    checks : tuple of FitCheck
+        One by one.
+    outliers : tuple of int
+        Frames too far off the model, by index, where the worst frame is a reason.
+    """
+
+    p_value: float
+    misfit: bool
+    reasons: tuple[str, ...]
+    chi_square: float
+    degrees_of_freedom: float
+    checks: tuple[FitCheck, ...]
+    outliers: tuple[int, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class LeftOutTerm:
+    """A term that is in no model of this scene, and why."""
+
+    term: str
+    reason: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Runtime:
+    """What the answer cost."""
+
+    wall_s: float
+    cpu_s: float
+    likelihood_calls: int
+    k_hat: float | None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Posterior:
+    """A posterior: summaries, verdict, ambiguity, identifiability, fit.
+
+    Attributes
+    ----------
+    method : str
+        "emcee" or "importance".
+    seed : int
+        The seed; the same seed gives the same draws.
+    modes : tuple of JointMode
+        All optima that were found, numbered as in the verdict.
+    selection : SelectionSummary, optional
+        With optional terms in the scene: the models that were compared, and what was decided.
+    """
+
+    method: str
+    seed: int
+    verdict: Verdict
+    parameters: dict[str, ParameterSummary]
+    modes: tuple[JointMode, ...]
+    range_m: RangeSummary
+    identifiability: tuple[Identifiability, ...]
+    fit: Fit
+    left_out: tuple[LeftOutTerm, ...]
+    runtime: Runtime
+    draws: Draws
+    selection: SelectionSummary | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain JSON data in the shape of the contract; non-finite values become null."""
+        document: dict[str, Any] = {
+            "method": self.method,
+            "seed": self.seed,
+            "verdict": dataclasses.asdict(self.verdict),
+            "parameters": {k: dataclasses.asdict(v) for k, v in self.parameters.items()},
+            "modes": [dataclasses.asdict(mode) for mode in self.modes],
+            "range_m": {
+                field.name: getattr(self.range_m, field.name)
+                for field in dataclasses.fields(RangeSummary)
+                if field.name != "modes"
+            },
+            "identifiability": [dataclasses.asdict(row) for row in self.identifiability],
+            "fit": dataclasses.asdict(self.fit),
+            "left_out": [dataclasses.asdict(row) for row in self.left_out],
+            "selection": None if self.selection is None else dataclasses.asdict(self.selection),
+            "runtime": dataclasses.asdict(self.runtime),
+        }
+        document["range_m"]["modes"] = [
+            [dataclasses.asdict(mode) for mode in modes] for modes in self.range_m.modes
+        ]
+        plain: dict[str, Any] = _plain(document)
+        return plain

@@ -1,0 +1,63 @@
+"""Draws of the ranges in a few numbers each, of which none is an average over two modes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.posterior.answer.draws import Draws
+from inference.posterior.answer.modes import boundaries, labels
+from inference.posterior.answer.posterior import Mode, RangeSummary
+from inference.posterior.answer.quantiles import quantiles
+from inference.posterior.answer.shares import resampled_share_error, share_error
+
+__all__ = ["range_summary"]
+
+Array = NDArray[np.float64]
+
+
+def range_summary(
+    draws: Draws, near_fold: NDArray[np.bool_], importance_ess: float | None
+) -> RangeSummary:
+    """Summarise the ranges of all frames of a job.
+
+    Parameters
+    ----------
+    draws : Draws
+        Draws of the ranges.
+    near_fold : ndarray of bool, shape (frames,)
+        Frames near a fold.
+    importance_ess : float or None
+        With importance sampling: its effective sample size.
+
+    Returns
+    -------
+    RangeSummary
+    """
+    n = draws.range_m.shape[-1]
+    columns = {name: np.full(n, np.nan) for name in ("q05", "q50", "q95", "mean", "sd")}
+    modes: list[tuple[Mode, ...]] = [()] * n
+    for frame in np.flatnonzero(np.isfinite(draws.range_m[0, 0, 0])):
+        r = draws.range_m[..., frame]
+        cuts = boundaries(np.log(r).ravel())
+        modes[frame] = _modes(r, labels(np.log(r), cuts), cuts.size + 1, importance_ess)
+        q = quantiles(r, several_modes=cuts.size > 0)
+        columns["q05"][frame], columns["q50"][frame], columns["q95"][frame] = q
+        if cuts.size == 0:
+            columns["mean"][frame], columns["sd"][frame] = r.mean(), r.std(ddof=1)
+    return RangeSummary(**columns, near_fold=near_fold, modes=tuple(modes))
+
+
+def _modes(
+    r: Array, label: NDArray[np.intp], count: int, importance_ess: float | None
+) -> tuple[Mode, ...]:
+    result = []
+    for k in range(count):
+        inside = label == k
+        weight = float(inside.mean())
+        if importance_ess is None:
+            error = share_error(inside)
+        else:
+            error = resampled_share_error(weight, r.size, importance_ess)
+        q05, q50, q95 = quantiles(r[inside], several_modes=False)
+        sd = float(r[inside].std(ddof=1)) if inside.sum() > 1 else 0.0
+        result.append(Mode(q50, weight, error, sd, q05, q95))
+    return tuple(result)

@@ -1,0 +1,1 @@
+"""Whether to believe an answer: the model against the data, the draws against the density."""

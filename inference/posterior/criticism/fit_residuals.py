@@ -1,0 +1,150 @@
+"""Residuals of frames across the curve that the range draws, the parameters fitted once more."""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from inference.density.collapsed import CollapsedDensity
+from inference.density.discrepant import DiscrepantDensity
+from inference.density.profile import best_ranges
+from inference.density.static import StaticDensity
+from inference.density.whitened import whitened
+from inference.posterior.answer.ranges import replicate
+from inference.posterior.job import Job
+
+__all__ = ["FitResiduals", "fit_residuals"]
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FitResiduals:
+    """Residuals of the frames and of replicates of them, each after a fit of its own.
+
+    Attributes
+    ----------
+    across : ndarray, shape (1 + replicates, n)
+        Signed residual of each frame with an object across its curve, in standard deviations,
+        by ascending range; the frames themselves first.
+    squared : ndarray, shape (1 + replicates, m)
+        Squared residual of every frame, in the order of the frames.
+    log_r : ndarray, shape (n,)
+        Best ranges of the frames with an object, ascending.
+    """
+
+    across: Array
+    squared: Array
+    log_r: Array
+
+
+def _without_flux_error(density: CollapsedDensity) -> CollapsedDensity:
+    if not isinstance(density, DiscrepantDensity):
+        return density
+    fields = {f.name: getattr(density, f.name) for f in dataclasses.fields(CollapsedDensity)}
+    return CollapsedDensity(**fields)
+
+
+def _stacked(density: CollapsedDensity, readings: Array) -> CollapsedDensity:
+    """Return the density of many sets of frames, one behind the other."""
+    sets, n, _ = readings.shape
+    frames = np.empty((sets * n, 3))
+    frames[:, :2] = readings.reshape(sets * n, 2)
+    frames[:, 2] = np.tile(density.frames[:, 2], sets)
+    present = None if density.present is None else np.tile(density.present, sets)
+    return dataclasses.replace(density, frames=frames, present=present)
+
+
+def fit_residuals(
+    job: Job, density: CollapsedDensity, z: Array, replicates: int, rng: np.random.Generator
+) -> FitResiduals:
+    """Compare the frames with replicates of them.
+
+    Replicates are made at the parameters z and the best ranges for them. Frames and replicates
+    alike get their best ranges, and z moves by one Gauss-Newton step towards each of them, held by
+    the prior's unit scale: what parameters can follow is no misfit, nor is an error of the flux
+    that the scene allows for.
+
+    Parameters
+    ----------
+    job : Job
+        The job.
+    density : CollapsedDensity
+        Its density.
+    z : ndarray, shape (d,)
+        A draw of the parameters.
+    replicates : int
+        How many.
+    rng : numpy.random.Generator
+        Source of randomness.
+
+    Returns
+    -------
+    FitResiduals
+    """
+    n, d = len(density.frames), z.size
+    plain = _without_flux_error(density)
+    seen = best_ranges(plain, z[None])[0, :, 0]
+    many = np.broadcast_to(z, (replicates, d))
+    anew = replicate(density, many, np.broadcast_to(seen, (replicates, n)).copy(), rng)
+    readings = np.concatenate([density.frames[None, :, :2], anew])
+    if isinstance(density, StaticDensity):
+        return _of_one_range(job, density, z, seen, readings)
+    stacked = _stacked(plain, readings)
+    best = best_ranges(stacked, z[None])[0, :, 0]
+    at = whitened(job.sensor, density.parameters, stacked.frames, z, best)
+    sets = replicates + 1
+    across = np.einsum("ni,ni->n", at.across, at.residual).reshape(sets, n)
+    square = np.sum(at.residual**2, axis=1).reshape(sets, n)
+    present = np.isfinite(seen)
+    # rows of the frames themselves stand for those of the replicates: only noise lies between
+    own = at.jacobian[:n]
+    if isinstance(density, DiscrepantDensity):
+        # the error's coefficients, whose prior has unit scale too, are fitted like parameters
+        functions = density.functions(seen)[0]
+        own = np.concatenate([own, at.signal[:n, :, None] * functions[:, None, :]], axis=2)
+        d = own.shape[2]
+    rows = np.concatenate(
+        [
+            np.einsum("ni,nid->nd", at.across[:n], own)[present],
+            own[~present].reshape(-1, d) if d else np.empty((2 * int((~present).sum()), 0)),
+        ]
+    )
+    empty = at.residual.reshape(sets, n, 2)[:, ~present].reshape(sets, -1)
+    before = np.concatenate([across[:, present], empty], axis=1)
+    fitted = before - _followed(before, rows)
+    count = int(present.sum())
+    squared = np.empty((sets, n))
+    # what is left along a curve, at the ends of the prior, stays as it is
+    along = square[:, present] - across[:, present] ** 2
+    squared[:, present] = fitted[:, :count] ** 2 + np.maximum(along, 0.0)
+    squared[:, ~present] = np.sum(fitted[:, count:].reshape(sets, -1, 2) ** 2, axis=2)
+    order = np.argsort(seen[present])
+    return FitResiduals(fitted[:, :count][:, order], squared, seen[present][order])
+
+
+def _of_one_range(
+    job: Job, density: StaticDensity, z: Array, seen: Array, readings: Array
+) -> FitResiduals:
+    """Do the same where all frames have one range, which is fitted like a parameter."""
+    sets, n, _ = readings.shape
+    at = whitened(job.sensor, density.parameters, density.frames, z, seen)
+    off = readings - (
+        density.frames[:, :2] - np.linalg.solve(at.whitener, at.residual[..., None])[..., 0]
+    )
+    residuals = np.einsum("nij,snj->sni", at.whitener, off).reshape(sets, 2 * n)
+    rows = np.concatenate([at.jacobian.reshape(2 * n, z.size), at.along.reshape(2 * n, 1)], axis=1)
+    fitted = residuals - _followed(residuals, rows, free=1)
+    squared = np.sum(fitted.reshape(sets, n, 2) ** 2, axis=2)
+    return FitResiduals(np.empty((sets, 0)), squared, np.empty(0))
+
+
+def _followed(residuals: Array, rows: Array, free: int = 0) -> Array:
+    """Return the part of residuals that the parameters follow, the last few without a prior."""
+    d = rows.shape[1]
+    if d == 0:
+        return np.zeros_like(residuals)
+    prior = np.eye(d)[: d - free]
+    basis = linalg.qr(np.concatenate([rows, prior]), mode="economic")[0][: len(rows)]
+    return np.asarray((residuals @ basis) @ basis.T)

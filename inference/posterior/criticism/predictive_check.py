@@ -1,0 +1,160 @@
+"""Posterior predictive checks: is the model able to make such readings at all."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.density.collapsed import CollapsedDensity
+from inference.posterior.answer.posterior import Fit, FitCheck
+from inference.posterior.criticism.fit_residuals import FitResiduals, fit_residuals
+from inference.posterior.job import Job
+from simulator.discrepancy import matern
+
+__all__ = ["predictive_check"]
+
+Array = NDArray[np.float64]
+
+_MISFIT = 1e-3
+_DRAWS = 5  # of the parameters
+_REPLICATES = 200  # of each
+_TAIL = 0.1  # share of the replicates that tell how the tail falls
+_LENGTH = 0.5  # in log r, of a smooth error
+
+
+def _total(of: FitResiduals) -> Array:
+    return np.asarray(of.squared.sum(axis=1), dtype=np.float64)
+
+
+def _worst(of: FitResiduals) -> Array:
+    return np.asarray(of.squared.max(axis=1))
+
+
+def _neighbours(of: FitResiduals) -> Array:
+    """Correlation of each residual with that of the next range."""
+    if of.log_r.size < 3:
+        return np.zeros(len(of.across))
+    size = np.sum(of.across**2, axis=1)
+    products = np.sum(of.across[:, 1:] * of.across[:, :-1], axis=1)
+    correlation = np.zeros(len(size))
+    np.divide(products, size, out=correlation, where=size > 0)
+    return correlation
+
+
+def _wander(of: FitResiduals) -> Array:
+    """Square of the residuals under a Matern 5/2 kernel along log r: large where they wander."""
+    if of.log_r.size < 3:
+        return np.zeros(len(of.across))
+    kernel = matern(of.log_r[:, None] - of.log_r, _LENGTH)
+    return np.asarray(np.sum((of.across @ kernel) * of.across, axis=1))
+
+
+_CHECKS: dict[str, Callable[[FitResiduals], Array]] = {
+    "total": _total,
+    "worst_frame": _worst,
+    "neighbours": _neighbours,
+    "wander": _wander,
+}
+
+
+def _survival(anew: Array, seen: Array) -> float:
+    """Return how rarely replicates are as large, the tail taken for exponential.
+
+    Statistics of normal residuals have tails that fall like that or faster.
+    """
+    start = float(np.quantile(anew, 1.0 - _TAIL))
+    excess = anew[anew > start] - start
+    scale = float(excess.mean()) if excess.size else 0.0
+    shares = []
+    for value in seen:
+        if value > start and scale > 0:
+            shares.append(_TAIL * math.exp(-(value - start) / scale))
+        else:
+            shares.append((float(np.sum(anew >= value)) + 0.5) / (anew.size + 1))
+    return float(np.mean(shares))
+
+
+def predictive_check(
+    job: Job, density: CollapsedDensity, z: Array, rng: np.random.Generator
+) -> Fit:
+    """Check the frames against replicates of them.
+
+    Four things are looked at: the chi-square of all frames, the worst frame, the correlation of
+    neighbours along the range, and slow wandering along it, which is how a smooth error of the
+    object model shows long before the chi-square does. Frames and replicates alike are fitted
+    before they are compared (`fit_residuals`), so that p is even under a true model up to what is
+    not linear; four tests are made up for as if they were independent (Sidak), which errs towards
+    fewer alarms.
+
+    Parameters
+    ----------
+    job : Job
+        The job.
+    density : CollapsedDensity
+        Its density.
+    z : ndarray, shape (m, d)
+        Draws of the parameters.
+    rng : numpy.random.Generator
+        Source of randomness.
+
+    Returns
+    -------
+    Fit
+    """
+    chosen = np.linspace(0, len(z) - 1, min(_DRAWS, len(z))).astype(np.intp)
+    every = [fit_residuals(job, density, z[k], _REPLICATES, rng) for k in chosen]
+    checks = []
+    for name, statistic in _CHECKS.items():
+        values = np.array([statistic(of) for of in every])
+        p = _survival(values[:, 1:].ravel(), values[:, 0])
+        mean = float(values[:, 1:].mean())
+        checks.append(FitCheck(name, float(np.median(values[:, 0])), mean, p))
+    least = min(check.p_value for check in checks)
+    p_value = -math.expm1(len(checks) * math.log1p(-min(least, 1.0 - 1e-12)))
+    outliers = _outliers(job, every)
+    failed = [c for c in checks if -math.expm1(len(checks) * math.log1p(-c.p_value)) < _MISFIT]
+    return Fit(
+        p_value,
+        p_value < _MISFIT,
+        tuple(_words(check, outliers) for check in failed),
+        checks[0].statistic,
+        checks[0].expected,
+        tuple(checks),
+        outliers if any(check.name == "worst_frame" for check in failed) else (),
+    )
+
+
+def _outliers(job: Job, every: list[FitResiduals]) -> tuple[int, ...]:
+    """Return the frames that are worse than all but one in a thousand worst frames should be."""
+    worst = np.concatenate([_worst(of)[1:] for of in every])
+    start = float(np.quantile(worst, 1.0 - _TAIL))
+    limit = start + float((worst[worst > start] - start).mean()) * math.log(_TAIL / _MISFIT)
+    seen = np.median([of.squared[0] for of in every], axis=0)
+    frames = np.flatnonzero(job.usable)[seen > limit]
+    return tuple(int(frame) for frame in frames)
+
+
+def _words(check: FitCheck, outliers: tuple[int, ...]) -> str:
+    """Say what a failed check means."""
+    if check.name == "total":
+        return (
+            f"the frames' chi-square is {check.statistic:.4g} where {check.expected:.4g} is "
+            "expected: the noise is larger than stated, or the model is wrong"
+        )
+    if check.name == "worst_frame":
+        size = math.sqrt(check.statistic)
+        which = ", ".join(str(frame) for frame in outliers[:10])
+        more = f" and {len(outliers) - 10} more" if len(outliers) > 10 else ""
+        named = f" (frames {which}{more}, counted from 0)" if outliers else ""
+        return f"the worst frame lies {size:.3g} standard deviations off the model{named}"
+    if check.name == "neighbours":
+        return (
+            f"residuals of neighbouring ranges go together (correlation {check.statistic:.2g}): "
+            "the model has a smooth error along the range; state a `discrepancy`"
+        )
+    return (
+        "residuals wander slowly along the range, "
+        f"{check.statistic / max(check.expected, 1e-300):.3g} times as much as by noise: "
+        "the model has a smooth error; state a `discrepancy`"
+    )

@@ -1,0 +1,239 @@
+"""A triangular map that unbends a posterior: its curved sheet becomes nearly a standard normal.
+
+Along the principal axes of a sample, widest first, every coordinate is standardised by a mean and a
+log scale that are polynomials of the coordinates before it (a Knothe-Rosenblatt rearrangement of a
+fixed form: Parno and Marzouk 2018, Transport map accelerated Markov chain Monte Carlo). Both
+directions are explicit, so that a poor fit costs speed, never correctness.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from inference.density.triangular import update_factor
+from inference.posterior.sampling.shear import Shear
+from simulator.compiled import compiled
+
+__all__ = ["TriangularMap", "fit_map"]
+
+Array = NDArray[np.float64]
+
+_POINTS = 6  # of the sample for every term of a polynomial
+_BEYOND = 1.5  # times the reach of the sample: held to it, moves never widen a sheet too short
+_RIDGE = 1e-3  # times the root of the sample size: keeps terms apart that are nearly the same
+_DOUBT = 3.0  # squared standard errors below which a term counts as noise
+_MEAN_LOG_NORMAL = 0.635  # less the mean of log |x| of a standard normal
+
+
+@compiled
+def _polynomial(w: Array, k: int, coefficients: Array, cubic: int) -> float:
+    """Return a polynomial of w[:k], cubic in the first ones; terms in the order of `_features`."""
+    total = float(coefficients[0])
+    n = 1
+    for i in range(k):
+        total += coefficients[n] * w[i]
+        n += 1
+    for i in range(k):
+        for j in range(i, k):
+            total += coefficients[n] * w[i] * w[j]
+            n += 1
+    m = min(k, cubic)
+    for i in range(m):
+        for j in range(i, m):
+            for h in range(j, m):
+                total += coefficients[n] * w[i] * w[j] * w[h]
+                n += 1
+    return total
+
+
+@compiled
+def _unbend(
+    out: Array,
+    log_det: Array,
+    whitened: Array,
+    bounds: Array,
+    means: Array,
+    scales: Array,
+    cubic: int,
+) -> None:
+    """Fill out[i] with x of whitened[i], and add log |dx/dw|."""
+    n, d = whitened.shape
+    inside = np.empty(d)
+    for i in range(n):
+        for k in range(d):
+            scale = _polynomial(inside, k, scales[k], 0)
+            out[i, k] = (whitened[i, k] - _polynomial(inside, k, means[k], cubic)) * math.exp(
+                -scale
+            )
+            log_det[i] -= scale
+            inside[k] = min(max(whitened[i, k], bounds[0, k]), bounds[1, k])
+
+
+@compiled
+def _bend(
+    whitened: Array,
+    log_det: Array,
+    x: Array,
+    bounds: Array,
+    means: Array,
+    scales: Array,
+    cubic: int,
+) -> None:
+    """Fill whitened[i] with w of x[i], and add log |dw/dx|."""
+    n, d = x.shape
+    inside = np.empty(d)
+    for i in range(n):
+        for k in range(d):
+            scale = _polynomial(inside, k, scales[k], 0)
+            whitened[i, k] = _polynomial(inside, k, means[k], cubic) + math.exp(scale) * x[i, k]
+            log_det[i] += scale
+            inside[k] = min(max(whitened[i, k], bounds[0, k]), bounds[1, k])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class TriangularMap:
+    """A map between parameters z and coordinates x that are nearly standard normal.
+
+    Attributes
+    ----------
+    centre : ndarray, shape (d,)
+        Mean of the sample it was fitted to.
+    axes : ndarray, shape (d, d)
+        Principal axes times their standard deviations, as columns, widest first.
+    bounds : ndarray, shape (2, d)
+        Somewhat more than the reach of the sample along the axes: polynomials are not continued
+        beyond.
+    means : ndarray, shape (d, terms)
+        Polynomial coefficients of each coordinate's mean; row k uses the first ones.
+    scales : ndarray, shape (d, terms)
+        Coefficients of each coordinate's log scale, at most quadratic.
+    cubic : int
+        Widest coordinates that have cubic terms in the means.
+    shear : Shear or None
+        Applied before all of this; None where nothing is confounded.
+    """
+
+    centre: Array
+    axes: Array
+    bounds: Array
+    means: Array
+    scales: Array
+    cubic: int
+    shear: Shear | None = None
+
+    @property
+    def _log_volume(self) -> float:
+        return float(np.log(np.linalg.norm(self.axes, axis=0)).sum())
+
+    def unbend(self, z: Array) -> tuple[Array, Array]:
+        """Return x of shape (n, d) and log |dx/dz| of shape (n,)."""
+        if self.shear is not None:
+            z = self.shear.forward(z)
+        # the axes are orthogonal: their inverse is their transpose, rescaled
+        inverse = self.axes / np.einsum("ij,ij->j", self.axes, self.axes)
+        whitened = np.einsum("nj,jk->nk", z - self.centre, inverse)
+        x = np.empty_like(whitened)
+        log_det = np.full(len(z), -self._log_volume)
+        _unbend(x, log_det, whitened, self.bounds, self.means, self.scales, self.cubic)
+        return x, log_det
+
+    def bend(self, x: Array) -> tuple[Array, Array]:
+        """Return z of shape (n, d) and log |dz/dx| of shape (n,)."""
+        whitened = np.empty_like(x)
+        log_det = np.full(len(x), self._log_volume)
+        _bend(
+            whitened,
+            log_det,
+            np.ascontiguousarray(x),
+            self.bounds,
+            self.means,
+            self.scales,
+            self.cubic,
+        )
+        z = self.centre + np.einsum("nk,jk->nj", whitened, self.axes)
+        return (z if self.shear is None else self.shear.backward(z)), log_det
+
+
+def _features(w: Array, k: int, quadratic: bool, cubic: int) -> Array:
+    """Return the terms of `_polynomial` at w, shape (n, terms)."""
+    columns = [np.ones(len(w))]
+    columns += [w[:, i] for i in range(k)]
+    if quadratic:
+        columns += [w[:, i] * w[:, j] for i in range(k) for j in range(i, k)]
+    m = min(k, cubic)
+    columns += [
+        w[:, i] * w[:, j] * w[:, h] for i in range(m) for j in range(i, m) for h in range(j, m)
+    ]
+    return np.column_stack(columns)
+
+
+def _regression(features: Array, target: Array, strength: float, copies: float) -> Array:
+    """Least squares with scaled columns; terms that the sample does not show are left out.
+
+    Terms, in their order and freed of those before them, are shrunk as the non-negative garrote
+    does (Breiman 1995). Without it a map of eighty terms fits the noise of five hundred draws:
+    members of a population that it did not see lie in its tails, where they stay, and directions
+    that the readings leave open lost a third of their variance from the prior to the posterior.
+    """
+    n, k = features.shape
+    scale = np.sqrt(np.mean(features**2, axis=0))
+    scale = np.where(scale > 0, scale, 1.0)
+    rows = np.empty((k + 1, n))
+    rows[:k], rows[k] = (features / scale).T, target
+    factor = math.sqrt(strength) * np.eye(k + 1)
+    factor[0, 0] = factor[k, k] = 0.0
+    # not LAPACK: the threads that it starts for so small a problem cost twice what they do
+    update_factor(factor, rows, n)
+    along = factor[1:k, k]
+    noise = _DOUBT * copies * factor[k, k] ** 2 / max(n - k, 1)
+    along *= np.maximum(0.0, 1.0 - noise / np.maximum(along**2, 1e-300))
+    return np.asarray(linalg.solve_triangular(factor[:k, :k], factor[:k, k]) / scale)
+
+
+def fit_map(draws: Array, shear: Shear | None = None) -> TriangularMap:
+    """Fit the map that makes a sample nearly standard normal.
+
+    Parameters
+    ----------
+    draws : ndarray, shape (n, d)
+        n > d, not all equal; duplicates count as often as they stand there.
+    shear : Shear, optional
+        Coordinates that the map starts from.
+
+    Returns
+    -------
+    TriangularMap
+    """
+    n, d = draws.shape
+    if shear is not None:
+        draws = shear.forward(draws)
+    centre = draws.mean(axis=0)
+    # singular values, not eigenvalues of the covariance: thin sheets keep their digits
+    _, singular, rows = linalg.svd(draws - centre, full_matrices=False)
+    sd = singular / math.sqrt(n)
+    axes = rows.T * np.maximum(sd, 1e-12 * sd[0] + 1e-300)
+    whitened = (draws - centre) @ (axes / np.einsum("ij,ij->j", axes, axes))
+    rest = n // _POINTS - math.comb(d + 1, 2)
+    cubic = max((m for m in range(d) if math.comb(m + 2, 3) <= rest), default=0)
+    quadratic = n // _POINTS >= 2 * math.comb(d + 1, 2)
+    means = np.zeros((d, math.comb(d + 1, 2) + math.comb(cubic + 2, 3)))
+    scales = np.zeros((d, math.comb(d + 1, 2)))
+    strength = _RIDGE * math.sqrt(n)
+    times = np.unique(draws, axis=0, return_counts=True)[1]
+    copies = float((times**2).sum() / n)  # equal draws say as much as one of them
+    for k in range(d):
+        features = _features(whitened, k, True, cubic)
+        mean = _regression(features, whitened[:, k], strength, copies) if k else np.zeros(1)
+        residual = whitened[:, k] - features @ mean
+        size = np.log(np.abs(residual) + 1e-3 * residual.std() + 1e-300) + _MEAN_LOG_NORMAL
+        terms = _features(whitened, k, quadratic, 0)
+        scale = _regression(terms, size, 3 * strength, copies)
+        left = residual * np.exp(-terms @ scale)
+        scale[0] += math.log(max(float(left.std()), 1e-300))
+        means[k, : mean.size] = mean
+        scales[k, : scale.size] = scale
+    bounds = _BEYOND * np.array([whitened.min(axis=0), whitened.max(axis=0)])
+    return TriangularMap(centre, axes, bounds, means, scales, cubic, shear)

@@ -1,0 +1,1 @@
+"""Which optional terms the data demand: evidence and cross-validated predictive density."""
