@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.curve_table import integration_bounds, tabulate
-from inference.density.frame_integral import find_modes, frame_log_likelihood
+from inference.density.frame_integral import frame_log_likelihood
 from inference.density.gaussian import Pair, gaussian, log_top
 from inference.density.integrand import Quad, Triple
+from inference.density.range_modes import find_modes
 from inference.density.rows import background_of, crosstalk_of, law_of, row_of
 from simulator.compiled import compiled
 from simulator.frames import Frames

@@ -11,14 +11,9 @@ from numpy.typing import NDArray
 from inference.density.collapsed import empty_frame_log_likelihood
 from inference.density.curve_table import integration_bounds, tabulate
 from inference.density.flux_error import add_row, expand
-from inference.density.frame_integral import find_modes
 from inference.density.gaussian import Pair, log_top
-from inference.density.integrand import (
-    Triple,
-    WarpedArguments,
-    log_integrand,
-    slope_and_curvature,
-)
+from inference.density.integrand import Triple, WarpedArguments, log_integrand, slope_and_curvature
+from inference.density.range_modes import find_modes
 from inference.density.rows import background_of, crosstalk_of, law_of
 from inference.density.triangular import cholesky, solve_factor
 from inference.density.warp import fill_curve

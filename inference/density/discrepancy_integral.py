@@ -15,9 +15,10 @@ from inference.density.collapsed import empty_frame_log_likelihood
 from inference.density.curve_table import integration_bounds, tabulate
 from inference.density.discrepancy_climb import best_positions, climb_jointly
 from inference.density.flux_error import add_mode, add_row, expand
-from inference.density.frame_integral import find_modes, frame_log_likelihood
+from inference.density.frame_integral import frame_log_likelihood
 from inference.density.gaussian import LOG_2PI, Pair, log_top
 from inference.density.integrand import WarpedArguments
+from inference.density.range_modes import find_modes
 from inference.density.rows import background_of, crosstalk_of, law_of
 from inference.density.triangular import solve_factor, update_factor
 from inference.density.warp import fill_curve

@@ -147,7 +147,7 @@ def add_mode(
     weight : float
         The mode's share of the frame's mass.
     mode : ndarray, shape (6,)
-        From `inference.density.frame_integral.find_modes`.
+        From `inference.density.range_modes.find_modes`.
     frame, scene
         As for `log_integrand`.
     basis : ndarray, shape (knots, 2, functions)

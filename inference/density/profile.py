@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity, empty_frame_log_likelihood
 from inference.density.curve_table import integration_bounds, tabulate
 from inference.density.discrepant import DiscrepantDensity
-from inference.density.frame_integral import find_modes
 from inference.density.gaussian import Pair, log_top
+from inference.density.range_modes import find_modes
 from inference.density.rows import background_of, crosstalk_of, law_of
 from inference.density.static import StaticDensity
 from inference.identifiability.sensitivity import whitener_of

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.curve_table import integration_bounds, tabulate
-from inference.density.frame_integral import find_modes
 from inference.density.gaussian import Pair
+from inference.density.range_modes import find_modes
 from inference.density.rows import background_of, crosstalk_of, law_of
 from inference.multiframe.problem import FitProblem
 from simulator.compiled import compiled

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from inference.multiframe.climb import profile_slopes
 from inference.multiframe.coordinates import bounds_of
 from inference.multiframe.problem import FitProblem
+from inference.multiframe.profile_slopes import profile_slopes
 
 __all__ = ["polish"]
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.multiframe.climb import Instrument
 from inference.multiframe.coordinates import KNOWN, SAME, Layout, bounds_of, chain, physical
+from inference.multiframe.deviance import Instrument
 from inference.multiframe.slopes import SLOTS
 from simulator.errors import RefusedError
 from simulator.frames import Frames

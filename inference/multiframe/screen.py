@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.gaussian import log_top
-from inference.multiframe.climb import deviance
 from inference.multiframe.coordinates import Layout, bounds_of, physical
+from inference.multiframe.deviance import deviance
 from inference.multiframe.slopes import SLOTS, frame_slopes
 from inference.multiframe.triangle import solve_least_squares
 from simulator.compiled import compiled

@@ -16,7 +16,8 @@ from inference.posterior.sampling.proposal import Mixture, Proposal
 from inference.posterior.sampling.shear import Shear
 from inference.posterior.sampling.transport import TriangularMap
 from inference.posterior.sampling.verdict import Verdict
-from inference.posterior.selection.selection import Candidate, Decision, Selection
+from inference.posterior.selection.candidates import Candidate
+from inference.posterior.selection.selection import Decision, Selection
 from simulator.frames import Frames
 
 __all__ = ["pack", "pack_parts", "unpack", "unpack_parts"]

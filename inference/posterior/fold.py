@@ -20,25 +20,19 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inference.posterior.answer import summary
+from inference.posterior import summary
+from inference.posterior.adaptation import adapt, is_slow, set_out
 from inference.posterior.answer.draws import Draws, draws_of
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.job import Checkpoint, Job, chains, prepare
-from inference.posterior.launch import POPULATIONS, WALKERS, new_ensembles, start
+from inference.posterior.launch import WALKERS, start
 from inference.posterior.sample import sample_of
-from inference.posterior.sampling.diagnostics import (
-    autocorrelation_time,
-    effective_sample_size,
-    split_r_hat,
-)
-from inference.posterior.sampling.ensemble import Ensemble, advance, restart
+from inference.posterior.sampling.diagnostics import effective_sample_size, split_r_hat
+from inference.posterior.sampling.ensemble import Ensemble, advance
 from inference.posterior.sampling.population import Population, first_population, temper
 from inference.posterior.sampling.proposal import Proposal
-from inference.posterior.sampling.shear import shear_of
-from inference.posterior.sampling.transport import fit_map
-from inference.posterior.sampling.verdict import Chains, Verdict, judge
+from inference.posterior.sampling.verdict import judge
 from inference.posterior.selecting import (
     AssessTask,
     StartTask,
@@ -48,7 +42,7 @@ from inference.posterior.selecting import (
     sampled,
     take_in,
 )
-from inference.posterior.selection.selection import Candidate
+from inference.posterior.selection.candidates import Candidate
 
 __all__ = [
     "Checkpoint",
@@ -66,14 +60,9 @@ __all__ = [
     "tasks",
 ]
 
-Array = NDArray[np.float64]
 
 _CHUNK_S = 0.33  # of the first chunk; later ones grow to about a second
 _MOST_STEPS = 20_000
-# steps of autocorrelation above which the proposal is adapted: as often as there are entries
-_SLOW = (10.0, 10.0, 40.0)
-_PILOT_DRAWS = 10_000
-_MAP_SHARE = 0.55  # of the steps that are independent jumps through a map
 _EVALUATION_S = 1.2e-6  # a frame under one parameter vector, for sizing chunks only
 
 
@@ -214,13 +203,11 @@ def merge(
             for population in checkpoint.populations
         )
         checkpoint = dataclasses.replace(checkpoint, populations=populations)
-        return _set_out(job, checkpoint) if all(map(_has_arrived, populations)) else checkpoint
+        return set_out(job, checkpoint) if all(map(_has_arrived, populations)) else checkpoint
     checkpoint = dataclasses.replace(checkpoint, ensembles=ensembles)
     kept = chains(job, checkpoint)
-    done = checkpoint.adaptations
-    # a parameter that does not move has no finite time
-    if done < len(_SLOW) and not _slowest(kept) < _SLOW[done]:
-        return _adapt(job, checkpoint, kept)
+    if is_slow(kept, checkpoint.adaptations):
+        return adapt(job, checkpoint, kept)
     verdict = judge(kept, job.settings.target_ess)
     columns = np.moveaxis(kept.z, -1, 0)
     least = min(effective_sample_size(draws) for draws in columns)
@@ -231,63 +218,6 @@ def merge(
         ess=least if math.isfinite(least) else None,
         r_hat=worst if math.isfinite(worst) else None,
         finished=verdict.converged or checkpoint.ensembles[0].steps >= _MOST_STEPS,
-    )
-
-
-def _set_out(job: Job, checkpoint: Checkpoint) -> Checkpoint:
-    """Fit a map to the populations that arrived, and set up ensembles in its coordinates.
-
-    The last ensemble starts around the optima of the multistart, the others from populations that
-    came from the prior and know nothing of them: they can contradict one another.
-    """
-    proposal = checkpoint.proposal
-    arrived = [p.z for p in checkpoint.populations if p is not None and len(p.z)]
-    if proposal is None:
-        raise ValueError("nothing is to be sampled")
-    density = job.density()
-    count = job.settings.ensembles
-    starts = [np.empty((0, len(density.parameters)))] * count
-    if arrived:
-        transport = fit_map(np.concatenate(arrived), shear_of(density))
-        proposal = dataclasses.replace(proposal, transport=transport, share=_MAP_SHARE)
-        for k in range(count - 1):
-            members = arrived[k % len(arrived)]
-            order = job.stream(10, k).permutation(len(members))
-            starts[k] = members[order]
-    ensembles = new_ensembles(density, proposal, tuple(starts), job)
-    return dataclasses.replace(
-        checkpoint,
-        proposal=proposal,
-        ensembles=ensembles,
-        adaptations=1,
-        calls=checkpoint.calls + WALKERS * count,
-    )
-
-
-def _slowest(kept: Chains) -> float:
-    """Return the longest autocorrelation time of the parameters, in steps."""
-    steps = kept.z.shape[2]
-    return max(autocorrelation_time(x.reshape(-1, steps).T) for x in np.moveaxis(kept.z, -1, 0))
-
-
-def _adapt(job: Job, checkpoint: Checkpoint, kept: Chains) -> Checkpoint:
-    """Fit the map to what was drawn so far, and forget the draws; or call for populations.
-
-    Populations are called for once: those that died on the way would die again.
-    """
-    pending = Verdict(False, ("the proposal was still being adapted",))
-    begun = dataclasses.replace(checkpoint, adaptations=checkpoint.adaptations + 1, verdict=pending)
-    old = checkpoint.proposal
-    if old is None or (old.transport is None and not checkpoint.populations):
-        return dataclasses.replace(begun, ensembles=(), populations=(None,) * POPULATIONS)
-    flat = kept.z.reshape(-1, kept.z.shape[-1])
-    pilot = flat[np.linspace(0, len(flat) - 1, min(len(flat), _PILOT_DRAWS)).astype(int)]
-    transport = fit_map(pilot, shear_of(job.density()))
-    new = dataclasses.replace(old, transport=transport, share=_MAP_SHARE)
-    return dataclasses.replace(
-        begun,
-        proposal=new,
-        ensembles=tuple(restart(ensemble, old, new) for ensemble in checkpoint.ensembles),
     )
 
 

@@ -5,14 +5,8 @@ import dataclasses
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Checkpoint, Job
 from inference.posterior.sampling.verdict import Verdict
-from inference.posterior.selection.selection import (
-    Candidate,
-    Selection,
-    assess,
-    candidate_terms,
-    decide,
-    reduced,
-)
+from inference.posterior.selection.candidates import Candidate, assess, candidate_terms, reduced
+from inference.posterior.selection.selection import Selection, decide
 
 __all__ = [
     "AssessTask",

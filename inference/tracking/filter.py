@@ -20,7 +20,8 @@ from inference.tracking.hypotheses import (
     log_outlier,
     prior_of,
 )
-from inference.tracking.modes import CHOICE_COLUMNS, find_choices
+from inference.tracking.masses import CHOICE_COLUMNS
+from inference.tracking.modes import find_choices
 from inference.tracking.motion import Rules, motion_over, presence_over
 from inference.tracking.report import OUTLIER, STATUS, SURPRISE, report
 from inference.tracking.square_root import drop_lightest, merge, merge_equals, move

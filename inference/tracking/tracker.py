@@ -12,20 +12,14 @@ from scipy import stats
 
 from inference.density.rows import law_of
 from inference.posterior.answer.posterior import Posterior
+from inference.tracking.columns import columns_of
 from inference.tracking.curve import Curve, Places
-from inference.tracking.globals import Globals, globals_of
+from inference.tracking.first_state import first_state
+from inference.tracking.globals import globals_of
 from inference.tracking.motion import Rules
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
-from inference.tracking.tabulate import (
-    Knots,
-    boxes_of,
-    empty_readings,
-    knots_of,
-    means_over,
-    scan_of,
-)
-from simulator.discrepancy import matern
+from inference.tracking.tabulate import boxes_of, empty_readings, knots_of, means_over, scan_of
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.parameters import Terms, parameters_of
 from simulator.scene import Reference, Scene, Stroke
@@ -35,7 +29,6 @@ __all__ = ["Tracker", "tracker"]
 
 Array = NDArray[np.float64]
 
-_FELT = 1e-3  # standard deviations of a reading that a global must change to be carried along
 _BREADTH = 10.0
 _SAME = 0.05
 _SURPRISE_TAIL = 1e-4  # probability beyond which a single frame's surprise is cut
@@ -145,7 +138,7 @@ def tracker(
     knots = knots_of(
         sensor, law, lambda u: means_over(u, sensor, known.centre, by_rate) * factors, rate
     )
-    columns, empty_columns, crosstalk_columns = _columns(
+    columns, empty_columns, crosstalk_columns = columns_of(
         sensor, scene, known, knots, factors, not learns
     )
     noise = sensor.noise
@@ -205,7 +198,7 @@ def tracker(
         unique_above=settings.unique_above,
     )
     limit = float(stats.gamma.isf(settings.false_alarm, freedom, scale=1.0 / freedom))
-    first = _first_state(
+    first = first_state(
         scene,
         settings,
         empty_columns.shape[1],
@@ -256,112 +249,6 @@ def _law(scene: Scene, centre: Terms) -> Any:
         low, high = law[0, 6], law[0, 7]
         law[0] = [-math.log(math.log(high / low)), -1.0, 0.0, 0.0, 0.0, 0.0, low, high]
     return law_of(law, 0)
-
-
-def _columns(
-    sensor: Sensor,
-    scene: Scene,
-    known: Globals,
-    knots: Knots,
-    factors: Array,
-    with_crosstalk: bool,
-) -> tuple[Array, Array, Array]:
-    """Return what each global does to the readings, to those of an empty scene, to crosstalk."""
-    full, empty, crosstalk = [], [], []
-    for plus, minus in zip(known.plus, known.minus, strict=True):
-        change = 0.5 * (
-            means_over(knots.positions, sensor, plus, False)
-            - means_over(knots.positions, sensor, minus, False)
-        )
-        change = (change * factors)[:, :2]
-        bare = empty_readings(sensor, plus, False) - empty_readings(sensor, minus, False)
-        bare = 0.5 * bare * factors[:2]
-        own = np.zeros(2)
-        if plus.crosstalk is not None and minus.crosstalk is not None:
-            own = 0.5 * (plus.crosstalk[0] - minus.crosstalk[0]) * factors[:2]
-        if with_crosstalk:
-            change, bare = change + own, bare + own
-        if max(np.abs(change).max(), np.abs(bare).max(), np.abs(own).max()) > _FELT:
-            full.append(change)
-            empty.append(bare)
-            crosstalk.append(own)
-    if scene.discrepancy is not None:
-        for shape in discrepancy_shapes(knots.positions, scene.discrepancy):
-            full.append(knots.means[:, 4:6] * shape[:, None])
-            empty.append(np.zeros(2))
-            crosstalk.append(np.zeros(2))
-    if not full:
-        return np.zeros((knots.positions.size, 0)), np.zeros((2, 0)), np.zeros((2, 0))
-    return (
-        np.concatenate(full, axis=1),
-        np.stack(empty, axis=1),
-        np.stack(crosstalk, axis=1),
-    )
-
-
-def discrepancy_shapes(positions: Array, sd: float) -> Array:
-    """Return the principal shapes of a smooth relative error of the object's flux.
-
-    Its covariance is `simulator.discrepancy.matern`. The shapes hold all but a thousandth of its
-    variance.
-
-    Parameters
-    ----------
-    positions : ndarray, shape (n,)
-        u = log r.
-    sd : float
-        Standard deviation of the error.
-
-    Returns
-    -------
-    ndarray, shape (k, n)
-    """
-    nodes = np.linspace(positions[0], positions[-1], 200)
-    values, vectors = np.linalg.eigh(matern(nodes[:, None] - nodes))
-    values, vectors = values[::-1], vectors[:, ::-1]
-    kept = int(np.searchsorted(np.cumsum(values), 0.999 * values.sum())) + 1
-    shapes = sd * np.sqrt(values[:kept]) * vectors[:, :kept]
-    return np.array([np.interp(positions, nodes, shape) for shape in shapes.T])
-
-
-def _first_state(
-    scene: Scene,
-    settings: TrackingSettings,
-    directions: int,
-    crosstalk: Array | None,
-    crosstalk_columns: Array,
-    scale: Array,
-) -> TrackState:
-    """Return the state before any frame."""
-    rows, n = settings.hypotheses + 1, 2 if crosstalk is None else 4
-    x, X = np.zeros((rows, n)), np.zeros((rows, n, n + directions))
-    if crosstalk is not None:
-        x[0, 2:] = crosstalk
-        values = scene.crosstalk_values
-        # of its own, so that it can be learnt: its correlation with other globals is left out
-        if directions > 1:
-            upper = np.asarray(np.linalg.qr(crosstalk_columns.T, mode="r"))
-            X[0, 2:, 2:4] = upper.T
-        elif directions == 1:
-            X[0, 2:, 2] = crosstalk_columns[:, 0]
-        if directions == 0 and values is not None:
-            for k, value in enumerate(values):
-                if not isinstance(value, float | int):
-                    mean, sd = _moments(value.distribution().from_normal)
-                    x[0, 2 + k], X[0, 2 + k, 2 + k] = mean * scale[k], sd * scale[k]
-    weight = np.zeros(rows)
-    there = settings.visit_s / (settings.visit_s + settings.absence_s)
-    weight[0] = 1.0 - there
-    return TrackState(x, X, weight, np.array([math.nan, there, 1.0, 0.0]))
-
-
-def _moments(from_normal: Any) -> tuple[float, float]:
-    """Return mean and standard deviation of a law given by its map from the standard normal."""
-    nodes, weights = np.polynomial.hermite_e.hermegauss(60)
-    values = from_normal(nodes)
-    weights = weights / weights.sum()
-    mean = float(weights @ values)
-    return mean, math.sqrt(float(weights @ (values - mean) ** 2))
 
 
 def _signature(*parts: Any) -> str:

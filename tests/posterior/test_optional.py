@@ -9,13 +9,8 @@ import pytest
 from inference.density.collapsed import collapsed_density
 from inference.posterior import fold
 from inference.posterior.infer import infer
-from inference.posterior.selection.selection import (
-    Candidate,
-    assess,
-    candidate_terms,
-    decide,
-    reduced,
-)
+from inference.posterior.selection.candidates import Candidate, assess, candidate_terms, reduced
+from inference.posterior.selection.selection import decide
 from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames
 from simulator.scene import Scene, parse_scene

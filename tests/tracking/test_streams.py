@@ -9,25 +9,17 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from inference.estimates import Status
+from inference.tracking.columns import discrepancy_shapes
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import state_from_bytes
 from inference.tracking.track import step, track
-from inference.tracking.tracker import discrepancy_shapes, tracker
+from inference.tracking.tracker import tracker
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.object_model import log_slope
 from simulator.parameters import parameters_of
 from simulator.sensor import parse_sensor
-from tests.tracking.scenes import (
-    FOLDED,
-    PLATE,
-    STEP,
-    frames_of,
-    read,
-    scene_of,
-    sensor_of,
-    wander,
-)
+from tests.tracking.scenes import FOLDED, PLATE, STEP, frames_of, read, scene_of, sensor_of, wander
 
 Array = NDArray[np.float64]
 

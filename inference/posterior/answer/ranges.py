@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.density.curve_table import integration_bounds, tabulate
-from inference.density.frame_integral import falls_off, find_modes, frame_log_likelihood
+from inference.density.frame_integral import falls_off, frame_log_likelihood
 from inference.density.gaussian import Pair
 from inference.density.integrand import SceneArguments, Triple, log_integrand
+from inference.density.range_modes import find_modes
 from inference.density.rows import background_of, crosstalk_of, curve_of, law_of
 from inference.density.static import StaticDensity
 from simulator.compiled import compiled

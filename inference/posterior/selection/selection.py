@@ -7,71 +7,23 @@ ignores what the prior says of the term; a term is left out only where neither d
 """
 
 import dataclasses
-import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inference.density.collapsed import CollapsedDensity
-from inference.posterior.sampling.start import Optimum
-from inference.posterior.selection.cross_validation import cross_validate
-from inference.posterior.selection.evidence import weigh
-from inference.posterior.selection.leave_one_out import MAX_K_HAT, standard_error
-from simulator.scene import Crosstalk, Scene
+from inference.posterior.selection.candidates import Candidate
+from inference.posterior.selection.comparison import EVIDENCE_MARGIN, Comparison, compare
+from inference.posterior.selection.leave_one_out import standard_error
+from simulator.scene import Scene
 
 __all__ = [
-    "EVIDENCE_MARGIN",
-    "PREDICTIVE_MARGIN",
-    "Candidate",
     "CandidateSummary",
     "Decision",
     "Selection",
     "SelectionSummary",
-    "assess",
-    "candidate_terms",
     "decide",
-    "reduced",
     "selection_summary",
 ]
-
-Array = NDArray[np.float64]
-
-# the odds that count as strong (Kass and Raftery 1995): with even odds beforehand and the term
-# absent, evidence this strong for it has a probability of 1/20 at most, whatever the model
-EVIDENCE_MARGIN = math.log(20.0)
-# what k superfluous parameters gain is about chi-square(k) / 2 - k (Stone 1977): more than 4 nats
-# with a probability of 0.3 % for any k up to 6
-PREDICTIVE_MARGIN = 4.0
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Candidate:
-    """A model with some of the optional terms, assessed.
-
-    Attributes
-    ----------
-    terms : tuple of str
-        Optional terms that it keeps.
-    log_evidence, log_evidence_error : float
-        Log evidence [nat] and its standard error.
-    evidence_k_hat : float or None
-        Of the importance weights behind the evidence; None with bridge sampling.
-    log_predictive : ndarray, shape (usable frames,)
-        log p(y_j | the other frames).
-    predictive_k_hat : float
-        The largest Pareto shape of all frames.
-    calls : int
-        Density evaluations.
-    """
-
-    terms: tuple[str, ...]
-    log_evidence: float
-    log_evidence_error: float
-    evidence_k_hat: float | None
-    log_predictive: Array
-    predictive_k_hat: float
-    calls: int
 
 
 @dataclasses.dataclass(frozen=True)
@@ -144,146 +96,11 @@ class SelectionSummary:
     decisions: tuple[Decision, ...]
 
 
-def candidate_terms(scene: Scene) -> tuple[tuple[str, ...], ...]:
-    """Return the combinations of optional terms, the simplest first.
-
-    Parameters
-    ----------
-    scene : Scene
-        With at most two optional terms.
-    """
-    terms = scene.optional_terms
-    singles = tuple((term,) for term in terms)
-    return ((), *singles, terms) if len(terms) > 1 else ((), *singles)
-
-
-def reduced(scene: Scene, terms: Sequence[str]) -> Scene:
-    """Return the scene with some of its optional terms, and without the others.
-
-    Parameters
-    ----------
-    scene : Scene
-        A scene.
-    terms : sequence of str
-        Optional terms that stay; they are not optional any more.
-
-    Returns
-    -------
-    Scene
-        Equal to the one that states only what stays.
-    """
-    changes: dict[str, object] = {}
-    if isinstance(scene.crosstalk, Crosstalk) and scene.crosstalk.optional:
-        changes["crosstalk"] = scene.crosstalk.values if "crosstalk" in terms else None
-    if scene.background is not None and scene.background.optional:
-        kept = scene.background.model_copy(update={"optional": False})
-        changes["background"] = kept if "background" in terms else None
-    return scene.model_copy(update=changes)
-
-
-def assess(
-    terms: tuple[str, ...],
-    density: CollapsedDensity,
-    rng: np.random.Generator,
-    fitted: Sequence[Optimum] = (),
-) -> Candidate:
-    """Assess one candidate.
-
-    Parameters
-    ----------
-    terms : tuple of str
-        Which optional terms it keeps.
-    density : CollapsedDensity
-        Of the scene that `reduced` makes with them.
-    rng : numpy.random.Generator
-        Source of randomness.
-    fitted : sequence of Optimum
-        Maxima of the density that are known beforehand.
-
-    Returns
-    -------
-    Candidate
-    """
-    weighed = weigh(density, rng, fitted)
-    predicted, calls = cross_validate(density, weighed, rng)
-    return Candidate(
-        terms,
-        weighed.evidence.log_evidence,
-        weighed.evidence.error,
-        weighed.evidence.k_hat,
-        predicted.log_predictive,
-        predicted.worst_k_hat,
-        weighed.calls + calls,
-    )
-
-
-@dataclasses.dataclass(frozen=True)
-class _Comparison:
-    """What a larger candidate gains over a smaller one [nat]."""
-
-    evidence: float
-    evidence_error: float
-    predictive: float
-    predictive_error: float
-    predictive_trusted: bool
-
-    @property
-    def by_evidence(self) -> bool:
-        # where the evidence is not known well enough to leave the term out, it stays
-        return not self.evidence + 2.0 * self.evidence_error < EVIDENCE_MARGIN
-
-    @property
-    def by_prediction(self) -> bool:
-        return self.predictive_trusted and not self.predictive < PREDICTIVE_MARGIN
-
-    @property
-    def words(self) -> str:
-        if not math.isfinite(self.evidence):
-            with_or_not = "without" if self.evidence > 0 else "with"
-            return f"{with_or_not} it no parameters within their priors explain the frames"
-        spread = "" if math.isnan(self.predictive_error) else f" +- {self.predictive_error:.1f}"
-        text = (
-            f"with it the log evidence changes by {self.evidence:+.1f} +- {self.evidence_error:.1f}"
-            f" (demanded above {EVIDENCE_MARGIN:.1f})"
-        )
-        if not math.isfinite(self.predictive):
-            return text + ", and the cross-validated log predictive density is not known"
-        text += (
-            f" and the cross-validated log predictive "
-            f"density by {self.predictive:+.1f}{spread} (demanded above {PREDICTIVE_MARGIN:.0f})"
-        )
-        if not self.predictive_trusted:
-            text += f"; the latter is not trusted, since a frame's k-hat is above {MAX_K_HAT}"
-        return text
-
-
-def _compare(larger: Candidate, smaller: Candidate) -> _Comparison:
-    if not math.isfinite(smaller.log_evidence):
-        # without the term no parameters explain the frames; without both nothing is demanded
-        gain = 0.0 if not math.isfinite(larger.log_evidence) else math.inf
-        return _Comparison(gain, 0.0, gain, 0.0, True)
-    if not math.isfinite(larger.log_evidence):
-        return _Comparison(-math.inf, 0.0, -math.inf, 0.0, True)
-    with np.errstate(invalid="ignore"):
-        gains = larger.log_predictive - smaller.log_predictive
-    total = float(gains.sum())
-    # draws that miss where a frame's weights are large make its density look too large: a gain
-    # over such a model is a lower bound, a gain of such a model an upper one
-    doubtful = larger if total > PREDICTIVE_MARGIN else smaller
-    return _Comparison(
-        larger.log_evidence - smaller.log_evidence,
-        math.hypot(larger.log_evidence_error, smaller.log_evidence_error),
-        total,
-        standard_error(gains),
-        bool(doubtful.predictive_k_hat < MAX_K_HAT and math.isfinite(total)),
-    )
-
-
 def _acceptable(candidate: Candidate, candidates: Sequence[Candidate]) -> bool:
     """Tell whether no model with more terms is demanded by either criterion."""
     for other in candidates:
         if set(other.terms) > set(candidate.terms):
-            gain = _compare(other, candidate)
+            gain = compare(other, candidate)
             if gain.by_evidence or gain.by_prediction:
                 return False
     return True
@@ -297,7 +114,7 @@ def _choose(candidates: Sequence[Candidate]) -> Candidate:
     if len(equals) == 1:
         return equals[0]
     first, second = sorted(equals, key=lambda candidate: -candidate.log_evidence)
-    gain = _compare(first, second)
+    gain = compare(first, second)
     clear = gain.evidence - 2.0 * gain.evidence_error > EVIDENCE_MARGIN
     if clear and not (gain.predictive_trusted and gain.predictive < 0.0):
         return first
@@ -333,13 +150,13 @@ def decide(scene: Scene, candidates: Sequence[Candidate]) -> tuple[Decision, ...
             other for other in scene.optional_terms if (other in chosen.terms) != (other == term)
         )
         pair = (chosen, by_terms[flipped]) if kept else (by_terms[flipped], chosen)
-        gain = _compare(*pair)
+        gain = compare(*pair)
         agree = gain.predictive_trusted and gain.by_evidence == gain.by_prediction == kept
         decisions.append(Decision(term, kept, agree, _reason(kept, gain)))
     return tuple(decisions)
 
 
-def _reason(kept: bool, gain: _Comparison) -> str:
+def _reason(kept: bool, gain: Comparison) -> str:
     if not kept:
         return f"the data do not demand it: {gain.words}"
     if gain.by_evidence and gain.by_prediction:

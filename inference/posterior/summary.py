@@ -12,12 +12,7 @@ from inference.posterior.answer.draws import draws_of
 from inference.posterior.answer.folds import near_fold
 from inference.posterior.answer.joint_modes import joint_modes
 from inference.posterior.answer.parameter_summary import summaries_of_chains, summaries_of_weights
-from inference.posterior.answer.posterior import (
-    LeftOutTerm,
-    ParameterSummary,
-    Posterior,
-    Runtime,
-)
+from inference.posterior.answer.posterior import LeftOutTerm, ParameterSummary, Posterior, Runtime
 from inference.posterior.answer.range_summary import range_summary
 from inference.posterior.criticism.cross_check import cross_check
 from inference.posterior.criticism.discrepancy_check import (

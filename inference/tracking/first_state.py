@@ -1,0 +1,69 @@
+"""The state of a tracker before any frame."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.tracking.settings import TrackingSettings
+from inference.tracking.state import TrackState
+from simulator.scene import Scene
+
+__all__ = ["first_state"]
+
+Array = NDArray[np.float64]
+
+
+def first_state(
+    scene: Scene,
+    settings: TrackingSettings,
+    directions: int,
+    crosstalk: Array | None,
+    crosstalk_columns: Array,
+    scale: Array,
+) -> TrackState:
+    """Return the state before any frame.
+
+    Parameters
+    ----------
+    scene, settings : Scene, TrackingSettings
+        The scene and how objects come and go.
+    directions : int
+        Number of uncertain directions that are carried along.
+    crosstalk : ndarray, shape (2,), or None
+        Where the crosstalk begins, in units of the read noise; None where it is not learnt.
+    crosstalk_columns : ndarray, shape (2, directions)
+        From `columns_of`.
+    scale : ndarray, shape (2,)
+        From readings to units of the read noise.
+    """
+    rows, n = settings.hypotheses + 1, 2 if crosstalk is None else 4
+    x, X = np.zeros((rows, n)), np.zeros((rows, n, n + directions))
+    if crosstalk is not None:
+        x[0, 2:] = crosstalk
+        values = scene.crosstalk_values
+        # of its own, so that it can be learnt: its correlation with other globals is left out
+        if directions > 1:
+            upper = np.asarray(np.linalg.qr(crosstalk_columns.T, mode="r"))
+            X[0, 2:, 2:4] = upper.T
+        elif directions == 1:
+            X[0, 2:, 2] = crosstalk_columns[:, 0]
+        if directions == 0 and values is not None:
+            for k, value in enumerate(values):
+                if not isinstance(value, float | int):
+                    mean, sd = _moments(value.distribution().from_normal)
+                    x[0, 2 + k], X[0, 2 + k, 2 + k] = mean * scale[k], sd * scale[k]
+    weight = np.zeros(rows)
+    there = settings.visit_s / (settings.visit_s + settings.absence_s)
+    weight[0] = 1.0 - there
+    return TrackState(x, X, weight, np.array([math.nan, there, 1.0, 0.0]))
+
+
+def _moments(from_normal: Any) -> tuple[float, float]:
+    """Return mean and standard deviation of a law given by its map from the standard normal."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(60)
+    values = from_normal(nodes)
+    weights = weights / weights.sum()
+    mean = float(weights @ values)
+    return mean, math.sqrt(float(weights @ (values - mean) ** 2))
