@@ -2,7 +2,7 @@
 
     python -m benchmarks.inner_integral [--cases 5000] [--seed 1] [--worst 5]
 
-Cases are random frames, ordinary and extreme (`tests.posterior.reference.random_case`); the
+Cases are random frames, ordinary and extreme (`tests.density.reference.random_case`); the
 reference takes about 0.1 s each. Cost is a ratio: frames of a call of 32 parameter vectors and 40
 frames, by the compiled adaptive kernel and by numpy on a fixed grid of Gauss-Legendre nodes.
 """
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.sampling.start import find_optima
 from simulator.sensor import PulsedSensor
-from tests.posterior.reference import Case, random_case, reference
+from tests.density.reference import Case, random_case, reference
 from tests.posterior.scenes import example
 
 Array = NDArray[np.float64]

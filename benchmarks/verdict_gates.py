@@ -2,9 +2,9 @@
 
     python -m benchmarks.verdict_gates [--runs 10000] [--sequential 1000] [--real 100] [--seed 1]
 
-1. Surrogate runs (`tests.posterior.surrogate`) of normal, Student and bimodal laws in turn, four
-   ensembles of 8 walkers and 100 autocorrelation times, judged once by all gates, the density's
-   included. A rate is shown with its binomial 95 % interval (Clopper and Pearson).
+1. Surrogate runs (`tests.posterior.sampling.surrogate`) of normal, Student and bimodal laws in
+   turn, four ensembles of 8 walkers and 100 autocorrelation times, judged once by all gates, the
+   density's included. A rate is shown with its binomial 95 % interval (Clopper and Pearson).
 2. Linear models whose truth comes from their prior: the gate of priors that end too early.
 3. Surrogate runs judged after every chunk until they pass, as a job is: alarms that never end, and
    whether the means of runs that were stopped by their own verdict are as good as they say.
@@ -25,7 +25,7 @@ from inference.posterior.criticism.prior_conflict import parameter_conflicts
 from inference.posterior.sampling.diagnostics import autocorrelation_time, effective_sample_size
 from inference.posterior.sampling.importance import draw_weighted
 from inference.posterior.sampling.verdict import judge
-from tests.posterior.surrogate import (
+from tests.posterior.sampling.surrogate import (
     DISTANCE,
     LAWS,
     UPPER,

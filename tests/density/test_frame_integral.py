@@ -14,7 +14,7 @@ from inference.density.collapsed import collapsed_density
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import PulsedSensor, Sensor, parse_sensor
-from tests.posterior.reference import (
+from tests.density.reference import (
     FEW_TERMS,
     Case,
     log_density,

@@ -21,7 +21,7 @@ from simulator.scene import parse_scene
 from simulator.sensor import PulsedSensor, Sensor, parse_sensor
 from simulator.simulate import simulate
 from simulator.trajectories import RadialTrajectory
-from tests.posterior.discrepancy_reference import matern_path_covariance
+from tests.density.discrepancy_reference import matern_path_covariance
 from tests.posterior.scenes import KINDS, OBJECT, UNKNOWN_CROSSTALK, data, sensor_of
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ import pytest
 from inference.density.collapsed import collapsed_density
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
-from tests.posterior.reference import FEW_TERMS, Case, random_case, reference
+from tests.density.reference import FEW_TERMS, Case, random_case, reference
 
 pytestmark = pytest.mark.xdist_group("kernels")  # compile each kernel once, in one process
 

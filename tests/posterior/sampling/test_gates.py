@@ -25,8 +25,7 @@ from inference.posterior.sampling.quadrature import lattice_moments
 from inference.posterior.sampling.verdict import Chains, judge
 from inference.posterior.settings import SamplerSettings
 from simulator.scene import parse_scene
-from tests.posterior.scenes import data, sensor_of
-from tests.posterior.surrogate import (
+from tests.posterior.sampling.surrogate import (
     DISTANCE,
     LAWS,
     banana,
@@ -38,6 +37,7 @@ from tests.posterior.surrogate import (
     surrogate,
     target,
 )
+from tests.posterior.scenes import data, sensor_of
 
 Array = NDArray[np.float64]
 

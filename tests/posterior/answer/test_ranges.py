@@ -13,7 +13,7 @@ from inference.posterior.answer.ranges import draw_ranges, replicate
 from simulator.frames import Frames
 from simulator.readings import covariance
 from simulator.scene import parse_scene
-from tests.posterior.reference import Case, log_density, mean_readings
+from tests.density.reference import Case, log_density, mean_readings
 from tests.posterior.scenes import KINDS, sensor_of
 
 pytestmark = pytest.mark.xdist_group("kernels")  # compile each kernel once, in one process

@@ -19,7 +19,7 @@ from simulator.scene import parse_scene
 from simulator.sensor import PulsedSensor, Sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
-from tests.posterior.discrepancy_reference import matern_path_covariance, sum_over_paths
+from tests.density.discrepancy_reference import matern_path_covariance, sum_over_paths
 from tests.posterior.scenes import KINDS, OBJECT, UNKNOWN_CROSSTALK, data, sensor_of
 
 NOTHING = np.empty((1, 0))

@@ -12,7 +12,7 @@ from inference.density.profile import best_ranges, linearise
 from simulator.frames import Frames
 from simulator.readings import background_readings, covariance, object_readings
 from simulator.scene import parse_scene
-from tests.posterior.reference import FEW_TERMS, log_density, random_case
+from tests.density.reference import FEW_TERMS, log_density, random_case
 from tests.posterior.scenes import KINDS, UNKNOWN_CROSSTALK, data, sensor_of
 
 pytestmark = pytest.mark.xdist_group("kernels")  # compile each kernel once, in one process
