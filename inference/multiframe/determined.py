@@ -1,13 +1,16 @@
 """Whether frames determine what is unknown, told after the fit with the reason and the remedy."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy import special
 
 from inference.identifiability.information import Information
+from inference.multiframe.information import residuals_and_information
 from inference.multiframe.multistart import Optimum
 from inference.multiframe.problem import FitProblem
+from inference.multiframe.ranges import WITHIN
 from inference.multiframe.report import FALSE_ALARM, describe
 from simulator.errors import RefusedError, listed
 
@@ -28,7 +31,13 @@ def _still(problem: FitProblem) -> bool:
     return bool(spread < special.chdtri(2 * max(len(shown) - 1, 1), FALSE_ALARM))
 
 
-def refuse_if_open(problem: FitProblem, top: Optimum, facts: Information, wider: float) -> None:
+def refuse_if_open(
+    problem: FitProblem,
+    top: Optimum,
+    facts: Information,
+    wider: float,
+    others: Sequence[tuple[float, Optimum]] = (),
+) -> None:
     """Refuse what the frames do not determine.
 
     Parameters
@@ -41,12 +50,14 @@ def refuse_if_open(problem: FitProblem, top: Optimum, facts: Information, wider:
         There.
     wider : float
         Factor on all standard deviations (`widening`).
+    others : sequence of (float, Optimum)
+        Optima that are nearly as good, with their deviance above the best.
 
     Raises
     ------
     RefusedError
         Where the Jacobian has not full rank, or the ranges share a relative standard deviation
-        above `LIMIT`.
+        above `LIMIT`, there or at another optimum as far as the intervals of 95 % reach.
     """
     present = problem.present & np.isfinite(top.positions)
     still = _still(problem)
@@ -82,3 +93,17 @@ def refuse_if_open(problem: FitProblem, top: Optimum, facts: Information, wider:
             "empty scene (object_present false), lower the noise, state a number as known, or use "
             "a posterior with priors"
         )
+    for excess, other in others:
+        if not excess < WITHIN:
+            continue
+        _, there = residuals_and_information(problem, other.x, other.positions)
+        shared = there.sd_of(there.response[problem.present & np.isfinite(other.positions)])
+        typical = float(np.median(shared)) * math.sqrt(1.0 - excess / WITHIN)
+        if not typical <= LIMIT:
+            raise RefusedError(
+                f"other values of the unknowns explain the frames nearly as well (chi-square "
+                f"{excess:.2g} higher), and with them the ranges would have a common relative "
+                f"standard deviation of {typical:.2g}, more than {LIMIT:g}; move the object nearer "
+                "and farther, add frames of the empty scene (object_present false), lower the "
+                "noise, state a number as known, or use a posterior with priors"
+            )

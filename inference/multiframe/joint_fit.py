@@ -46,7 +46,8 @@ def _solve_as(name: str, task: Task) -> TechniqueResult:
         # the old one lies in the same valley, on the way to this
         optima[0] = better
         optima = [one for one in optima if one.deviance >= better.deviance]
-    refuse_if_open(problem, top, facts, wider)
+    others = [(one.deviance - top.deviance, one) for one in optima[1:]]
+    refuse_if_open(problem, top, facts, wider, others)
     undecided = [
         Answer(one.x, one.deviance - top.deviance, None if k else wider * facts.factor)
         for k, one in enumerate(optima)

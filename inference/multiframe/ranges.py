@@ -5,11 +5,13 @@ decides between modes and between optima of the fit. What the decision leaves st
 """
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from inference.estimates import Status, TechniqueResult
 from inference.multiframe.frame_modes import MOST, frame_modes
@@ -17,11 +19,12 @@ from inference.multiframe.information import residuals_and_information
 from inference.multiframe.problem import FitProblem
 from inference.realtime.net import ABSENT, COMMON_REASONS, SATURATED
 
-__all__ = ["DECIDED", "Answer", "frame_ranges"]
+__all__ = ["DECIDED", "WITHIN", "Answer", "frame_ranges"]
 
 Array = NDArray[np.float64]
 
 DECIDED = 9.0  # deviance by which something must be worse to be decided against: 3 sd
+WITHIN = special.chdtri(1, 0.05)  # deviance that intervals of 95 % reach: 1.96 sd
 _IMPOSSIBLE = 36.0  # chi-square of a single frame that nothing explains
 _ONE = 1.0  # standard deviations below which two modes are one
 
@@ -83,7 +86,12 @@ def _modes(problem: FitProblem, answers: Sequence[Answer]) -> tuple[Array, Array
 
 
 def _merged(u: Array, sd: Array, excess: Array) -> tuple[list[int], bool]:
-    """Return the indices of a frame's distinct modes, best first, and whether some were merged."""
+    """Return the indices of a frame's distinct modes, best first, and whether some were merged.
+
+    What explains the readings nearly as well as the mode that it is merged with may be far less
+    certain: ``sd`` of the mode that stays is widened until its interval of 95 % holds that of the
+    other, as far as the deviance lets it reach.
+    """
     kept: list[int] = []
     merged = False
     for k in np.argsort(excess, kind="stable"):
@@ -93,6 +101,10 @@ def _merged(u: Array, sd: Array, excess: Array) -> tuple[list[int], bool]:
         twins = [i for i in kept if abs(u[i] - u[k]) <= _ONE * max(width, np.nan_to_num(sd[i]))]
         if twins or any(abs(u[i] - u[k]) < 1e-9 for i in kept):
             merged = merged or any(abs(u[i] - u[k]) > 1e-6 for i in twins)
+            if excess[k] < WITHIN:
+                for i in twins:
+                    reach = abs(u[i] - u[k]) + width * math.sqrt(WITHIN - excess[k])
+                    sd[i] = max(sd[i], reach / math.sqrt(WITHIN))
         else:
             kept.append(int(k))
     return kept, merged

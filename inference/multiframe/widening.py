@@ -22,7 +22,9 @@ Array = NDArray[np.float64]
 
 _LINEAR = 0.02  # standard deviation of all coordinates below which curvature tells everything
 _DOUBLINGS = 7
+_HALVINGS = 2  # of the last doubling, where it went too far
 _HELD = 2  # unknowns that are held in turn
+_OPEN = 1.0  # standard deviation of a logarithm above which an unknown is held as well
 _ENOUGH = 4.0  # deviance that two standard deviations cost
 _LEAST = 0.01  # below which rounding of an optimum counts
 _FARTHEST = 1.0  # change of the mean log range beyond which nothing more need be known
@@ -59,9 +61,13 @@ def widening(problem: FitProblem, top: Optimum, facts: Information) -> tuple[flo
     spread = math.sqrt(max(float(mean @ along), 0.0))
     if not spread > 0.0:
         return 1.0, None
-    order = np.argsort(-np.abs(along) / facts.sd, kind="stable")
+    order = np.argsort(-np.abs(along) / facts.sd, kind="stable")[:_HELD].tolist()
+    # of an unknown that is open, the correlation with the ranges here says nothing of elsewhere
+    openest = int(np.argmax(np.where(logarithms, facts.sd, 0.0)))
+    if facts.sd[openest] > _OPEN and openest not in order:
+        order.append(openest)
     widest = 1.0
-    for j in order[:_HELD].tolist():
+    for j in order:
         for sign in (1.0, -1.0):
             ratio, better = _walk(problem, top, facts, j, sign)
             if better is not None:
@@ -78,22 +84,30 @@ def _walk(
     sd = float(facts.sd[j])
     # where the others go meanwhile, as far as curvature knows
     ahead = sign * facts.factor @ facts.factor[j] / sd
-    x, reach, widest = top.x + np.clip(ahead, -_STRIDE, _STRIDE), 1.0, 0.0
+    x, widest = top.x + np.clip(ahead, -_STRIDE, _STRIDE), 0.0
+    near, far, reach, halvings = 0.0, math.inf, 1.0, 0
     for _ in range(_DOUBLINGS):
-        x[j] = top.x[j] + sign * min(reach * sd, _STRIDE * reach)
-        smaller, rest = held(problem, j, x)
+        start = x.copy()
+        start[j] = top.x[j] + sign * min(reach * sd, _STRIDE * reach)
+        smaller, rest = held(problem, j, start)
         found = optimum_from(smaller, rest)
         if not math.isfinite(found.deviance):
             break
         cost = found.deviance - top.deviance
-        x = released(problem, smaller, found.x)
         if cost < -_BETTER:
-            better = optimum_from(problem, x)
+            better = optimum_from(problem, released(problem, smaller, found.x))
             return widest, better if better.deviance < top.deviance else None
         shift = abs(float(np.mean(found.positions[present] - top.positions[present])))
         if cost > _LEAST:
             widest = max(widest, shift / math.sqrt(cost))
-        if cost >= _ENOUGH or shift > _FARTHEST:
+        if shift > _FARTHEST or _ENOUGH <= cost < 2.0 * _ENOUGH:
             break
-        reach *= 2.0
+        if cost < _ENOUGH:
+            near, x = reach, released(problem, smaller, found.x)
+        else:
+            far, halvings = reach, halvings + 1
+        if halvings > _HALVINGS:
+            break
+        # at a wall of the deviance most of the way is covered just before it
+        reach = 2.0 * near if math.isinf(far) else 0.5 * (near + far)
     return widest, None
