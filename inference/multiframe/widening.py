@@ -24,7 +24,6 @@ _LINEAR = 0.02  # standard deviation of all coordinates below which curvature te
 _DOUBLINGS = 7
 _HALVINGS = 2  # of the last doubling, where it went too far
 _HELD = 2  # unknowns that are held in turn
-_OPEN = 1.0  # standard deviation of a logarithm above which an unknown is held as well
 _ENOUGH = 4.0  # deviance that two standard deviations cost
 _LEAST = 0.01  # below which rounding of an optimum counts
 _FARTHEST = 1.0  # change of the mean log range beyond which nothing more need be known
@@ -61,13 +60,9 @@ def widening(problem: FitProblem, top: Optimum, facts: Information) -> tuple[flo
     spread = math.sqrt(max(float(mean @ along), 0.0))
     if not spread > 0.0:
         return 1.0, None
-    order = np.argsort(-np.abs(along) / facts.sd, kind="stable")[:_HELD].tolist()
-    # of an unknown that is open, the correlation with the ranges here says nothing of elsewhere
-    openest = int(np.argmax(np.where(logarithms, facts.sd, 0.0)))
-    if facts.sd[openest] > _OPEN and openest not in order:
-        order.append(openest)
+    order = np.argsort(-np.abs(along) / facts.sd, kind="stable")
     widest = 1.0
-    for j in order:
+    for j in order[:_HELD].tolist():
         for sign in (1.0, -1.0):
             ratio, better = _walk(problem, top, facts, j, sign)
             if better is not None:
