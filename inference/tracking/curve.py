@@ -258,7 +258,7 @@ def add_factor(root: Triple, first: float, second: float) -> Triple:
 def noise_root(m1: float, m2: float, o1: float, o2: float, curve: Curve) -> Triple:
     """Return the triangular root of the noise's covariance at mean readings m, object's part o."""
     root = (1.0, 0.0, 1.0)
-    if curve.shot2 > 0.0:
+    if curve.shot1 > 0.0 or curve.shot2 > 0.0:
         first, second = curve.shot1 * abs(m1), curve.shot2 * abs(m2)
         if not curve.pulsed:
             root = (math.sqrt(1.0 + first), 0.0, math.sqrt(1.0 + second))

@@ -24,11 +24,11 @@ from inference.tracking.masses import CHOICE_COLUMNS
 from inference.tracking.modes import find_choices
 from inference.tracking.motion import Rules, motion_over, presence_over
 from inference.tracking.report import OUTLIER, STATUS, SURPRISE, report
+from inference.tracking.state import COUNT
 from inference.tracking.square_root import drop_lightest, merge, merge_equals, move
 from simulator.compiled import compiled
 
 __all__ = [
-    "COUNT",
     "EMPTY",
     "EMPTY_SATURATED",
     "PENDING",
@@ -44,7 +44,7 @@ Array = NDArray[np.float64]
 # what is known of a frame before it is looked at
 USABLE, SATURATED, EMPTY, EMPTY_SATURATED = range(4)
 # places in the state's numbers
-TIME, PENDING, RUNNING, COUNT = range(4)
+TIME, PENDING, RUNNING = range(3)
 _NEVER = -math.inf
 _LEAST = -700.0  # log of a weight that underflows
 _ODD = math.log(1e-2)  # log weight from which on a frame may have been an outlier

@@ -1,6 +1,9 @@
 """All that a tracker remembers between frames, in memory and as bytes."""
 
 import dataclasses
+import struct
+import zipfile
+import zlib
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,10 +11,24 @@ from numpy.typing import NDArray
 from inference.posterior.archive import pack, unpack
 from simulator.errors import InvalidInputError
 
-__all__ = ["TrackState", "state_from_bytes", "state_to_bytes"]
+__all__ = ["TrackState", "check_state", "state_from_bytes", "state_to_bytes"]
 
 Array = NDArray[np.float64]
 _KIND = "track state 1"
+# what reading an archive raises where bytes are missing or changed
+_BROKEN = (
+    ValueError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    OSError,
+    EOFError,
+    NotImplementedError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+COUNT = 3  # place of the number of hypotheses in the state's numbers
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -62,5 +79,29 @@ def state_from_bytes(data: bytes) -> TrackState:
         return TrackState(
             arrays["x"], arrays["X"], arrays["weight"], arrays["numbers"], meta["signature"]
         )
-    except (ValueError, KeyError, OSError, EOFError) as error:
+    except _BROKEN as error:
         raise InvalidInputError.at("/state", "is not the state of a tracker") from error
+
+
+def check_state(state: TrackState, like: TrackState) -> None:
+    """Check that the kernels can take a state: they trust shapes and counts.
+
+    Parameters
+    ----------
+    state : TrackState
+        To be checked.
+    like : TrackState
+        One of the same tracker.
+
+    Raises
+    ------
+    InvalidInputError
+        At "/state".
+    """
+    for name in ("x", "X", "weight", "numbers"):
+        array, wanted = getattr(state, name), getattr(like, name)
+        if array.shape != wanted.shape or array.dtype != wanted.dtype:
+            raise InvalidInputError.at("/state", f"has an array `{name}` of another shape or type")
+    count = state.numbers[COUNT]
+    if not (0 <= count < len(state.weight) and count == int(count)):
+        raise InvalidInputError.at("/state", "counts hypotheses that it does not have")

@@ -26,7 +26,7 @@ from inference.tracking.report import (
     WEIGHT,
 )
 from inference.tracking.settings import TrackingSettings
-from inference.tracking.state import TrackState
+from inference.tracking.state import TrackState, check_state
 from inference.tracking.tracker import Tracker, tracker
 from simulator.errors import InvalidInputError
 from simulator.frames import Frames, check_frames
@@ -136,6 +136,7 @@ def step(
     """
     if state.signature != model.first.signature:
         raise InvalidInputError.at("/state", "belongs to another tracker")
+    check_state(state, model.first)
     check_frames(model.sensor, frames)
     times = _times(frames, float(state.numbers[TIME]))
     kinds = np.zeros(len(frames), dtype=np.uint8)

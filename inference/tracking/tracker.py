@@ -206,7 +206,8 @@ def tracker(
         crosstalk_columns,
         scale,
     )
-    first = dataclasses.replace(first, signature=_signature(curve, places, rules))
+    shapes = np.array([*first.x.shape, *first.X.shape])
+    first = dataclasses.replace(first, signature=_signature(curve, places, rules, (shapes,)))
     return Tracker(sensor, settings, units, curve, places, rules, limit, first)
 
 
