@@ -327,7 +327,8 @@ def check_scene(sensor: Sensor, scene: Scene) -> None:
         if isinstance(distance, float | int) and 0 < distance < limit:
             limit, of_limit = float(distance), "the background at"
     if isinstance(scene.range_m, Stroke | Reference):
-        if scene.range_m.low >= limit:
+        # in logarithms, which are what a common law of the ranges is made from
+        if math.log(scene.range_m.low) >= math.log(limit):
             problems.append(Problem("/range_m/low", f"lies beyond {of_limit} {limit:g} m"))
     elif scene.range_m is not None:
         problems += _check_support(scene.range_m, 0.0, limit, "/range_m")

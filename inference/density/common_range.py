@@ -81,7 +81,7 @@ def _find_modes(modes: Array, knots: Array, frames: Array, scene: SceneArguments
         if count > 0:
             modes[count - 1, 4] = knots[valley]
         lower, upper = knots[max(k - 1, 0)], knots[min(k + 1, n - 1)]
-        u = knots[k]
+        u, top = knots[k], values[k]
         slope, curvature = _joint_slope(u, frames, scene)
         for _ in range(100):
             if slope > 0.0:
@@ -92,13 +92,18 @@ def _find_modes(modes: Array, knots: Array, frames: Array, scene: SceneArguments
             if not lower < trial < upper:
                 trial = 0.5 * (lower + upper)
             moved = abs(trial - u)
-            u = trial
-            slope, curvature = _joint_slope(u, frames, scene)
             if moved * math.sqrt(curvature) < 1e-4 or upper - lower < 1e-14 * (1.0 + abs(u)):
                 break
-        top = _joint(u, frames, scene)
-        if not top >= values[k]:
-            u, top = knots[k], values[k]
+            value = _joint(trial, frames, scene)
+            if not value >= top:
+                # beyond a dip: the top lies nearer
+                if trial > u:
+                    upper = trial
+                else:
+                    lower = trial
+                continue
+            u, top = trial, value
+            slope, curvature = _joint_slope(u, frames, scene)
         modes[count, 0], modes[count, 1] = u, top
         sd = 1.0 / math.sqrt(curvature) if curvature > 0.0 else math.inf
         modes[count, 2] = min(sd, knots[n - 1] - knots[0])

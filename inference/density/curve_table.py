@@ -27,17 +27,23 @@ _FEWEST_KNOTS = 192
 _MOST_KNOTS = 16384
 _TURN = 0.7  # cosine of the largest turn of the curve at a knot
 _VISIBLE = 0.3  # standard deviations of a reading below which a turn of the curve is not seen
-_REACH = 9.0  # standard deviations of a normal prior beyond which nothing is left
+_REACH = 9.0  # standard deviations of a normal prior beyond which it leaves nothing
+_FARTHEST = 38.5  # at which its density is no number any more: so far readings may contradict it
+_FACTOR = 3.0  # log range up to which that is looked at
 
 
 @compiled
 def integration_bounds(law: Law | ReferenceLaw) -> Pair:
-    """Return the interval of u = log r that holds all the prior's mass but rounding."""
+    """Return the interval of u = log r that holds all the mass but rounding.
+
+    Also that of a posterior whose readings contradict a narrow prior: cut where the prior alone
+    leaves nothing, it would pile up at the cut.
+    """
     low, high = law[6], law[7]
     if law[3] > 0.0:
         # from the point of the support where the density is largest: it may be an end
         centre = min(max(law[2], low), high)
-        low, high = max(low, centre - _REACH / law[3]), min(high, centre + _REACH / law[3])
+        low, high = max(low, centre - _FARTHEST / law[3]), min(high, centre + _FARTHEST / law[3])
     if not high > low or not high > 0.0:
         return 0.0, -1.0
     # only a law that is not one of log r has next to nothing near zero
@@ -45,7 +51,8 @@ def integration_bounds(law: Law | ReferenceLaw) -> Pair:
     first, last = math.log(max(low, floor)), math.log(high)
     if law[5] > 0.0:
         centre = min(max(law[4], first), last)
-        first, last = max(first, centre - _REACH / law[5]), min(last, centre + _REACH / law[5])
+        reach = max(_REACH / law[5], min(_FARTHEST / law[5], _FACTOR))
+        first, last = max(first, centre - reach), min(last, centre + reach)
     return first, last
 
 

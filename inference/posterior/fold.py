@@ -64,6 +64,7 @@ __all__ = [
 _CHUNK_S = 0.33  # of the first chunk; later ones grow to about a second
 _MOST_STEPS = 20_000
 _EVALUATION_S = 1.2e-6  # a frame under one parameter vector, for sizing chunks only
+_WITH_DISCREPANCY = 10.0  # times as long, where the flux's error is integrated out
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -138,6 +139,8 @@ def tasks(
     if checkpoint.finished or proposal is None:
         return ()
     evaluation_s = int(job.usable.sum()) * _EVALUATION_S
+    if job.scene.discrepancy is not None:
+        evaluation_s *= _WITH_DISCREPANCY
     if not checkpoint.ensembles:
         calls = int(3 * _CHUNK_S / evaluation_s)
         return tuple(

@@ -181,7 +181,8 @@ def new_ensembles(
     seeds = np.random.SeedSequence(job.seed, spawn_key=(3,)).spawn(len(starts))
     ensembles = []
     for given, seed in zip(starts, seeds, strict=True):
-        coords = np.unique(given, axis=0)[:WALKERS]
+        _, first = np.unique(given, axis=0, return_index=True)
+        coords = given[np.sort(first)][:WALKERS]
         if np.linalg.matrix_rank(coords - coords[:1]) < coords.shape[1]:
             coords = coords[:0]  # walkers on a plane never leave it
         rng = np.random.default_rng(seed.spawn(1)[0])

@@ -25,7 +25,8 @@ class SamplerSettings(Validated):
         Wall time [s] after which no chunk begins and an unfinished run is summarised as it is. What
         has begun is ended first: a chunk of about a second, importance sampling of ten seconds at
         most, or the search for starting points, which takes a second of processor time for 100
-        frames and half a minute for the most frames and nine unknowns.
+        frames and half a minute for the most frames and nine unknowns, and several times as long
+        with a discrepancy.
     seed : int, optional
         Left out: drawn, and returned with the answer.
     """

@@ -1,5 +1,6 @@
 """From a checkpoint to the answer."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -63,7 +64,10 @@ def _parameters(density: CollapsedDensity, sample: Sample) -> dict[str, Paramete
         natural = density.parameters.natural(sample.weighted.z)
         return summaries_of_weights(names, natural, sample.weighted.weights)
     n = len(sample.flat)
-    return summaries_of_weights(names, density.parameters.natural(sample.flat), np.full(n, 1 / n))
+    found = summaries_of_weights(names, density.parameters.natural(sample.flat), np.full(n, 1 / n))
+    # starting points are no draws: nothing is known of how well they stand for the posterior
+    nothing = {"ess_bulk": math.nan, "ess_tail": math.nan, "mcse_mean": math.nan}
+    return {name: dataclasses.replace(row, **nothing) for name, row in found.items()}
 
 
 def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> Posterior:

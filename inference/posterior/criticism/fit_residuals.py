@@ -16,6 +16,8 @@ from inference.posterior.job import Job
 
 __all__ = ["FitResiduals", "fit_residuals"]
 
+_AT_END = 1e-6  # log range between the best range and an end of its prior
+
 Array = NDArray[np.float64]
 
 
@@ -134,8 +136,14 @@ def _of_one_range(
         density.frames[:, :2] - np.linalg.solve(at.whitener, at.residual[..., None])[..., 0]
     )
     residuals = np.einsum("nij,snj->sni", at.whitener, off).reshape(sets, 2 * n)
-    rows = np.concatenate([at.jacobian.reshape(2 * n, z.size), at.along.reshape(2 * n, 1)], axis=1)
-    fitted = residuals - _followed(residuals, rows, free=1)
+    rows = at.jacobian.reshape(2 * n, z.size)
+    law = density.parameters.terms(z[None]).ranges[0]
+    with np.errstate(divide="ignore"):
+        at_end = np.abs(np.nanmax(seen) - np.log(law[6:8])) < _AT_END
+    if not at_end.any():
+        rows = np.concatenate([rows, at.along.reshape(2 * n, 1)], axis=1)
+    # a range at an end of its prior cannot follow what lies beyond
+    fitted = residuals - _followed(residuals, rows, free=0 if at_end.any() else 1)
     squared = np.sum(fitted.reshape(sets, n, 2) ** 2, axis=2)
     return FitResiduals(np.empty((sets, 0)), squared, np.empty(0))
 

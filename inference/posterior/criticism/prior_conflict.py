@@ -8,8 +8,8 @@ Three findings, none of which depends on how the walkers moved.
 * Most draws lie near an end of the prior's support, and the likelihood, the other unknowns giving
   way, still climbs there by many of its own standard errors: a score test (Rao 1948), which does
   not depend on the coordinates.
-* Most draws of a range lie near an end of the range's prior, and without that end its frame would
-  fit far better: a likelihood ratio.
+* Most draws of a range lie where its prior has next to no mass; or near an end of it, and without
+  that end the frame (all frames, of a static object) would fit far better: a likelihood ratio.
 """
 
 import dataclasses
@@ -22,7 +22,8 @@ from scipy import linalg, special
 
 from inference.density.collapsed import CollapsedDensity
 from inference.density.profile import best_ranges, linearise
-from simulator.priors import LogUniform
+from inference.density.static import StaticDensity
+from simulator.priors import Distribution
 from simulator.scene import Reference, Stroke
 
 __all__ = ["parameter_conflicts", "prior_conflicts", "range_conflicts", "scores"]
@@ -35,6 +36,7 @@ _SCORE = 5.0  # standard errors
 _GAIN = 15.0  # nats a frame may gain: half of a chi-square of 30 with at most 2 degrees of freedom
 _DRAWS = 15
 _BEYOND = 100.0  # factor by which the ranges are widened
+_WIDER = 1.5  # at least
 
 
 def prior_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[str, ...]:
@@ -168,11 +170,7 @@ def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
         The reasons.
     """
     law = density.parameters.range_prior
-    distribution = (
-        LogUniform(low=law.low, high=law.high).distribution()
-        if isinstance(law, Stroke | Reference)
-        else law
-    )
+    distribution = _uniform(law.low, law.high) if isinstance(law, Stroke | Reference) else law
     with np.errstate(invalid="ignore"):
         middle = np.exp(np.median(log_r, axis=0))
     ends = distribution.from_normal(special.ndtri([_OUTER, 1 - _OUTER]))
@@ -183,18 +181,30 @@ def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
     high = min(_BEYOND * float(ends[1]), farthest)
     if math.isfinite(distribution.high):
         high = max(high, distribution.high)
+    # ranges that were stated beyond the sensor's reach have room as well
+    high = max(high, _WIDER * float(ends[1]))
     wide = dataclasses.replace(
         density,
         parameters=dataclasses.replace(
-            density.parameters,
-            range_prior=LogUniform(low=float(ends[0]) / _BEYOND, high=high).distribution(),
+            density.parameters, range_prior=_uniform(float(ends[0]) / _BEYOND, high)
         ),
     )
     chosen = _few(z)
     gain = np.median(_best_fit(wide, chosen) - _best_fit(density, chosen), axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        out = np.abs(distribution.to_normal(np.where(np.isnan(middle), ends.mean(), middle)))
+    # at most 1.1e-5 of runs in each direction, however many frames there are
+    tail = -float(special.ndtri(special.ndtr(-_TAIL) / max(np.isfinite(middle).sum(), 1)))
     reasons = []
     for here, side in zip(near, ("lower", "upper"), strict=True):
-        count = int(np.sum(here & (gain > _GAIN)))
+        beyond = here & (out > tail)
+        if beyond.any():
+            reasons.append(
+                f"the ranges of {int(beyond.sum())} frames lie where range_m has next to no mass, "
+                f"up to {out[beyond].max():.1f} standard deviations towards its {side} end: widen "
+                "range_m"
+            )
+        count = int(np.sum(here & ~beyond & (gain > _GAIN)))
         if count:
             reasons.append(
                 f"the ranges of {count} frames pile up at the {side} end of range_m, beyond which "
@@ -204,9 +214,22 @@ def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
 
 
 def _best_fit(density: CollapsedDensity, z: Array) -> Array:
-    """Log likelihood of every frame at its best range, shape (n, frames)."""
+    """Log likelihood of every frame at its best range, shape (n, frames); of a static one (n, 1).
+
+    A range that all frames have in common is one unknown: its prior counts once, and all frames
+    together are what may gain.
+    """
     best = best_ranges(density, z)
     a0, a1, a2, a3, a4, a5, _, _ = density.parameters.terms(z).ranges.T[:, :, None]
     u = best[:, :, 0]
     prior = a0 + (a1 + 1) * u - 0.5 * (((np.exp(u) - a2) * a3) ** 2 + ((u - a4) * a5) ** 2)
-    return np.asarray(best[:, :, 1] - np.where(np.isnan(u), 0.0, prior))
+    prior = np.where(np.isnan(u), 0.0, prior)
+    if isinstance(density, StaticDensity):
+        common = prior[:, np.flatnonzero(density.holds)[:1]]
+        return np.asarray(best[:, :, 1].sum(axis=1, keepdims=True) - common)
+    return np.asarray(best[:, :, 1] - prior)
+
+
+def _uniform(low: float, high: float) -> Distribution:
+    """Return a law uniform in log r; of computed ends, of which no size is asked."""
+    return Distribution("uniform", True, 0.0, 1.0, low, high)

@@ -111,14 +111,17 @@ def _moves(proposal: Proposal) -> list[tuple[Any, float]]:
 
     Where the posterior is narrower than the ensemble is wide, as at the ends of a curved sheet, all
     steps of the ensemble's own width fail: a walker that gets there leaves by short ones.
+
+    emcee's `DESnookerMove` (3.1.6) is not among them: its direction is not a unit vector and its
+    acceptance has half the exponent of ter Braak and Vrugt (2008), so that it leaves a standard
+    normal in nine dimensions with three quarters of its variance.
     """
     rest = 1.0 - proposal.share
     short = _SHORT * 2.38 / math.sqrt(2.0 * proposal.optima.centres.shape[1])
     return [
         (emcee.moves.MHMove(proposal.propose), proposal.share),
-        (emcee.moves.DEMove(sigma=0.2), 0.3 * rest),
+        (emcee.moves.DEMove(sigma=0.2), 0.4 * rest),
         (emcee.moves.DEMove(sigma=0.5, gamma0=short), 0.3 * rest),
-        (emcee.moves.DESnookerMove(), 0.1 * rest),
         (emcee.moves.StretchMove(), 0.3 * rest),
     ]
 

@@ -15,6 +15,8 @@ __all__ = ["MAX_K_HAT", "WeightedDraws", "draw_weighted", "generalised_pareto", 
 Array = NDArray[np.float64]
 
 MAX_K_HAT = 0.5
+_LEAST_EXCESS = 5  # weights above the cut that a shape is fitted to
+_EQUAL = 1e-9  # of the largest weight, by which equal ones differ through rounding
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -86,7 +88,8 @@ def pareto_k_hat(log_weights: Array) -> float:
     Returns
     -------
     float
-        inf where too few weights are positive to tell.
+        inf where too few weights are positive to tell, or a few are all there is; minus inf where
+        all are equal.
     """
     finite = log_weights[np.isfinite(log_weights)]
     tail = int(min(0.2 * log_weights.size, 3 * math.sqrt(log_weights.size)))
@@ -95,8 +98,11 @@ def pareto_k_hat(log_weights: Array) -> float:
     ordered = np.sort(finite)
     weights = np.exp(ordered[-tail - 1 :] - ordered[-1])
     excess = weights[1:] - weights[0]
-    excess = excess[excess > 0]
-    return generalised_pareto(excess)[0] if excess.size >= 5 else -math.inf
+    positive = excess[excess > 0]
+    if positive.size >= _LEAST_EXCESS:
+        return generalised_pareto(positive)[0]
+    # equal weights, or a few that dwarf all others
+    return -math.inf if excess[-1] <= _EQUAL else math.inf
 
 
 def draw_weighted(

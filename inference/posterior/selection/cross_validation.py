@@ -114,6 +114,9 @@ def cross_validate(
     z, log_weights = _draws(weighed, independent, rng)
     if independent:
         likelihoods, calls = density.frame_log_likelihoods(z), len(z)
+    elif n == 1:
+        # nothing is known without the only frame
+        likelihoods, calls = density.log_likelihood(z)[:, None], len(z)
     else:
         columns = [_given_others(density, z, frame) for frame in range(n)]
         likelihoods, calls = np.column_stack(columns), 2 * n * len(z)

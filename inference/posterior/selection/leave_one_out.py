@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 MAX_K_HAT = 0.7
 _LEAST_TAIL = 5
+_EQUAL = 1e-9  # of the largest weight, by which equal ones differ through rounding
 _TINY = 1e-290  # of the largest weight: one over it is still a number
 
 
@@ -60,8 +61,8 @@ def _smooth(log_weights: Array) -> tuple[Array, float]:
     cut = math.exp(max(log_weights[order[-tail - 1]] - top, -700.0))
     excess = np.exp(log_weights[largest] - top) - cut
     if np.unique(excess[excess > 0]).size < _LEAST_TAIL:
-        # all weights equal: nothing to smooth, nothing that dominates
-        return log_weights, -math.inf
+        # all weights equal: nothing to smooth, nothing that dominates; or a few dwarf all others
+        return log_weights, -math.inf if excess.max() <= _EQUAL else math.inf
     shape, scale = generalised_pareto(np.maximum(excess, _TINY))
     probability = (np.arange(tail) + 0.5) / tail
     step = special.boxcox1p(-probability, -shape)  # ((1 - p)^-k - 1) / -k, good at k = 0 as well
