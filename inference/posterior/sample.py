@@ -49,6 +49,11 @@ class Sample:
     weighted: WeightedDraws | None
 
     @property
+    def drawn(self) -> bool:
+        """Whether these are draws of the posterior, or all is known; else starting points."""
+        return self.chains is not None or self.weighted is not None or self.z.shape[-1] == 0
+
+    @property
     def flat(self) -> Array:
         """All draws, shape (n, d): ensemble by ensemble, walker by walker, step by step."""
         return self.z.reshape(self.log_density.size, self.z.shape[-1])
