@@ -6,10 +6,11 @@ from numpy.typing import NDArray
 from inference.tracking.globals import Globals
 from inference.tracking.tabulate import Knots, empty_readings, means_over
 from simulator.discrepancy import matern
+from simulator.parameters import Terms
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
-__all__ = ["columns_of", "discrepancy_shapes"]
+__all__ = ["columns_of", "crosstalk_change", "discrepancy_shapes"]
 
 Array = NDArray[np.float64]
 
@@ -23,7 +24,7 @@ def columns_of(
     knots: Knots,
     factors: Array,
     with_crosstalk: bool,
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array]:
     """Return what each uncertain direction does to the readings, a standard deviation along it.
 
     Parameters
@@ -41,10 +42,10 @@ def columns_of(
 
     Returns
     -------
-    (ndarray, ndarray, ndarray), shapes (knots, 2 k), (2, k), (2, k)
-        Of the readings along the range, of those of an empty scene, of crosstalk.
+    (ndarray, ndarray), shapes (knots, 2 k), (2, k)
+        Of the readings along the range, of those of an empty scene.
     """
-    full, empty, crosstalk = [], [], []
+    full, empty = [], []
     for plus, minus in zip(known.plus, known.minus, strict=True):
         change = 0.5 * (
             means_over(knots.positions, sensor, plus, False)
@@ -53,27 +54,32 @@ def columns_of(
         change = (change * factors)[:, :2]
         bare = empty_readings(sensor, plus, False) - empty_readings(sensor, minus, False)
         bare = 0.5 * bare * factors[:2]
-        own = np.zeros(2)
-        if plus.crosstalk is not None and minus.crosstalk is not None:
-            own = 0.5 * (plus.crosstalk[0] - minus.crosstalk[0]) * factors[:2]
         if with_crosstalk:
+            own = crosstalk_change(plus, minus) * factors[:2]
             change, bare = change + own, bare + own
-        if max(np.abs(change).max(), np.abs(bare).max(), np.abs(own).max()) > _FELT:
+        if max(np.abs(change).max(), np.abs(bare).max()) > _FELT:
             full.append(change)
             empty.append(bare)
-            crosstalk.append(own)
     if scene.discrepancy is not None:
         for shape in discrepancy_shapes(knots.positions, scene.discrepancy):
             full.append(knots.means[:, 4:6] * shape[:, None])
             empty.append(np.zeros(2))
-            crosstalk.append(np.zeros(2))
     if not full:
-        return np.zeros((knots.positions.size, 0)), np.zeros((2, 0)), np.zeros((2, 0))
-    return (
-        np.concatenate(full, axis=1),
-        np.stack(empty, axis=1),
-        np.stack(crosstalk, axis=1),
-    )
+        return np.zeros((knots.positions.size, 0)), np.zeros((2, 0))
+    return np.concatenate(full, axis=1), np.stack(empty, axis=1)
+
+
+def crosstalk_change(plus: Terms, minus: Terms) -> Array:
+    """Return what one direction does to the crosstalk, shape (2,) [reading units].
+
+    Parameters
+    ----------
+    plus, minus : Terms
+        A standard deviation along it on either side.
+    """
+    if plus.crosstalk is None or minus.crosstalk is None:
+        return np.zeros(2)
+    return np.asarray(0.5 * (plus.crosstalk[0] - minus.crosstalk[0]))
 
 
 def discrepancy_shapes(positions: Array, sd: float) -> Array:

@@ -22,6 +22,7 @@ __all__ = [
     "add_factor",
     "cell_of",
     "column_at",
+    "expected_at",
     "log_density",
     "mass_bound",
     "mean_at",
@@ -131,6 +132,9 @@ class Prior(NamedTuple):
         Mean at the centre, change with u and standard deviation of du/dt given u.
     gain : float
         The frame's factor on the sensor's gain.
+    share : float
+        Part of the variance of u that comes from crosstalk that is not known: along it the curve
+        counts as straight (`inference.tracking.shared_error`).
     """
 
     born: bool
@@ -148,6 +152,7 @@ class Prior(NamedTuple):
     rate_slope: float
     rate_sd: float
     gain: float
+    share: float
 
 
 @compiled
@@ -210,6 +215,19 @@ def _hermite(u: float, curve: Curve, first: int) -> tuple[float, float, float, f
 def mean_at(u: float, curve: Curve) -> tuple[float, float, float, float]:
     """Return the two mean readings and their derivatives along u."""
     return _hermite(u, curve, MEAN)
+
+
+@compiled
+def expected_at(u: float, prior: Prior, curve: Curve) -> tuple[float, float, float, float]:
+    """Return the two mean readings and their derivatives along u, straight along a shared error.
+
+    What is linear in u, the error's own part included, is in the prior's slopes.
+    """
+    if prior.share == 0.0:
+        return mean_at(u, curve)
+    own = 1.0 - prior.share
+    value1, value2, d1, d2 = mean_at(prior.centre + own * (u - prior.centre), curve)
+    return value1, value2, own * d1, own * d2
 
 
 @compiled
@@ -310,7 +328,7 @@ def log_density(
     """
     if not curve.start <= u <= curve.end:
         return -math.inf
-    value1, value2, _, _ = mean_at(u, curve)
+    value1, value2, _, _ = expected_at(u, prior, curve)
     value1, value2 = value1 * prior.gain, value2 * prior.gain
     away = 0.0 if prior.born else u - prior.centre
     if curve.by_rate:

@@ -24,6 +24,7 @@ from inference.tracking.masses import CHOICE_COLUMNS
 from inference.tracking.modes import find_choices
 from inference.tracking.motion import Rules, motion_over, presence_over
 from inference.tracking.report import OUTLIER, STATUS, SURPRISE, report
+from inference.tracking.shared_error import ANCHOR, certainty
 from inference.tracking.square_root import drop_lightest, merge, merge_equals, move
 from inference.tracking.state import COUNT
 from simulator.compiled import compiled
@@ -91,7 +92,7 @@ def _pass_time(
     carry, decay, noise = motion_over(seconds, rules.rate_sd, rules.rate_time)
     root = math.sqrt(seconds)
     drift1, drift2 = rules.drift1 * root, rules.drift2 * root
-    learns = x.shape[1] > 2
+    learns = X.shape[1] > 2
     born = weight[0] * chance.arrived + numbers[PENDING] * (1.0 - chance.left)
     empty = weight[0] * (1.0 - chance.arrived)
     for j in range(1, count + 1):
@@ -101,7 +102,10 @@ def _pass_time(
             merge(x, X, 0, j, left / empty, 2, work)
         born += weight[j] * chance.replaced
         weight[j] *= chance.stayed
+        along = carry * x[j, 1]
         move(x, X, j, carry, decay, noise, drift1, drift2, work)
+        if learns:
+            x[j, ANCHOR] += certainty(x, X, j) * along
     weight[0] = empty + numbers[PENDING] * chance.left
     numbers[PENDING] = born
     if learns:
@@ -113,6 +117,7 @@ def _copy(x_to: Array, X_to: Array, to: int, x: Array, X: Array, row: int) -> No
     """Copy one hypothesis."""
     for i in range(x.shape[1]):
         x_to[to, i] = x[row, i]
+    for i in range(X.shape[1]):
         for j in range(X.shape[2]):
             X_to[to, i, j] = X[row, i, j]
 
@@ -136,7 +141,7 @@ def _weigh(
     count = int(numbers[COUNT])
     choices, columns, work, factors = room.choices, room.columns, room.work, room.factors
     values, scan, next_scan = room.values, places.scan, places.next_scan
-    spread = X[0, x.shape[1] - 2 :]
+    spread = X[0, X.shape[1] - 2 :]
     log_usual, log_odd = math.log1p(-rules.outlier), math.log(rules.outlier)
     found = 0
     for h in range(1, count + 1):
@@ -157,7 +162,7 @@ def _weigh(
         best = max(best, choices[j, 0])
     # what is too light to be looked for is kept at an upper bound of its weight until it is not
     old = found
-    bound = log_born + math.log(mass_bound(first, second, gain, x.shape[1], curve, places))
+    bound = log_born + math.log(mass_bound(first, second, gain, X.shape[1], curve, places))
     pending = math.exp(min(bound - best, 0.0)) + math.exp(odd_born - best)
     if full or bound > best + rules.log_negligible:
         prior = born_prior(x, X, gain, log_born + log_usual, rules.rate_sd, curve)
@@ -228,7 +233,7 @@ def _weigh(
         if choices[j, 5] == 0.0 and choices[j, 0] > _NEVER:
             pending += math.exp(choices[j, 0] - best)
     total += pending
-    if x.shape[1] > 2 and usual_empty > odd_empty:
+    if X.shape[1] > 2 and usual_empty > odd_empty:
         learn_empty(x, X, first, second, gain, curve, places.empty, columns, work, factors, True)
     weight[0] = (empty + odd_mass) / total
     numbers[PENDING] = pending / total
@@ -287,7 +292,7 @@ def run_filter(
     """
     capacity, n, m = X.shape
     room = Room(
-        np.zeros((_SPARE * capacity, n)),
+        np.zeros((_SPARE * capacity, x.shape[1])),
         np.zeros((_SPARE * capacity, n, m)),
         np.zeros(_SPARE * capacity),
         np.empty((2 * _SPARE * capacity, CHOICE_COLUMNS)),

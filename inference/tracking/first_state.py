@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.tracking.settings import TrackingSettings
+from inference.tracking.shared_error import ANCHOR
 from inference.tracking.state import TrackState
 from simulator.scene import Scene
 
@@ -33,23 +34,23 @@ def first_state(
         Number of uncertain directions that are carried along.
     crosstalk : ndarray, shape (2,), or None
         Where the crosstalk begins, in units of the read noise; None where it is not learnt.
-    crosstalk_columns : ndarray, shape (2, directions)
-        From `columns_of`.
+    crosstalk_columns : ndarray, shape (2, k)
+        Its change along every direction in which a posterior spreads, in the same units; k is 0
+        where there is no posterior, and its prior holds.
     scale : ndarray, shape (2,)
         From readings to units of the read noise.
     """
     rows, n = settings.hypotheses + 1, 2 if crosstalk is None else 4
     x, X = np.zeros((rows, n)), np.zeros((rows, n, n + directions))
     if crosstalk is not None:
-        x[0, 2:] = crosstalk
+        x = np.zeros((rows, ANCHOR + 1))
+        x[0, 2:ANCHOR] = crosstalk
         values = scene.crosstalk_values
-        # of its own, so that it can be learnt: its correlation with other globals is left out
-        if directions > 1:
+        if crosstalk_columns.size:
+            # of its own, so that it can be learnt: its correlation with other globals is left out
             upper = np.asarray(np.linalg.qr(crosstalk_columns.T, mode="r"))
-            X[0, 2:, 2:4] = upper.T
-        elif directions == 1:
-            X[0, 2:, 2] = crosstalk_columns[:, 0]
-        if directions == 0 and values is not None:
+            X[0, 2:, 2 : 2 + len(upper)] = upper.T
+        elif values is not None:
             for k, value in enumerate(values):
                 if not isinstance(value, float | int):
                     mean, sd = _moments(value.distribution().from_normal)

@@ -16,6 +16,13 @@ from inference.tracking.curve import (
     object_at,
 )
 from inference.tracking.motion import Rules
+from inference.tracking.shared_error import (
+    ANCHOR,
+    follow,
+    shared_part,
+    straighten,
+    turn_of,
+)
 from inference.tracking.square_root import solve, update
 from simulator.compiled import compiled
 
@@ -30,7 +37,7 @@ _BROAD = 10.0  # standard deviation of log r before the first frame: vague, but 
 @compiled
 def prior_of(x: Array, X: Array, row: int, gain: float, log_weight: float, curve: Curve) -> Prior:
     """Return what a hypothesis says of the next frame, as a density of u and the rest given u."""
-    n, m = x.shape[1], X.shape[2]
+    n, m = X.shape[1], X.shape[2]
     variance = 0.0
     for j in range(n):
         variance += X[row, 0, j] * X[row, 0, j]
@@ -40,6 +47,7 @@ def prior_of(x: Array, X: Array, row: int, gain: float, log_weight: float, curve
     offset1, offset2 = curve.crosstalk1, curve.crosstalk2
     slope1, slope2 = 0.0, 0.0
     root = (0.0, 0.0, 0.0)
+    share = 0.0
     if n > 2:
         offset1, offset2 = offset1 + x[row, 2], offset2 + x[row, 3]
         for j in range(n):
@@ -48,6 +56,9 @@ def prior_of(x: Array, X: Array, row: int, gain: float, log_weight: float, curve
         for j in range(n):
             own = X[row, 0, j]
             root = add_factor(root, X[row, 2, j] - slope1 * own, X[row, 3, j] - slope2 * own)
+        _, _, share = shared_part(X, row, n)
+        _, _, d1, d2 = mean_at(x[row, ANCHOR], curve)
+        slope1, slope2 = slope1 + gain * share * d1, slope2 + gain * share * d2
     if m > n:
         # the filter runs at the centre of the globals: what they do to the readings beyond what
         # they have already done to the range is noise to it
@@ -82,6 +93,7 @@ def prior_of(x: Array, X: Array, row: int, gain: float, log_weight: float, curve
         rate_slope,
         rate_sd,
         gain,
+        share,
     )
 
 
@@ -93,7 +105,7 @@ def born_prior(
 
     Row 0 holds the crosstalk as the empty scene has it.
     """
-    n, m = x.shape[1], X.shape[2]
+    n, m = X.shape[1], X.shape[2]
     offset1, offset2 = curve.crosstalk1, curve.crosstalk2
     root = (0.0, 0.0, 0.0)
     if n > 2:
@@ -116,6 +128,7 @@ def born_prior(
         0.0,
         rate_sd,
         gain,
+        0.0,
     )
 
 
@@ -186,13 +199,26 @@ def learn(
     float
         Normalised innovation squared.
     """
-    n, m = x.shape[1], X.shape[2]
+    n, m = X.shape[1], X.shape[2]
     u, gain = choices[choice, 3], prior.gain
-    value1, value2, d1, d2 = mean_at(u, curve)
+    # where the curve is taken: as far as the error that u shares with the crosstalk goes, at u's
+    # prediction
+    at = u if prior.born else prior.centre + (1.0 - prior.share) * (u - prior.centre)
+    value1, value2, d1, d2 = mean_at(at, curve)
     value1, value2, d1, d2 = gain * value1, gain * value2, gain * d1, gain * d2
+    back, turn = (0.0, 0.0), (0.0, 0.0)
+    before = (x[row, 0], 0.0, 0.0)
+    if n > 2 and not prior.born:
+        back1, back2, _ = shared_part(X, row, n)
+        _, _, s1, s2 = mean_at(x[row, ANCHOR], curve)
+        back, turn = (back1, back2), turn_of((back1, back2), gain * s1 - d1, gain * s2 - d2)
+        before = (x[row, 0], x[row, 2], x[row, 3])
+        straighten(X, row, n, back, turn)
     if prior.born:
         # before the frame: anywhere near, so vaguely that the frame alone speaks
         x[row, 0], x[row, 1] = u, 0.0
+        if n > 2:
+            x[row, ANCHOR] = u
         for j in range(m):
             X[row, 0, j], X[row, 1, j] = 0.0, 0.0
         X[row, 0, 0], X[row, 1, 1] = _BROAD, prior.rate_sd
@@ -217,9 +243,11 @@ def learn(
         for j in range(m - n):
             g1, g2 = column_at(i, t, j, curve)
             columns[0, j], columns[1, j] = gain * g1, gain * g2
-        e1 = first - m1 - d1 * (x[row, 0] - u)
-        e2 = second - m2 - d2 * (x[row, 0] - u)
+        e1 = first - m1 - d1 * (x[row, 0] - at)
+        e2 = second - m2 - d2 * (x[row, 0] - at)
     surprise = update(x, X, row, e1, e2, slopes, noise, columns, work, factors)
+    if n > 2 and not prior.born:
+        follow(x, X, row, before, back, turn, gain, curve)
     variance = 0.0
     for j in range(n):
         variance += X[row, 0, j] * X[row, 0, j]
@@ -271,7 +299,7 @@ def learn_empty(
     (float, float, float, float)
         Log density without the log of 2 pi, normalised innovation squared, and what was expected.
     """
-    n, m = x.shape[1], X.shape[2]
+    n, m = X.shape[1], X.shape[2]
     m1 = gain * empty[0, 0] + curve.crosstalk1
     m2 = gain * empty[1, 0] + curve.crosstalk2
     if n > 2:

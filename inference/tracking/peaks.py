@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.tracking.curve import Curve, Prior, Triple, log_density, mean_at
+from inference.tracking.curve import Curve, Prior, Triple, expected_at, log_density
 from simulator.compiled import compiled
 
 __all__ = ["climb", "climb_plain", "edge"]
@@ -48,7 +48,7 @@ def climb_plain(
     curvature = 0.0
     moved = high - low
     for _ in range(60):
-        value1, value2, slope1, slope2 = mean_at(u, curve)
+        value1, value2, slope1, slope2 = expected_at(u, prior, curve)
         away = 0.0 if prior.born else u - prior.centre
         e1 = first - prior.gain * value1 - prior.offset1 - prior.slope1 * away
         e2 = second - prior.gain * value2 - prior.offset2 - prior.slope2 * away

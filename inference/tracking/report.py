@@ -50,7 +50,7 @@ _UNIQUE, _AMBIGUOUS, _NONE = int(Status.UNIQUE), int(Status.AMBIGUOUS), int(Stat
 def _describe(rows: Array, i: int, at: int, x: Array, X: Array, weight: Array, j: int) -> None:
     """Fill one row of the hypotheses."""
     own, common, rate = 0.0, 0.0, 0.0
-    n = x.shape[1]
+    n = X.shape[1]
     for k in range(X.shape[2]):
         square = X[j, 0, k] * X[j, 0, k]
         if k >= n:
@@ -144,7 +144,7 @@ def report(
                 rows[i, at, k] = rows[i, at - 1, k]
             at -= 1
         _describe(rows, i, at, x, X, weight, j)
-    if x.shape[1] > 2:
+    if X.shape[1] > 2:
         _describe_crosstalk(out, i, x, X, weight, count)
     if weight[0] > 0.5 or count == 0:
         return

@@ -1,8 +1,9 @@
 """Kalman steps on roots of covariances: predict, update, merge; nothing is ever subtracted.
 
 A hypothesis holds the mean x of (u, du/dt) and, where crosstalk drifts, of two crosstalk readings;
-n is 2 or 4. Its error is X w with w standard normal: the first n columns of X are its own, lower
-triangular; the last p belong to the globals, which all frames share. Globals are "considered" as in
+n is 2 or 4 (x then has a fifth column, `inference.tracking.shared_error`). Its error is X w with w
+standard normal: the first n columns of X are its own, lower triangular; the last p belong to the
+globals, which all frames share. Globals are "considered" as in
 the Schmidt-Kalman filter: no frame makes them better known, so that what they do to the range never
 averages down; the state learns from a frame as much as it can beside them.
 """
@@ -70,7 +71,7 @@ def move(
     work : ndarray, shape (n, at least 2 n)
         Overwritten.
     """
-    n = x.shape[1]
+    n = X.shape[1]
     x[row, 0] += carry * x[row, 1]
     x[row, 1] *= decay
     for j in range(X.shape[2]):
@@ -135,7 +136,7 @@ def update(
     float
         Normalised innovation squared.
     """
-    n, m = x.shape[1], X.shape[2]
+    n, m = X.shape[1], X.shape[2]
     root = noise
     for j in range(m):
         f1 = slopes[0] * X[row, 0, j] + slopes[2] * X[row, 1, j]
@@ -195,7 +196,7 @@ def merge(
     work : ndarray, shape (n, at least 3 n + p + 1)
         Overwritten.
     """
-    n, m = x.shape[1], X.shape[2]
+    n, m = X.shape[1], X.shape[2]
     left, right = math.sqrt(1.0 - share), math.sqrt(share)
     for i in range(first, n):
         gap = x[other, i] - x[into, i]
@@ -232,6 +233,8 @@ def _log_determinant(x: Array, X: Array, one: int, other: int, share: float) -> 
     p11 += spread * gap1 * gap1
     p12 += spread * gap1 * gap2
     p22 += spread * gap2 * gap2
+    if p22 == 0.0:  # an object at rest has no rate to be told apart by
+        return math.log(p11) if p11 > 0.0 else -math.inf
     rest = max(p22 - p12 * (p12 / p11), 1e-14 * p22) if p11 > 0.0 else 0.0
     return math.log(p11 * rest) if p11 * rest > 0.0 else -math.inf
 
@@ -242,6 +245,7 @@ def _replace(x: Array, X: Array, weight: Array, row: int, other: int) -> None:
     weight[row] = weight[other]
     for i in range(x.shape[1]):
         x[row, i] = x[other, i]
+    for i in range(X.shape[1]):
         for c in range(X.shape[2]):
             X[row, i, c] = X[other, i, c]
 

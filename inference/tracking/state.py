@@ -37,9 +37,10 @@ class TrackState:
 
     Attributes
     ----------
-    x : ndarray, shape (rows, n)
-        Means of log r, its rate [1/s] and, if learnt, the crosstalk [units of the noise]; row 0 is
-        the empty scene, rows that are not in use are arbitrary.
+    x : ndarray, shape (rows, n), or (rows, n + 1) where crosstalk is learnt
+        Means of log r, its rate [1/s] and, if learnt, the crosstalk [units of the noise] and the
+        log r at which tangents are taken (`inference.tracking.shared_error`); row 0 is the empty
+        scene, rows that are not in use are arbitrary.
     X : ndarray, shape (rows, n, n + p)
         Roots of the covariances (`inference.tracking.square_root`).
     weight : ndarray, shape (rows,)

@@ -12,7 +12,7 @@ from scipy import stats
 
 from inference.density.rows import law_of
 from inference.posterior.answer.posterior import Posterior
-from inference.tracking.columns import columns_of
+from inference.tracking.columns import columns_of, crosstalk_change
 from inference.tracking.curve import Curve, Places
 from inference.tracking.first_state import first_state
 from inference.tracking.globals import globals_of
@@ -138,9 +138,10 @@ def tracker(
     knots = knots_of(
         sensor, law, lambda u: means_over(u, sensor, known.centre, by_rate) * factors, rate
     )
-    columns, empty_columns, crosstalk_columns = columns_of(
-        sensor, scene, known, knots, factors, not learns
-    )
+    columns, empty_columns = columns_of(sensor, scene, known, knots, factors, not learns)
+    changes = [
+        crosstalk_change(*pair) * scale for pair in zip(known.plus, known.minus, strict=True)
+    ]
     noise = sensor.noise
     relative, shot = (0.0, 0.0) if by_rate else (noise.relative, noise.shot)
     fixed, offset = np.zeros(2), np.zeros(2)
@@ -203,7 +204,7 @@ def tracker(
         settings,
         empty_columns.shape[1],
         offset if learns else None,
-        crosstalk_columns,
+        np.array(changes).reshape(-1, 2).T,
         scale,
     )
     shapes = np.array([*first.x.shape, *first.X.shape])
