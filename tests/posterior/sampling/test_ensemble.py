@@ -1,14 +1,20 @@
 """Ensembles: reproducible, resumable, each with a random stream of its own."""
 
+import dataclasses
+from typing import cast
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.sampling.ensemble import Ensemble, advance, new_ensemble, restart
-from inference.posterior.sampling.proposal import Proposal, mixture_of
+from inference.posterior.sampling.proposal import Mixture, Proposal, mixture_of
 from inference.posterior.sampling.start import find_optima
 from inference.posterior.sampling.transport import fit_map
 from tests.posterior.scenes import example
+
+Array = NDArray[np.float64]
 
 
 @pytest.fixture(scope="module", params=["Laplace", "map"])
@@ -89,3 +95,29 @@ def test_a_restart_in_other_coordinates_keeps_the_points(
     z, log_det = other.bend(fresh.coords)
     assert z == pytest.approx(ensemble.chain[-1], rel=1e-9, abs=1e-9)
     assert fresh.log_prob - log_det == pytest.approx(ensemble.chain_log_prob[-1], rel=1e-12)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Normal:
+    """A standard normal in place of a density of frames."""
+
+    def __call__(self, z: Array) -> Array:
+        return np.asarray(-0.5 * np.sum(z**2, axis=1))
+
+
+def test_local_moves_leave_a_normal_law_as_it_is() -> None:
+    """Its variance in nine dimensions, walked by local moves alone, within 4 standard errors.
+
+    The mean square of a run of 32 walkers and 3,000 steps scatters by 0.7 % (six runs), that of two
+    by 0.5 %. With emcee's snooker move in a tenth of the steps it is 0.965.
+    """
+    d = 9
+    optima = Mixture(np.zeros((1, d)), np.eye(d)[None], np.ones(1))
+    proposal = Proposal(optima, None, 0.0)
+    density = cast(CollapsedDensity, _Normal())
+    squares = []
+    for key in range(2):
+        start = np.random.default_rng(key).standard_normal((32, d))
+        ensemble = new_ensemble(proposal, start, density(start), np.random.SeedSequence(key))
+        squares.append(np.mean(advance(density, proposal, ensemble, 3_000).chain ** 2))
+    assert np.mean(squares) == pytest.approx(1.0, abs=0.02)

@@ -1,0 +1,83 @@
+"""Where ensembles begin, and what is said before they have moved."""
+
+import math
+
+import numpy as np
+
+from inference.density.collapsed import collapsed_density
+from inference.posterior import fold
+from inference.posterior.adaptation import set_out
+from inference.posterior.infer import infer
+from inference.posterior.launch import WALKERS
+from inference.posterior.sampling.population import Population
+from inference.posterior.sampling.proposal import Proposal, mixture_of
+from inference.posterior.sampling.start import find_optima
+from inference.posterior.sampling.verdict import Verdict
+from inference.posterior.settings import SamplerSettings
+from simulator.frames import frames_from_columns
+from simulator.scene import parse_scene
+from tests.posterior.scenes import UNKNOWN_CROSSTALK, example, sensor_of
+
+
+def test_ensembles_begin_in_different_members_from_all_over_a_population() -> None:
+    sensor, scene, frames = example("pulsed", crosstalk=True)
+    job = fold.prepare(sensor, scene, frames, SamplerSettings(seed=1, ensembles=6))
+    density = collapsed_density(sensor, scene, frames)
+    optima = mixture_of(find_optima(density, np.random.default_rng(1)))
+    members = optima.draw(np.random.default_rng(2), 1000)
+    members = members[np.isfinite(density(members))]
+    populations = tuple(
+        Population(z, density(z), np.zeros(len(z)), 1.0, 0.0, 1, 1)
+        for z in np.array_split(members[np.argsort(members[:, 0])], 2)
+    )
+    before = fold.Checkpoint(
+        "emcee",
+        optima,
+        Proposal(optima, None, 0.5),
+        populations=populations,
+        calls=0,
+        verdict=Verdict(False, ()),
+    )
+    after = set_out(job, before)
+    assert after.proposal is not None
+    starts = [after.proposal.bend(ensemble.coords)[0] for ensemble in after.ensembles[:-1]]
+    for k, start in enumerate(starts):
+        population = populations[k % 2].z
+        # 32 members drawn at random: their mean within 4.5 standard errors of the population's
+        error = population[:, 0].std() / math.sqrt(WALKERS)
+        assert abs(start[:, 0].mean() - population[:, 0].mean()) < 4.5 * error
+    together = np.concatenate(starts[::2]).round(9)
+    assert len(np.unique(together, axis=0)) == len(together)
+
+
+def test_starting_points_are_not_judged_as_draws() -> None:
+    scene = parse_scene({"crosstalk": UNKNOWN_CROSSTALK})
+    sensor = sensor_of("pulsed")
+    frames = frames_from_columns(
+        sensor, {"w1": [0.0014, 0.0009, 0.0005], "w2": [0.0314, 0.0135, 0.0077]}
+    )
+    found = infer(sensor, scene, frames, SamplerSettings(seed=1, max_seconds=1e-3))
+    assert not found.verdict.converged
+    assert not found.fit.misfit
+    assert "nothing was drawn" in found.fit.reasons[0]
+    for row in found.identifiability:
+        assert row.status == "not_identified"
+        assert row.reason.startswith("not known yet")
+    for summary in found.parameters.values():
+        assert math.isnan(summary.ess_bulk)
+        assert math.isnan(summary.mcse_mean)
+
+
+def test_one_frame_a_discrepancy_and_an_optional_term_are_answered() -> None:
+    sensor = sensor_of("pulsed")
+    scene = parse_scene(
+        {
+            "object": {"c0": 0.0769, "c1": -0.123, "c2": 0.0957},
+            "discrepancy": 0.05,
+            "crosstalk": {"values": UNKNOWN_CROSSTALK, "optional": True},
+        }
+    )
+    frames = frames_from_columns(sensor, {"w1": [0.0014], "w2": [0.0314]})
+    found = infer(sensor, scene, frames, SamplerSettings(seed=1, max_seconds=20))
+    assert found.selection is not None
+    assert all(np.isfinite(one.log_evidence) for one in found.selection.candidates)
