@@ -51,6 +51,8 @@ def obstacle(
     """
     if sensor.kind not in technique.kinds:
         return "a sine wave has no late window"
+    if scene.discrepancy is not None and "discrepancy" not in technique.immune_to:
+        return "has no term for the scene's discrepancy; use a posterior"
     if technique.differential:
         if technique.uses_background and scene.motion == "tangential":
             return "needs radial motion: a range that does not change leaves the background alone"

@@ -4,12 +4,14 @@ A moving average of M + 1 first differences is the difference (x_i - x_(i-M-1)) 
 25-27 as corrected): a longer window has less noise, and belongs to its centre. So a frame's own
 derivative needs a window around it. Three readings (i - m, i, i + m) with Lagrange's weights give
 it to second order at any spacing; with equal spacing it is the difference over 2 m, so M = 2 m - 1.
-At the ends the window is (i, i + m, i + 2 m), or its mirror.
+At the ends, and nowhere else, the window is (i, i + m, i + 2 m), or its mirror.
 
 The half width m is Lepski's choice: the widest window whose direction of the derivative agrees with
 that of every narrower one within twice the narrower one's standard deviation. Noise widens it, and
 motion that bends the curves narrows it, without a model of either. What remains is a bias of the
-ratio of about -(N + 1)/3 (v h / r)^2 for a flux falling as r^-N and a half width of h seconds.
+ratio of about -(N + 1)/3 (v h / r)^2 for a flux falling as r^-N and a half width of h seconds: as
+large as the noise of narrower windows lets it be. So the noise that is stated is that of the widest
+window at most half as wide; where even its direction drowns, nothing is told.
 """
 
 import math
@@ -32,13 +34,16 @@ __all__ = ["DERIVATIVE_REASONS", "LONELY", "UNEVEN_GAIN", "derivatives_of"]
 
 Array = NDArray[np.float64]
 
-LONELY, UNEVEN_GAIN = 0, 1
+LONELY, UNEVEN_GAIN, DROWNED_CHANGE = range(3)
 DERIVATIVE_REASONS = (
     "no other frame to form a difference with",
     "the frame's gain changes, so that unknown crosstalk does not cancel in differences",
+    "the readings change by no more than their noise",
 )
 _HALF_WIDTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
 _AGREEMENT = 2.0
+_END = 4  # frames from an end, where windows to one side are better than none
+_TOLD = 1.0 / 3.0  # uncertainty of a direction [rad] above which no bias of a wider window is seen
 
 
 @compiled
@@ -63,19 +68,23 @@ def _differences(
     half_widths: tuple[int, ...],
     out: Array,
 ) -> None:
-    """Fill out (n, 5) with d1, d2, var1, var2, cov; nan where no window is allowed."""
+    """Fill out (n, 6) with d1, d2, var1, var2, cov and the uncertainty of the direction [rad].
+
+    nan where no window is allowed.
+    """
     n = t.size
-    kept = np.empty((len(half_widths), 2))
+    kept, noises = np.empty((len(half_widths), 2)), np.empty((len(half_widths), 4))
     for i in range(n):
-        for j in range(5):
+        for j in range(6):
             out[i, j] = math.nan
         tried = 0
+        near_end = min(i, n - 1 - i) < _END
         for m in half_widths:
             if i >= m and i + m < n:
                 a, b, c, at = i - m, i, i + m, 1
-            elif i + 2 * m < n:
+            elif near_end and i + 2 * m < n:
                 a, b, c, at = i, i + m, i + 2 * m, 0
-            elif i >= 2 * m:
+            elif near_end and i >= 2 * m:
                 a, b, c, at = i - 2 * m, i - m, i, 2
             elif n == 2:
                 a, b, c, at = 0, 0, 1, -1
@@ -113,7 +122,16 @@ def _differences(
             kept[tried, 0], kept[tried, 1] = angle, sd
             tried += 1  # noqa: SIM113  # not every width is tried
             out[i, 0], out[i, 1] = d1, d2
-            out[i, 2], out[i, 3], out[i, 4] = v1, v2, v12
+            noises[tried - 1, 0], noises[tried - 1, 1] = v1, v2
+            noises[tried - 1, 2], noises[tried - 1, 3] = v12, m
+            # a bias is seen only where it exceeds the noise of a narrower window: of one half as
+            # wide, whose own bias is a quarter
+            judge = 0
+            for earlier in range(tried):
+                if 2.0 * noises[earlier, 3] <= m:
+                    judge = earlier
+            out[i, 2], out[i, 3], out[i, 4] = noises[judge, 0], noises[judge, 1], noises[judge, 2]
+            out[i, 5] = kept[judge, 1]
             if at < 0:
                 break
 
@@ -164,10 +182,10 @@ def derivatives_of(
             var2 = var2 + (net.relative * net.second) ** 2
             cov = cov + net.relative**2 * net.first * net.second
     gain = frames.gain if crosstalk is None else None
-    out = np.full((len(frames), 5), np.nan)
+    out = np.full((len(frames), 6), np.nan)
     state = net.state.copy()
     if usable.size >= 2:
-        part = np.empty((usable.size, 5))
+        part = np.empty((usable.size, 6))
         _differences(
             frames.time_s[usable],
             net.first[usable],
@@ -182,6 +200,7 @@ def derivatives_of(
         out[usable] = part
         missing = np.isnan(out[:, 0]) & np.isnan(out[:, 2]) & (state == 0)
         state[missing] = first_reason + UNEVEN_GAIN
+        state[(out[:, 5] > _TOLD) & (state == 0)] = first_reason + DROWNED_CHANGE
     else:
         state[usable] = first_reason + LONELY
     bad = (state == 0) & ~(np.isfinite(out[:, 0]) & np.isfinite(out[:, 1]))

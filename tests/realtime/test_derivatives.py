@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from inference.estimate import estimate
 from inference.estimates import Status
-from inference.realtime.derivatives import derivatives_of
+from inference.realtime.derivatives import DERIVATIVE_REASONS, derivatives_of
 from simulator.errors import InvalidInputError
 from simulator.frames import Frames
 from simulator.scene import parse_scene
@@ -75,15 +75,49 @@ def test_noise_widens_the_window_and_motion_narrows_it() -> None:
     r = 0.4 + 0.8 * t
     rng = np.random.default_rng(5)
     spread = []
-    for noise in (1e-12, 1e-3, 1e-2):
+    for noise in (1e-12, 1e-5, 1e-4):
         sensor = pulsed(noise)
         data = readings(sensor, r) + noise * rng.standard_normal((t.size, 2))
         rate = derivatives_of(sensor, None, Frames(data, time_s=t), 0)
-        # sd of a difference over 2 m steps is noise sqrt(2) / (2 m h)
-        width = noise * math.sqrt(2) / np.sqrt(rate.var2[150]) / (2 * (t[1] - t[0]))
-        spread.append(float(width))
+        # sd of a difference over 2 m steps is noise sqrt(2) / (2 m h), and what is stated is that
+        # of a window at most half as wide as the one that is used
+        width = noise * math.sqrt(2) / np.sqrt(rate.var2[50:250]) / (2 * (t[1] - t[0]))
+        spread.append(float(np.median(width)))
     assert spread[0] == pytest.approx(1.0)
-    assert spread[0] < spread[1] <= spread[2]
+    assert spread[0] < spread[1] < spread[2]
+
+
+def test_intervals_cover_what_windows_wide_enough_for_the_noise_bend() -> None:
+    """100 frames over 0.2-1.5 m, ten runs: 88 % of 95 % intervals hold; 64 % if noise alone counts.
+
+    Frames of a run share windows, some five of them: 200 independent ones, of which fewer than
+    78 % hold once in 1e4 runs of this test.
+    """
+    r, t = np.linspace(0.2, 1.5, 100), np.linspace(0, 10, 100)
+    unknown = [{"prior": "normal", "mean": 0.0, "sd": 0.01}] * 2
+    scene = parse_scene({"object": {"c0": C0, "c1": C1, "c2": C2}, "crosstalk": unknown})
+    held, far = [], []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        sensor = pulsed(8e-5)
+        data = readings(sensor, r) + [0.001, 0.002] + 8e-5 * rng.standard_normal((t.size, 2))
+        (found,) = estimate(sensor, scene, Frames(data, time_s=t), ["differential"]).results
+        z = (found.range_m - r) / found.sd_m
+        held += (np.abs(z[np.isfinite(z)]) < 1.96).tolist()
+        far += (np.abs(z[np.isfinite(z)]) > 4.0).tolist()
+    assert len(held) > 700
+    assert np.mean(held) > 0.78
+    assert np.mean(far) < 0.04
+
+
+def test_a_change_that_drowns_in_noise_tells_no_range() -> None:
+    t = np.linspace(0, 1, 60)
+    sensor = pulsed(1.0)
+    data = readings(sensor, 2.0 + 0.01 * t) + np.random.default_rng(0).standard_normal((60, 2))
+    rate = derivatives_of(sensor, None, Frames(data, time_s=t), 10)
+    told = DERIVATIVE_REASONS.index("the readings change by no more than their noise")
+    # three standard deviations in any of the widths that are tried: not in a quarter of frames
+    assert np.mean(rate.state == 10 + told) > 0.75
 
 
 def test_sd_is_that_of_the_scatter() -> None:

@@ -84,7 +84,7 @@ def test_plan(scene: dict[str, Any], chosen: str | None) -> None:
 def test_immunity_is_that_of_table_4_1() -> None:
     immunity = {name: set(technique.immune_to) for name, technique in TECHNIQUES.items()}
     assert immunity == {
-        "conventional": set(),
+        "conventional": {"discrepancy"},
         "intensity": set(),
         "intensity_w1": set(),
         "differential": {"crosstalk"},
