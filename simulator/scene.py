@@ -87,6 +87,12 @@ class Shadow(Validated):
     c1: Quantity | None = None
 
 
+def _no_other_word(value: object) -> object:
+    if isinstance(value, str) and value != "object":
+        raise ValueError('must be "object", or an object with c0 and c1')
+    return value
+
+
 class Background(Validated):
     """A uniform background behind the object.
 
@@ -108,6 +114,7 @@ class Background(Validated):
         Annotated[Literal["object"], pydantic.Tag("as_object")]
         | Annotated[Shadow, pydantic.Tag("own")],
         pydantic.Discriminator(lambda v: "as_object" if isinstance(v, str) else "own"),
+        pydantic.BeforeValidator(_no_other_word),
     ] = Shadow()
     optional: bool = False
 
@@ -153,6 +160,23 @@ def _kind_of_range(value: object) -> str:
     return kind if kind in ("stroke", "reference") else "independent"
 
 
+def _no_number(value: object) -> object:
+    if isinstance(value, int | float | str | list | tuple):
+        raise ValueError(
+            'must be a prior, {"prior": "stroke", "low", "high"} or {"prior": "reference", "low", '
+            '"high"}; a range that is known is given by a narrow prior'
+        )
+    return value
+
+
+def _size_of_discrepancy(value: object) -> object:
+    if value == "default":
+        return DISCREPANCY_SD
+    if isinstance(value, str):
+        raise ValueError('must be a standard deviation, such as 0.07, or "default"')
+    return value
+
+
 class Scene(Validated):
     """A scene. Everything that it does not mention is left out of every model made from it.
 
@@ -192,6 +216,7 @@ class Scene(Validated):
             | Annotated[Stroke, pydantic.Tag("stroke")]
             | Annotated[Reference, pydantic.Tag("reference")],
             pydantic.Discriminator(_kind_of_range),
+            pydantic.BeforeValidator(_no_number),
         ]
         | None
     ) = None
@@ -199,7 +224,7 @@ class Scene(Validated):
     discrepancy: Annotated[
         Positive | None,
         pydantic.BeforeValidator(
-            lambda value: DISCREPANCY_SD if value == "default" else value,
+            _size_of_discrepancy,
             json_schema_input_type=Positive | Literal["default"] | None,
         ),
     ] = None

@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 _WIDER = 3.0  # than the curvature predicts: more than one solution, or a curved valley
 _NARROWER = 3.0  # than it predicts: told by the law of the ranges, not by the readings
 _LEANING = (
-    ", but the readings by themselves only to {:.2g}: the rest is taken from how range_m says that "
-    'ranges are spread. Where that is not known, {{"prior": "reference"}} takes nothing from it'
+    ". The readings by themselves would tell it only to {:.2g}: the rest is taken from how range_m "
+    'says that ranges are spread. Where that is not known, {{"prior": "reference"}} takes nothing from it'
 )
 _HELP = 2.0  # a term is to blame where the scale would be known so many times better with it known
 _ALIKE = (
@@ -142,7 +142,8 @@ def _left_open(experiment: Experiment, spread: Spread, prediction: Prediction | 
 
 def _cause(diagnosis: Diagnosis, name: str, spread: float, foreseen: float) -> str:
     if name.startswith("range_m."):
-        return f"{diagnosis.distinct} ranges say no more of the law that they were drawn from"
+        few = "one range says" if diagnosis.distinct == 1 else f"{diagnosis.distinct} ranges say"
+        return f"{few} no more of the law that they were drawn from"
     text = diagnosis.explain(name)
     if spread > _WIDER * foreseen:
         text += (

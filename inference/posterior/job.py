@@ -190,7 +190,8 @@ def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSetti
             "posterior has one amplitude for all frames; use the technique `differential`"
         )
     if settings.seed is None:
-        seed = int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 1)
+        # of 53 bits, which readers of JSON that know only floats do not round
+        seed = int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 11)
         settings = settings.model_copy(update={"seed": seed})
     job = Job(sensor, scene, frames, settings)
     if not job.usable.any():

@@ -28,8 +28,8 @@ Pair = tuple[float, float]
 
 _REASONS = reasons_of(
     "no light: w2 is not positive",
-    "w1 is not positive: at or near contact",
-    "w1 is above w2: beyond r0",
+    "w1 is not positive: at or near contact, or too little light",
+    "w1 is above w2: beyond r0, or too little light",
     "no signal: i and q are zero",
     "the phase is below zero within its noise: at or near contact",
 )

@@ -44,5 +44,9 @@ def _run(args: argparse.Namespace) -> int:
         timeout_graceful_shutdown=round(settings.shutdown_s),
     )
     server = uvicorn.Server(config)
-    server.run()
+    try:
+        server.run()
+    except SystemExit:
+        # uvicorn has said why, such as a port that is taken
+        return 4
     return 0 if server.started else 4

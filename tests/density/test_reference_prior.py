@@ -226,7 +226,7 @@ def test_an_object_at_constant_speed_before_a_wall(law: str) -> None:
     rows = {row.parameter: row for row in found.identifiability}
     if law == "loguniform":
         assert rows[DISTANCE].status == rows["range_m"].status == "weak"
-        assert "the readings by themselves only to" in rows[DISTANCE].reason
+        assert "The readings by themselves would tell it only to" in rows[DISTANCE].reason
         return
     assert found.verdict.converged
     wall = found.parameters[DISTANCE]

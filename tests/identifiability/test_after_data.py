@@ -63,7 +63,7 @@ def test_what_the_law_of_the_ranges_tells_is_not_identified_by_the_data(law: str
             assert row.status == "identified"
             continue
         assert row.status != "identified"
-        assert "the readings by themselves only to" in row.reason
+        assert "The readings by themselves would tell it only to" in row.reason
         assert '{"prior": "reference"}' in row.reason
 
 

