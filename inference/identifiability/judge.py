@@ -20,7 +20,8 @@ _WIDER = 3.0  # than the curvature predicts: more than one solution, or a curved
 _NARROWER = 3.0  # than it predicts: told by the law of the ranges, not by the readings
 _LEANING = (
     ". The readings by themselves would tell it only to {:.2g}: the rest is taken from how range_m "
-    'says that ranges are spread. Where that is not known, {{"prior": "reference"}} takes nothing from it'
+    'says that ranges are spread. Where that is not known, {{"prior": "reference"}} takes nothing '
+    "from it"
 )
 _HELP = 2.0  # a term is to blame where the scale would be known so many times better with it known
 _ALIKE = (
