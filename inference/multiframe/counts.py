@@ -16,7 +16,7 @@ from simulator.parameters import parameters_of
 from simulator.scene import Scene
 from simulator.sensor import Sensor, SineWaveSensor
 
-__all__ = ["frames_needed", "joint_obstacle"]
+__all__ = ["frames_needed", "joint_obstacle", "unmodelled_error"]
 
 _MOST_FRAMES = 20_000
 _MOST_HALF_TURNS = 1000.0
@@ -45,6 +45,20 @@ def frames_needed(unknowns: tuple[str, ...], empty: int) -> int:
     return len(unknowns) - told + 1
 
 
+def unmodelled_error(scene: Scene) -> str | None:
+    """Return why a fit over frames does not serve a scene whose object errs, None if it serves.
+
+    Parameters
+    ----------
+    scene : Scene
+        A stated discrepancy is one error for all frames, which noise of each frame cannot stand
+        for: a fit without a term for it would be surer than it may be.
+    """
+    if scene.discrepancy is None:
+        return None
+    return "has no term for the scene's discrepancy; use a posterior"
+
+
 def joint_obstacle(
     sensor: Sensor, scene: Scene, _known: Known, frames: Frames | None
 ) -> str | None:
@@ -64,8 +78,9 @@ def joint_obstacle(
             f"needs an object whose range changes, and the scene's motion is {scene.motion}; "
             "ranges, crosstalk and background cannot be told apart otherwise"
         )
-    if scene.discrepancy is not None:
-        return "has no term for the scene's discrepancy; use a posterior"
+    unmodelled = unmodelled_error(scene)
+    if unmodelled:
+        return unmodelled
     if scene.optional_terms:
         return (
             f"keeps every term, and the scene leaves {' and '.join(scene.optional_terms)} to the "

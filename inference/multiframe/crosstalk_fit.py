@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
+from inference.multiframe.counts import unmodelled_error
 from inference.multiframe.linear_answer import linear_answer, without_warnings
 from inference.multiframe.object_fit import carrier, gains
 from inference.multiframe.problem import unknowns_of
@@ -191,6 +192,9 @@ def _solve(task: Task) -> TechniqueResult:
 def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None) -> str | None:
     if scene.motion != "radial":
         return f"needs radial motion, and the scene's is {scene.motion}"
+    unmodelled = unmodelled_error(scene)
+    if unmodelled:
+        return unmodelled
     if scene.optional_terms:
         return "keeps crosstalk, and the scene leaves it to the data; use a posterior"
     unknown = unknowns_of(sensor, scene)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
+from inference.multiframe.counts import unmodelled_error
 from inference.multiframe.linear_answer import linear_answer, without_warnings
 from inference.multiframe.problem import unknowns_of
 from inference.multiframe.weighted import Equations, LinearFit, Observed, fit_equations
@@ -177,6 +178,9 @@ def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None)
     unknown = unknowns_of(sensor, scene)
     if scene.motion == "tangential":
         return "needs a constant object, and the scene's amplitude changes"
+    unmodelled = unmodelled_error(scene)
+    if unmodelled:
+        return unmodelled
     if scene.background is not None:
         missing = [path for path in _BACKGROUND if not known.has(path)]
         if missing:

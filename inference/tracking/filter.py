@@ -24,8 +24,8 @@ from inference.tracking.masses import CHOICE_COLUMNS
 from inference.tracking.modes import find_choices
 from inference.tracking.motion import Rules, motion_over, presence_over
 from inference.tracking.report import OUTLIER, STATUS, SURPRISE, report
-from inference.tracking.state import COUNT
 from inference.tracking.square_root import drop_lightest, merge, merge_equals, move
+from inference.tracking.state import COUNT
 from simulator.compiled import compiled
 
 __all__ = [

@@ -169,6 +169,22 @@ def test_crosstalk_fit_attains_its_stated_scatter(kind: str, known: tuple[str, .
     assert chi_square < 1.05 * special.chdtri(freedom, 1e-5)
 
 
+def test_empty_frames_beyond_full_scale_tell_no_strength() -> None:
+    """What is clipped at nine tenths of the wall alone would pull the strength down."""
+    sensor = sensor_of("pulsed", 1e3)
+    truth = {"object": {**OBJECT, "c2": 5e-4}, "background": WALL}
+    scene = {**truth, "background": {**WALL, "strength": PRIOR}}
+    frames = data(sensor, truth, path(10, 3, span=(0.3, 0.45)))
+    full = 0.9 * WALL["strength"]
+    assert frames.readings[:10, 1].max() < full < frames.readings[10:, 1].min()
+    limited = sensor.model_copy(update={"full_scale": (1.0, full)})
+    clipped = dataclasses.replace(frames, readings=np.minimum(frames.readings, (1.0, full)))
+    (result,) = served(limited, scene, clipped, ["shadow_fit"])
+    (without,) = served(sensor, scene, frames.select(np.arange(10)), ["shadow_fit"])
+    assert (result.status[10:] == Status.SATURATED).all()
+    assert result.parameters == without.parameters
+
+
 def test_obstacles_name_what_is_missing() -> None:
     sensor = sensor_of("pulsed", 1e4)
     frames = data(sensor, {"object": OBJECT}, path(6))
@@ -178,6 +194,13 @@ def test_obstacles_name_what_is_missing() -> None:
         found = estimate(sensor, parse_scene(scene), shown, names)
         return {item.name: item.reason for item in found.left_out}
 
+    for name, scene in (
+        ("object_fit", {}),
+        ("crosstalk_fit", {"object": OBJECT, "crosstalk": [VAGUE, VAGUE]}),
+        ("shadow_fit", {"object": OBJECT, "background": {**WALL, "shadow": {}}}),
+    ):
+        timed = dataclasses.replace(frames, time_s=np.arange(6.0))
+        assert "discrepancy" in reasons({**scene, "discrepancy": 0.02}, timed)[name]
     assert "is known" in reasons({"object": OBJECT})["object_fit"]
     assert "crosstalk" in reasons({"crosstalk": [VAGUE, VAGUE]})["object_fit"]
     wall = {**WALL, "strength": PRIOR}
