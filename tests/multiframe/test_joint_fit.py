@@ -11,7 +11,7 @@ from scipy import special
 from inference.estimate import estimate
 from inference.estimates import Status, TechniqueResult
 from inference.identifiability.experiment import Experiment, information
-from inference.multiframe import joint_fit
+from inference.multiframe import likelihood_answer
 from inference.multiframe.information import residuals_and_information
 from inference.multiframe.multistart import Optimum, find_optima, optimum_from
 from inference.multiframe.problem import fit_problem
@@ -299,7 +299,7 @@ def test_walks_without_end_leave_an_answer_in_one_piece(monkeypatch: pytest.Monk
     def restless(_: Any, top: Optimum, __: Any) -> tuple[float, Optimum]:
         return 1.0, dataclasses.replace(top, x=top.x * (1 + 1e-4), deviance=top.deviance - 1.0)
 
-    monkeypatch.setattr(joint_fit, "widening", restless)
+    monkeypatch.setattr(likelihood_answer, "widening", restless)
     sensor = sensor_of("pulsed")
     result = fitted(sensor, {}, data(sensor, {"object": OBJECT}, path(16)))
     assert result.parameters is not None
