@@ -11,12 +11,19 @@ import numpy as np
 from inference.multiframe.problem import unknowns_of
 from inference.realtime.known import Known
 from inference.realtime.net import SATURATED, rule_out
+from simulator.errors import listed
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
 from simulator.scene import Scene
 from simulator.sensor import Sensor, SineWaveSensor
 
-__all__ = ["frames_needed", "joint_obstacle", "ranges_needed", "unmodelled_error"]
+__all__ = [
+    "frames_needed",
+    "joint_obstacle",
+    "linear_obstacle",
+    "ranges_needed",
+    "unmodelled_error",
+]
 
 _MOST_FRAMES = 20_000
 _MOST_HALF_TURNS = 1000.0
@@ -86,6 +93,27 @@ def unmodelled_error(scene: Scene) -> str | None:
     if scene.discrepancy is None:
         return None
     return "has no term for the scene's discrepancy; use a posterior"
+
+
+def linear_obstacle(scene: Scene, unknowns: tuple[str, ...]) -> str | None:
+    """Return why no fit linear in an object's numbers serves a scene, None if one does.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    unknowns : tuple of str
+        Scene paths of what is fitted.
+    """
+    if scene.motion == "tangential":
+        return "needs a constant object, and the scene's amplitude changes"
+    if scene.motion == "static" and len(unknowns) > 1:
+        return (
+            "needs an object whose range changes, and the scene's motion is static: one range "
+            f"tells one of {listed(list(unknowns))}; move the object, or state all of them but one "
+            "as known"
+        )
+    return unmodelled_error(scene)
 
 
 def joint_obstacle(

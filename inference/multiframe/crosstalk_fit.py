@@ -2,7 +2,9 @@
 
 Ranges come from differential time of flight, which crosstalk does not reach; given them, readings
 are linear in both crosstalks and c2. Errors of the ranges enter the weights as a rank-one part of
-each frame's covariance along the direction in which its readings move with the range.
+each frame's covariance along the direction in which its readings move with the range. Where the
+derivatives are differences of the readings themselves, the result is but a start for the
+likelihood of all frames.
 """
 
 import dataclasses
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
 from inference.multiframe.counts import unmodelled_error
+from inference.multiframe.likelihood_answer import likelihood_answer_from
 from inference.multiframe.linear_answer import linear_answer, without_warnings
 from inference.multiframe.object_fit import carrier, gains
 from inference.multiframe.problem import unknowns_of
@@ -181,6 +184,16 @@ def _solve(task: Task) -> TechniqueResult:
             "the best fit has a negative c2: the readings do not fall with range as the object's "
             "c0 and c1 say; check them, or take joint_fit"
         )
+    if task.frames.derivatives is None:
+        # differences of the readings tell nothing that the readings do not, and their errors are
+        # neither small nor independent: they serve to find where the likelihood is climbed from
+        answer = likelihood_answer_from("crosstalk_fit", task, values)
+        if answer.fit is not None and answer.fit["misfit"]:
+            raise RefusedError(
+                "the ranges by differences in time lead to values that do not explain the "
+                "readings; take joint_fit, which starts from everywhere"
+            )
+        return answer
     light = float(np.median(np.abs(task.frames.readings - np.median(task.frames.readings, axis=0))))
     natural = {
         path: (values[path], np.eye(len(order))[k], light if path != "object.c2" else values[path])

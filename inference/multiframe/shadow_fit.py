@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.multiframe.counts import unmodelled_error
+from inference.multiframe.counts import linear_obstacle
 from inference.multiframe.linear_answer import linear_answer, without_warnings
 from inference.multiframe.object_fit import carrier, gains
 from inference.multiframe.problem import unknowns_of
@@ -143,11 +143,9 @@ def _visible_of_empty(task: Task, frames: Frames) -> Array:
 
 def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None) -> str | None:
     unknown = unknowns_of(sensor, scene)
-    if scene.motion == "tangential":
-        return "needs a constant object, and the scene's amplitude changes"
-    unmodelled = unmodelled_error(scene)
-    if unmodelled:
-        return unmodelled
+    unserved = linear_obstacle(scene, unknown)
+    if unserved:
+        return unserved
     if not unknown:
         return "fits the shadow or the background's strength, and both are known"
     if _STRENGTH in unknown and len(unknown) > 1:

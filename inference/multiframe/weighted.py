@@ -6,6 +6,7 @@ changes with both readings, the range along with them, and the weights from a fi
 """
 
 import dataclasses
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -148,6 +149,9 @@ class Equations:
         (ranges, frames) -> the object's part of the readings, shape (n, 2).
     unknowns : tuple of str
         Names, one a column of the equation.
+    widest : float
+        Relative standard deviation of a range above which its frame takes no part: first order
+        does not describe what its noise does to the equation.
     """
 
     technique: Technique
@@ -155,6 +159,7 @@ class Equations:
     equation: Callable[[Array, Frames], Observed]
     signal: Callable[[Array, Frames], Array]
     unknowns: tuple[str, ...]
+    widest: float = math.inf
 
     def slopes(self, ranges: Array) -> tuple[Observed, Observed, Array]:
         """Return how the equations change with the first and the second reading.
@@ -230,7 +235,9 @@ def fit_equations(equations: Equations) -> tuple[LinearFit, TechniqueResult]:
         if (result.root_count > 1).any():
             last = np.maximum(result.root_count - 1, 0)
             starts.append(result.roots_m[np.arange(last.size), last])
-        fits = [_fit_from(equations, result.roots_m, start) for start in starts]
+        usable = result.roots_sd_m <= equations.widest * result.roots_m
+        roots = np.where(usable | (equations.widest == math.inf), result.roots_m, np.nan)
+        fits = [_fit_from(equations, roots, start) for start in starts]
     good = [fit for fit in fits if fit.rank == len(unknowns)]
     if not good:
         raise RefusedError(
