@@ -25,10 +25,24 @@ def test_a_fit_without_a_guess_finds_the_optimum_of_a_start_at_the_truth(kind: s
     assert sum(right) >= 13
 
 
-def test_it_does_so_with_everything_unknown() -> None:
-    """Of 4 sets more than 2 fail in 4e-3 of cases where 90 % are right."""
-    right = [outcome_of(random_set("everything", "pulsed", seed)).right for seed in range(4)]
-    assert sum(right) >= 2
+@pytest.mark.parametrize("seed", [3, 5, 13, 17])
+def test_it_does_so_with_everything_unknown(seed: int) -> None:
+    """Four sets that tell enough to be answered: two thirds of such sets are rightly refused.
+
+    A median of |z| over the frames, which share their errors, is above 3.3 in 1e-3 of sets.
+    """
+    outcome = outcome_of(random_set("everything", "pulsed", seed))
+    assert not outcome.refused
+    assert outcome.right
+    assert len(outcome.misses) > 20
+    assert np.median(np.abs(outcome.misses)) < 3.3
+
+
+def test_what_is_open_with_everything_unknown_is_refused() -> None:
+    """Two sets of which the truth leaves the ranges open by half of the limit and more."""
+    outcomes = [outcome_of(random_set("everything", "pulsed", seed)) for seed in (0, 1)]
+    assert all(outcome.refused for outcome in outcomes)
+    assert all(outcome.right for outcome in outcomes)
 
 
 def test_values_that_fit_nearly_as_well_and_leave_the_ranges_open_are_a_reason_to_refuse() -> None:
