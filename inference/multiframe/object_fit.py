@@ -16,12 +16,18 @@ from inference.multiframe.counts import linear_obstacle
 from inference.multiframe.likelihood_answer import likelihood_answer_from
 from inference.multiframe.linear_answer import linear_answer, without_warnings
 from inference.multiframe.problem import unknowns_of
-from inference.multiframe.weighted import Equations, LinearFit, Observed, fit_equations
+from inference.multiframe.weighted import (
+    Equations,
+    LinearFit,
+    Observed,
+    fit_equations,
+    refuse_at_rest,
+)
 from inference.realtime.background_intensity import BACKGROUND_INTENSITY
 from inference.realtime.conventional import CONVENTIONAL
 from inference.realtime.known import Known
 from inference.realtime.technique import Task, Technique
-from simulator.errors import RefusedError, listed
+from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import PulsedSensor, Sensor
@@ -39,7 +45,6 @@ _BACKGROUND = (
 )
 _SIGNIFICANT = 3.0  # standard deviations that a coefficient must be above zero
 _NARROW = 0.1  # relative standard deviation of a range up to which first order describes it
-_STILL = 4.0  # variance of the ranges over that of their noise up to which an object is at rest
 _POWER_LAW = 0.15  # distance of the exponent from a whole number
 
 
@@ -100,28 +105,6 @@ def _map(unknown: tuple[str, ...], known: Known) -> tuple[Array, Array]:
         columns.append(np.array([0.0, c1 if c1 is not None else 0.0, 1.0]))
     assert len(columns) == len(unknown)  # noqa: S101
     return np.stack(columns, axis=1), t
-
-
-def _refuse_at_rest(fit: LinearFit, single: TechniqueResult, unknown: tuple[str, ...]) -> None:
-    """Refuse where the ranges differ by no more than their own noise.
-
-    They are regressed on: where their differences are noise, what follows from them is noise too,
-    and surer of itself the more frames there are. Of a still object `_STILL` is exceeded in at
-    most 1e-3 of sets of four frames or more.
-    """
-    if len(unknown) < 2:
-        return  # one range tells one number
-    r = fit.ranges[fit.used]
-    at = np.nanargmin(np.abs(single.roots_m[fit.used] - r[:, None]), axis=1)
-    own = float(np.mean((single.roots_sd_m[fit.used][np.arange(r.size), at] / r) ** 2))
-    between = float(np.var(np.log(r)))
-    if not between > _STILL * own:
-        raise RefusedError(
-            "the object hardly moves: the ranges of single frames differ by "
-            f"{math.sqrt(between):.2g} of themselves and are uncertain by {math.sqrt(own):.2g}; "
-            f"{listed(list(unknown))} need distinct ranges; move the object nearer and farther, or "
-            f"state {'one' if len(unknown) == 2 else len(unknown) - 1} of them as known"
-        )
 
 
 def _exponent(task: Task, fit: LinearFit) -> float:
@@ -186,7 +169,7 @@ def _solve(task: Task) -> TechniqueResult:
         return np.asarray(size[:, None] * carrier(task.sensor, r))
 
     fit, single = fit_equations(Equations(technique, task, equation, signal, unknown, _NARROW))
-    _refuse_at_rest(fit, single, unknown)
+    refuse_at_rest(fit, single, unknown)
     x = to_x @ fit.x + fixed
     sd = np.linalg.norm(to_x @ fit.factor, axis=1)
     reach = float(np.nanmax(fit.ranges))

@@ -15,7 +15,7 @@ from inference.multiframe.counts import linear_obstacle
 from inference.multiframe.linear_answer import linear_answer, without_warnings
 from inference.multiframe.object_fit import carrier, gains
 from inference.multiframe.problem import unknowns_of
-from inference.multiframe.weighted import Equations, Observed, fit_equations
+from inference.multiframe.weighted import Equations, Observed, fit_equations, refuse_at_rest
 from inference.realtime.background_cancelling import BACKGROUND_CANCELLING
 from inference.realtime.known import Known
 from inference.realtime.net import SATURATED, rule_out
@@ -76,6 +76,7 @@ def _solve(task: Task) -> TechniqueResult:
         return _signal(task, r, frames)
 
     fit, single = fit_equations(Equations(BACKGROUND_CANCELLING, task, equation, signal, unknown))
+    refuse_at_rest(fit, single, unknown)
     y = to_y @ fit.x + fixed
     sd = np.linalg.norm(to_y @ fit.factor, axis=1)
     missing: dict[str, str] = {}

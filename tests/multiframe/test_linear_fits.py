@@ -199,6 +199,19 @@ def test_noise_of_a_still_object_is_not_its_law(kind: str, distance: float) -> N
     assert abs(item["value"] - OBJECT["c2"]) < 6 * item["sd"]
 
 
+def test_the_shadow_of_a_still_object() -> None:
+    """One range tells one number of it, and noise the other."""
+    sensor = sensor_of("pulsed", SIGNAL_AT_1M / 1e-5)
+    scene = parse_scene({"object": OBJECT, "background": {**WALL, "shadow": {}}})
+    for seed in range(5):
+        truth = {"object": OBJECT, "background": WALL}
+        frames = data(sensor, truth, path(40, span=(0.6, 0.6)), seed)
+        found = estimate(sensor, scene, frames, ["shadow_fit"])
+        assert not found.results
+        (left,) = (item for item in found.left_out if item.name == "shadow_fit")
+        assert "hardly moves" in left.reason
+
+
 def test_a_flux_between_square_and_fourth_law_is_called_neither() -> None:
     """About 0.3 m it falls as r^-3.1."""
     sensor = sensor_of("pulsed", SIGNAL_AT_1M / 1e-5)
@@ -253,6 +266,21 @@ def test_crosstalk_from_differences_in_time_is_as_certain_as_said(kind: str) -> 
             total[key] = total.get(key, 0.0) + miss**2
     assert len(total) == 3
     assert max(total.values()) < special.chdtri(sets, 1e-5)
+
+
+def test_crosstalk_from_differences_that_explain_nothing_is_refused() -> None:
+    """Ten readings are off by a hundred standard deviations."""
+    sensor = sensor_of("pulsed", SIGNAL_AT_1M / 1e-5)
+    truth = {"object": OBJECT, "crosstalk": [0.01, 0.02]}
+    scene = {"object": {key: OBJECT[key] for key in ("c0", "c1")}, "crosstalk": [VAGUE, VAGUE]}
+    time = np.linspace(0.0, 1.0, 100)
+    frames = data(sensor, truth, path(100, span=(0.3, 1.0)))
+    frames.readings[::10, 0] += 1e-3
+    timed = dataclasses.replace(frames, time_s=time)
+    found = estimate(sensor, parse_scene(scene), timed, ["crosstalk_fit"])
+    assert not found.results
+    (left,) = (item for item in found.left_out if item.name == "crosstalk_fit")
+    assert "do not explain the readings; take joint_fit" in left.reason
 
 
 def test_empty_frames_beyond_full_scale_tell_no_strength() -> None:
