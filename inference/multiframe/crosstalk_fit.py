@@ -18,7 +18,7 @@ from inference.multiframe.likelihood_answer import likelihood_answer_from
 from inference.multiframe.linear_answer import linear_answer, without_warnings
 from inference.multiframe.object_fit import carrier, gains
 from inference.multiframe.problem import unknowns_of
-from inference.multiframe.weighted import LinearFit, covariances, solve_weighted
+from inference.multiframe.weighted import LinearFit, covariances, solve_weighted, whitener_of
 from inference.realtime.differential import DIFFERENTIAL
 from inference.realtime.known import Known
 from inference.realtime.net import SATURATED, rule_out
@@ -85,7 +85,7 @@ def _fit(
         design = np.zeros((n, 2, 3))
         design[:, 0, 0] = design[:, 1, 1] = 1.0
         design[:, :, 2] = expected
-        whitener = _whitener(own[used], common[:, used])
+        whitener = whitener_of(own[used], common[:, used])
         matrix = np.einsum("nij,njk->nik", whitener, design[used])
         target = np.einsum("nij,nj->ni", whitener, frames.readings[used])
         target = target - matrix[:, :, ~free] @ x[~free]
@@ -111,22 +111,6 @@ def _fit(
         ):
             break
     return fit
-
-
-def _whitener(own: Array, common: Array) -> Array:
-    """Return W with W^T W the inverse of own + the sum of a a^T over a of common, (n, 2, 2).
-
-    The range's part may be a million times the rest: it is never added to it.
-    """
-    result = np.linalg.inv(np.linalg.cholesky(own))
-    for along in common:
-        w = np.einsum("nij,nj->ni", result, along)
-        root = np.hypot(1.0, np.hypot(w[:, 0], w[:, 1]))
-        # (I + w w^T)^(-1/2) = I - w w^T / (root (1 + root))
-        shrunk = w / root[:, None] / (1.0 + root)[:, None]
-        across = np.einsum("nj,nji->ni", w, result)
-        result = result - shrunk[:, :, None] * across[:, None, :]
-    return np.asarray(result)
 
 
 def _best_roots(task: Task, roots: Array, x: Array) -> NDArray[np.intp]:

@@ -27,6 +27,7 @@ __all__ = [
     "fit_equations",
     "refuse_at_rest",
     "solve_weighted",
+    "whitener_of",
 ]
 
 Array = NDArray[np.float64]
@@ -106,6 +107,31 @@ def covariances(sensor: Sensor, readings: Array, signal: Array) -> Array:
         out[:, 0, 1] += shared
         out[:, 1, 0] += shared
     return np.asarray(out)
+
+
+def whitener_of(own: Array, common: Array) -> Array:
+    """Return W with W^T W the inverse of own + the sum of a a^T over a of common.
+
+    Parameters
+    ----------
+    own : ndarray, shape (n, 2, 2)
+        Covariances.
+    common : ndarray, shape (k, n, 2)
+        May be a million times the rest: never added to it.
+
+    Returns
+    -------
+    ndarray, shape (n, 2, 2)
+    """
+    result = np.linalg.inv(np.linalg.cholesky(own))
+    for along in common:
+        w = np.einsum("nij,nj->ni", result, along)
+        root = np.hypot(1.0, np.hypot(w[:, 0], w[:, 1]))
+        # (I + w w^T)^(-1/2) = I - w w^T / (root (1 + root))
+        shrunk = w / root[:, None] / (1.0 + root)[:, None]
+        across = np.einsum("nj,nji->ni", w, result)
+        result = result - shrunk[:, :, None] * across[:, None, :]
+    return np.asarray(result)
 
 
 def solve_weighted(matrix: Array, target: Array) -> tuple[Array, Array, int]:
