@@ -54,9 +54,9 @@ class TechniqueResult:
         and ``status``.
     fit : mapping, optional
         How well a technique of many frames explains them: ``chi_square``, ``deviance``
-        (-2 log likelihood relative to no residual under read noise alone; joint fits only),
+        (-2 log likelihood relative to no residual under read noise alone; of fits by likelihood),
         ``degrees_of_freedom``, ``p_value``, ``misfit``, ``rank``, ``widening`` (factor on all
-        standard deviations; joint fits only) and ``optima``.
+        standard deviations; of fits by likelihood) and ``optima``.
     runtime_s : float
         Time that the technique took [s].
     """

@@ -87,9 +87,21 @@ def judge_draws(
 
 
 def _is_still(drawn: Array) -> bool:
-    """Return whether the frames' ranges differ by no more than their own uncertainty."""
-    if drawn.shape[1] < 2:
+    """Return whether the frames' ranges differ by no more than their own uncertainty.
+
+    What all frames share is no motion, and neither is it their own uncertainty: a shift of all
+    ranges, and a stretch of the whole way by which they differ.
+    """
+    n = drawn.shape[1]
+    if n < 2:
         return True
-    own = drawn - drawn.mean(axis=1, keepdims=True)  # what all frames share is no motion
-    between = float(own.mean(axis=0).var())
-    return between <= _STILL * float(own.var(axis=0).mean())
+    shifted = drawn - drawn.mean(axis=1, keepdims=True)
+    way = shifted.mean(axis=0)
+    size = float(way @ way)
+    if size == 0.0:
+        return True
+    own, freedom = shifted - way, n - 1
+    if n > 2:  # two ranges have no way but their difference
+        own, freedom = shifted - (shifted @ way / size)[:, None] * way, n - 2
+    within = float(np.square(own).sum(axis=1).mean()) / freedom
+    return bool(size / (n - 1) <= _STILL * within)

@@ -97,7 +97,10 @@ def predict(experiment: Experiment, whitener: Array | None = None) -> Prediction
     if isinstance(p.range_prior, Stroke):
         centre = (plus.ranges[:, 4] - minus.ranges[:, 4]) / (2 * STEP)
         jacobian[present, 2, :d] = -centre * law[5]
-        spread = _spread_row(along[present], plus.ranges, minus.ranges, law[5])
+        told = np.square(along[present, :2]).sum(axis=1)
+        if experiment.common_range:
+            told = told.sum(keepdims=True)  # one range, however often it was read
+        spread = _spread_row(told, plus.ranges, minus.ranges, law[5])
         extra.append(np.append(spread, np.zeros(k))[None])
     if experiment.common_range and present.any():
         # one range, one prior of it
@@ -155,14 +158,15 @@ def _room(experiment: Experiment) -> float:
     return room / math.sqrt(12) if room > 0 else math.inf
 
 
-def _spread_row(along: Array, plus: Array, minus: Array, inverse: float) -> Array:
+def _spread_row(told: Array, plus: Array, minus: Array, inverse: float) -> Array:
     """Information of independent ranges on the spread w of their log-normal prior.
 
-    A log range read with variance s^2 is normal with variance v = w^2 + s^2, whose information on
-    w is (dv/dw)^2 / (2 v^2) = 2 w^2 / v^2.
+    The readings' information on each log range is ``told``. A log range read with variance s^2 is
+    normal with variance v = w^2 + s^2, whose information on w is (dv/dw)^2 / (2 v^2) =
+    2 w^2 / v^2.
     """
     rate = (1 / plus[:, 5] - 1 / minus[:, 5]) / (2 * STEP)  # dw / dz
     w = 1 / inverse
     with np.errstate(divide="ignore"):
-        own = 1 / (along[:, 0] ** 2 + along[:, 1] ** 2)
+        own = 1 / told
     return np.asarray(np.sqrt(np.sum(2 * w**2 / (w**2 + own) ** 2)) * rate)

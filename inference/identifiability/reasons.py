@@ -20,7 +20,8 @@ _ALIKE = 0.98  # correlation of two bounds above which one parameter hides behin
 _HELP = 2.0  # a change that lowers a bound by less is not worth its words
 _POWER_LAW = 0.15  # distance of the exponent from a whole number
 _WANTED = 0.1  # relative error that a bound is held against
-_FAR_BACKGROUND = ("background.strength", "background.distance_m")
+_BACKGROUND = ("background.strength", "background.distance_m")
+_PRODUCT = ("object.c0", "object.c2")  # all that a flux that falls as r^-4 tells of an object
 
 
 def _count(number: float) -> str:
@@ -147,7 +148,10 @@ class Diagnosis:
             text = "the readings alone do not even tell its order of magnitude"
         law = self._power_law()
         if law == 4 and parameter.startswith("object.c"):
-            return f"{text}: at these ranges the flux falls as r^-4 and tells c0 c2 alone"
+            if set(_PRODUCT) <= set(self.experiment.names):
+                return f"{text}: at these ranges the flux falls as r^-4 and tells c0 c2 alone"
+            if parameter == "object.c1":
+                return f"{text}: at these ranges the flux falls as r^-4, whatever c1"
         if law == 2 and parameter in ("object.c0", "object.c1"):
             return f"{text}: at these ranges the flux falls as r^-2, whatever c0 and c1"
         if self.experiment.discrepancy is not None:
@@ -159,16 +163,18 @@ class Diagnosis:
                     f"tell it to {_relative(parameter, without)}"
                 )
         name, value = self._look_alike(parameter)
-        if self._is_far_background(parameter, name if abs(value) > _ALIKE else ""):
-            return f"{text}: crosstalk and a far background look alike"
+        if self._is_background(parameter, name if abs(value) > _ALIKE else ""):
+            assert self.experiment.terms.background is not None  # noqa: S101  # it is unknown
+            away = float(self.experiment.terms.background[0, 1])
+            return f"{text}: crosstalk and a background at {away:.2g} m look alike"
         if abs(value) > _ALIKE:
             size = f"is {value:.4f}" if abs(value) < 0.9999 else "exceeds 0.9999 in size"
             return f"{text}: it hides behind {name} (their correlation {size})"
         return text
 
-    def _is_far_background(self, parameter: str, like: str) -> bool:
+    def _is_background(self, parameter: str, like: str) -> bool:
         """Return whether it is crosstalk and background that are taken for one another."""
-        kinds = {"crosstalk": "crosstalk", **dict.fromkeys(_FAR_BACKGROUND, "background")}
+        kinds = {"crosstalk": "crosstalk", **dict.fromkeys(_BACKGROUND, "background")}
         mine = kinds.get("crosstalk" if parameter.startswith("crosstalk") else parameter)
         other = kinds.get("crosstalk" if like.startswith("crosstalk") else like)
         if mine is None:

@@ -11,38 +11,109 @@ import numpy as np
 from inference.multiframe.problem import unknowns_of
 from inference.realtime.known import Known
 from inference.realtime.net import SATURATED, rule_out
+from simulator.errors import listed
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
 from simulator.scene import Scene
 from simulator.sensor import Sensor, SineWaveSensor
 
-__all__ = ["frames_needed", "joint_obstacle"]
+__all__ = [
+    "frames_needed",
+    "joint_obstacle",
+    "linear_obstacle",
+    "ranges_needed",
+    "unmodelled_error",
+]
 
 _MOST_FRAMES = 20_000
 _MOST_HALF_TURNS = 1000.0
 
 
-def frames_needed(unknowns: tuple[str, ...], empty: int) -> int:
+# how the two readings of an empty scene move with what they show, at no special place: crosstalk
+# adds to one of them, the strength moves both, the distance of a pulse's background the first
+_OF_EMPTY = {
+    "crosstalk.w1": (1.0, 0.0),
+    "crosstalk.w2": (0.0, 1.0),
+    "crosstalk.i": (1.0, 0.0),
+    "crosstalk.q": (0.0, 1.0),
+    "background.strength": (0.6, 0.8),
+}
+_OF_DISTANCE = {"pulsed": (1.0, 0.0), "sine_wave": (-0.8, 0.6)}
+
+
+def ranges_needed(kind: str, unknowns: tuple[str, ...], empty: bool) -> int:
+    """Return how many distinct ranges determine the unknowns.
+
+    Parameters
+    ----------
+    kind : str
+        Of the sensor.
+    unknowns : tuple of str
+        Scene paths of what is unknown besides the ranges.
+    empty : bool
+        Whether there are frames without an object: they tell as many numbers as the rank of what
+        moves their readings.
+    """
+    if not empty:
+        return len(unknowns)
+    moves = {**_OF_EMPTY, "background.distance_m": _OF_DISTANCE[kind]}
+    shown = [moves[path] for path in unknowns if path in moves]
+    return len(unknowns) - (int(np.linalg.matrix_rank(np.array(shown))) if shown else 0)
+
+
+def frames_needed(kind: str, unknowns: tuple[str, ...], empty: bool) -> int:
     """Return the least number of frames with an object: one more than determines the unknowns.
 
     Parameters
     ----------
+    kind : str
+        Of the sensor.
     unknowns : tuple of str
         Scene paths of what is unknown besides the ranges.
-    empty : int
-        Number of frames without an object.
+    empty : bool
+        Whether there are frames without an object.
 
     Returns
     -------
     int
         Exactly determined systems have several exact solutions, so one more is asked for.
     """
-    static = sum(
-        path.startswith("crosstalk.") or path in ("background.strength", "background.distance_m")
-        for path in unknowns
-    )
-    told = min(2, static) if empty else 0
-    return len(unknowns) - told + 1
+    return ranges_needed(kind, unknowns, empty) + 1
+
+
+def unmodelled_error(scene: Scene) -> str | None:
+    """Return why a fit over frames does not serve a scene whose object errs, None if it serves.
+
+    Parameters
+    ----------
+    scene : Scene
+        A stated discrepancy is one error for all frames, which noise of each frame cannot stand
+        for: a fit without a term for it would be surer than it may be.
+    """
+    if scene.discrepancy is None:
+        return None
+    return "has no term for the scene's discrepancy; use a posterior"
+
+
+def linear_obstacle(scene: Scene, unknowns: tuple[str, ...]) -> str | None:
+    """Return why no fit linear in an object's numbers serves a scene, None if one does.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    unknowns : tuple of str
+        Scene paths of what is fitted.
+    """
+    if scene.motion == "tangential":
+        return "needs a constant object, and the scene's amplitude changes"
+    if scene.motion == "static" and len(unknowns) > 1:
+        return (
+            "needs an object whose range changes, and the scene's motion is static: one range "
+            f"tells one of {listed(list(unknowns))}; move the object, or state all of them but one "
+            "as known"
+        )
+    return unmodelled_error(scene)
 
 
 def joint_obstacle(
@@ -64,8 +135,9 @@ def joint_obstacle(
             f"needs an object whose range changes, and the scene's motion is {scene.motion}; "
             "ranges, crosstalk and background cannot be told apart otherwise"
         )
-    if scene.discrepancy is not None:
-        return "has no term for the scene's discrepancy; use a posterior"
+    unmodelled = unmodelled_error(scene)
+    if unmodelled:
+        return unmodelled
     if scene.optional_terms:
         return (
             f"keeps every term, and the scene leaves {' and '.join(scene.optional_terms)} to the "
@@ -82,9 +154,9 @@ def joint_obstacle(
     if len(frames) > _MOST_FRAMES:
         return f"serves up to {_MOST_FRAMES} frames, not {len(frames)}; send a part of them"
     usable = rule_out(sensor, frames) != SATURATED
-    empty = int(np.count_nonzero(usable & ~frames.present))
+    empty = bool((usable & ~frames.present).any())
     objects = int(np.count_nonzero(usable & frames.present))
-    needed = frames_needed(unknowns, empty)
+    needed = frames_needed(sensor.kind, unknowns, empty)
     if objects < needed:
         return (
             f"needs at least {needed} unsaturated frames with the object at different ranges for "

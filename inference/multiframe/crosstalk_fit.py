@@ -2,7 +2,9 @@
 
 Ranges come from differential time of flight, which crosstalk does not reach; given them, readings
 are linear in both crosstalks and c2. Errors of the ranges enter the weights as a rank-one part of
-each frame's covariance along the direction in which its readings move with the range.
+each frame's covariance along the direction in which its readings move with the range. Where the
+derivatives are differences of the readings themselves, the result is but a start for the
+likelihood of all frames.
 """
 
 import dataclasses
@@ -11,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
+from inference.multiframe.counts import unmodelled_error
+from inference.multiframe.likelihood_answer import likelihood_answer_from
 from inference.multiframe.linear_answer import linear_answer, without_warnings
 from inference.multiframe.object_fit import carrier, gains
 from inference.multiframe.problem import unknowns_of
-from inference.multiframe.weighted import LinearFit, covariances, solve_weighted
+from inference.multiframe.weighted import LinearFit, covariances, solve_weighted, whitener_of
 from inference.realtime.differential import DIFFERENTIAL
 from inference.realtime.known import Known
 from inference.realtime.net import SATURATED, rule_out
@@ -81,7 +85,7 @@ def _fit(
         design = np.zeros((n, 2, 3))
         design[:, 0, 0] = design[:, 1, 1] = 1.0
         design[:, :, 2] = expected
-        whitener = _whitener(own[used], common[:, used])
+        whitener = whitener_of(own[used], common[:, used])
         matrix = np.einsum("nij,njk->nik", whitener, design[used])
         target = np.einsum("nij,nj->ni", whitener, frames.readings[used])
         target = target - matrix[:, :, ~free] @ x[~free]
@@ -107,22 +111,6 @@ def _fit(
         ):
             break
     return fit
-
-
-def _whitener(own: Array, common: Array) -> Array:
-    """Return W with W^T W the inverse of own + the sum of a a^T over a of common, (n, 2, 2).
-
-    The range's part may be a million times the rest: it is never added to it.
-    """
-    result = np.linalg.inv(np.linalg.cholesky(own))
-    for along in common:
-        w = np.einsum("nij,nj->ni", result, along)
-        root = np.hypot(1.0, np.hypot(w[:, 0], w[:, 1]))
-        # (I + w w^T)^(-1/2) = I - w w^T / (root (1 + root))
-        shrunk = w / root[:, None] / (1.0 + root)[:, None]
-        across = np.einsum("nj,nji->ni", w, result)
-        result = result - shrunk[:, :, None] * across[:, None, :]
-    return np.asarray(result)
 
 
 def _best_roots(task: Task, roots: Array, x: Array) -> NDArray[np.intp]:
@@ -180,6 +168,16 @@ def _solve(task: Task) -> TechniqueResult:
             "the best fit has a negative c2: the readings do not fall with range as the object's "
             "c0 and c1 say; check them, or take joint_fit"
         )
+    if task.frames.derivatives is None:
+        # differences of the readings tell nothing that the readings do not, and their errors are
+        # neither small nor independent: they serve to find where the likelihood is climbed from
+        answer = likelihood_answer_from("crosstalk_fit", task, values)
+        if answer.fit is not None and answer.fit["misfit"]:
+            raise RefusedError(
+                "the ranges by differences in time lead to values that do not explain the "
+                "readings; take joint_fit, which starts from everywhere"
+            )
+        return answer
     light = float(np.median(np.abs(task.frames.readings - np.median(task.frames.readings, axis=0))))
     natural = {
         path: (values[path], np.eye(len(order))[k], light if path != "object.c2" else values[path])
@@ -191,6 +189,9 @@ def _solve(task: Task) -> TechniqueResult:
 def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None) -> str | None:
     if scene.motion != "radial":
         return f"needs radial motion, and the scene's is {scene.motion}"
+    unmodelled = unmodelled_error(scene)
+    if unmodelled:
+        return unmodelled
     if scene.optional_terms:
         return "keeps crosstalk, and the scene leaves it to the data; use a posterior"
     unknown = unknowns_of(sensor, scene)

@@ -4,31 +4,84 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import special
 
 from inference.identifiability.information import Information
+from inference.multiframe.counts import ranges_needed
 from inference.multiframe.information import residuals_and_information
+from inference.multiframe.motion_seen import numbers_shown
 from inference.multiframe.multistart import Optimum
 from inference.multiframe.problem import FitProblem
 from inference.multiframe.ranges import WITHIN
-from inference.multiframe.report import FALSE_ALARM, describe
+from inference.multiframe.report import describe
 from simulator.errors import RefusedError, listed
 
-__all__ = ["LIMIT", "refuse_if_open"]
+__all__ = ["LIMIT", "refuse_if_open", "refuse_if_undetermined"]
+
+_SEEN_WITHOUT_OBJECT = (3, 4, 5, 6)  # crosstalk, strength and distance of the background
+
+_SHOWN = {
+    1.0: "the object does not move: all frames read the same but for noise",
+    2.0: "the object moves too little for this noise: all frames read along a straight line",
+}
 
 LIMIT = 0.1  # relative standard deviation of the ranges that the unknowns share out
 
 
-def _still(problem: FitProblem) -> bool:
-    """Tell whether all frames with an object read the same but for noise."""
-    shown = problem.frames[problem.present]
-    if np.ptp(shown[:, 2]) > 0:
-        return False
-    read, shot, relative = np.asarray(problem.instrument[2]), *problem.instrument[3:]
-    middle = shown[:, :2].mean(axis=0)
-    variance = read**2 + (shot or 0.0) * np.abs(middle) + ((relative or 0.0) * middle) ** 2
-    spread = float((((shown[:, :2] - middle) ** 2) / variance).sum())
-    return bool(spread < special.chdtri(2 * max(len(shown) - 1, 1), FALSE_ALARM))
+def _other_frames(problem: FitProblem) -> str:
+    """Say which other frames would tell more: empty ones, where there are none and they tell."""
+    told = problem.present.all() and np.isin(problem.slots, _SEEN_WITHOUT_OBJECT).any()
+    empty = ", add frames of the empty scene (object_present false)" if told else ""
+    return f"move the object nearer and farther{empty}"
+
+
+def _remedy(problem: FitProblem, numbers: int) -> str:
+    """Say what would help where so many numbers are missing."""
+    count = "one" if numbers == 1 else str(numbers)
+    return f"{_other_frames(problem)}, or state {count} of them as known"
+
+
+def _less_noise(problem: FitProblem) -> str:
+    """Say what would help where noise hides what is unknown."""
+    return (
+        f"{_other_frames(problem)}, lower the noise, state a number as known, or use a posterior "
+        "with priors"
+    )
+
+
+def refuse_if_undetermined(problem: FitProblem, top: Optimum, facts: Information) -> None:
+    """Refuse where frames tell fewer numbers than are unknown.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    top : Optimum
+        Its best optimum.
+    facts : Information
+        There.
+
+    Raises
+    ------
+    RefusedError
+        Where the Jacobian has not full rank, or the readings do not show enough motion.
+    """
+    shown = numbers_shown(problem, top)
+    if facts.rank < len(problem):
+        weights = np.abs(facts.null_space).max(axis=1)
+        names = [name for name, w in zip(problem.names, weights, strict=True) if w > 0.05]
+        cause = _SHOWN.get(shown, "the frames do not tell them apart")
+        raise RefusedError(
+            f"{listed(names or list(problem.names))} cannot be determined (rank {facts.rank} of "
+            f"{len(problem)}): {cause}; {_remedy(problem, len(problem) - facts.rank)}"
+        )
+    kind = "pulsed" if problem.instrument[1] is None else "sine_wave"
+    needed = ranges_needed(kind, problem.names, not problem.present.all())
+    if shown < needed:
+        raise RefusedError(
+            f"{listed(list(problem.names))} cannot be determined: {_SHOWN[shown]}, and that tells "
+            f"{shown:g} of the {needed} numbers that are missing; "
+            f"{_remedy(problem, needed - int(shown))}"
+        )
 
 
 def refuse_if_open(
@@ -38,7 +91,7 @@ def refuse_if_open(
     wider: float,
     others: Sequence[tuple[float, Optimum]] = (),
 ) -> None:
-    """Refuse what the frames do not determine.
+    """Refuse what the frames determine too badly.
 
     Parameters
     ----------
@@ -56,42 +109,22 @@ def refuse_if_open(
     Raises
     ------
     RefusedError
-        Where the Jacobian has not full rank, or the ranges share a relative standard deviation
-        above `LIMIT`, there or at another optimum as far as the intervals of 95 % reach.
+        Where the ranges share a relative standard deviation above `LIMIT`, there or at another
+        optimum as far as the intervals of 95 % reach.
     """
     present = problem.present & np.isfinite(top.positions)
-    still = _still(problem)
-    if facts.rank < len(problem):
-        weights = np.abs(facts.null_space).max(axis=1)
-        names = [name for name, w in zip(problem.names, weights, strict=True) if w > 0.05]
-        cause = (
-            "the object does not move: all frames read the same but for noise"
-            if still
-            else "the frames do not tell them apart"
-        )
-        raise RefusedError(
-            f"{listed(names or list(problem.names))} cannot be determined (rank {facts.rank} of "
-            f"{len(problem)}): {cause}; move the object nearer and farther, add frames of the "
-            "empty scene (object_present false), or state one of them as known"
-        )
     shared = facts.sd_of(facts.response[present])
     typical = wider * float(np.median(shared)) if shared.size else math.inf
     if not typical <= LIMIT:
         open_ones = [
             name
-            for name, item in describe(problem, top.x, facts, wider).items()
+            for name, item in describe(problem, top, facts, wider).items()
             if item["status"] != "identified"
         ]
-        cause = (
-            "the object does not move: all frames read the same but for noise"
-            if still
-            else (f"{listed(open_ones or list(problem.names))} are too uncertain")
-        )
         raise RefusedError(
             f"the ranges would have a common relative standard deviation of {typical:.2g}, more "
-            f"than {LIMIT:g}: {cause}; move the object nearer and farther, add frames of the "
-            "empty scene (object_present false), lower the noise, state a number as known, or use "
-            "a posterior with priors"
+            f"than {LIMIT:g}: {listed(open_ones or list(problem.names))} are too uncertain; "
+            f"{_less_noise(problem)}"
         )
     for excess, other in others:
         if not excess < WITHIN:
@@ -103,7 +136,5 @@ def refuse_if_open(
             raise RefusedError(
                 f"other values of the unknowns explain the frames nearly as well (chi-square "
                 f"{excess:.2g} higher), and with them the ranges would have a common relative "
-                f"standard deviation of {typical:.2g}, more than {LIMIT:g}; move the object nearer "
-                "and farther, add frames of the empty scene (object_present false), lower the "
-                "noise, state a number as known, or use a posterior with priors"
+                f"standard deviation of {typical:.2g}, more than {LIMIT:g}; {_less_noise(problem)}"
             )

@@ -1,66 +1,24 @@
 """One fit of everything unknown over all frames, and the iterative techniques as settings of it."""
 
-import numpy as np
-
 from inference.estimates import TechniqueResult
 from inference.multiframe.counts import joint_obstacle
-from inference.multiframe.determined import refuse_if_open
-from inference.multiframe.information import residuals_and_information
+from inference.multiframe.likelihood_answer import likelihood_answer
 from inference.multiframe.multistart import find_optima
 from inference.multiframe.problem import fit_problem, unknowns_of
-from inference.multiframe.ranges import DECIDED, Answer, frame_ranges
-from inference.multiframe.report import describe, fit_report
-from inference.multiframe.widening import widening
 from inference.realtime.known import Known
 from inference.realtime.net import SATURATED, rule_out
 from inference.realtime.technique import Task, Technique
-from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
 __all__ = ["ITERATIVE_BACKGROUND_CANCELLING", "ITERATIVE_DIFFERENTIAL", "JOINT_FIT"]
 
-_WALKS = 3  # that may meet a better optimum than the last
-
 
 def _solve_as(name: str, task: Task) -> TechniqueResult:
     state = rule_out(task.sensor, task.frames)
-    used = np.flatnonzero(state != SATURATED)
-    problem = fit_problem(task.sensor, task.scene, task.frames.select(used))
-    optima = list(find_optima(problem))
-    if not optima:
-        raise RefusedError(
-            "no values of the unknowns give the readings a likelihood that can be computed; check "
-            "gain, noise and range_m"
-        )
-    for walk in range(_WALKS + 1):
-        top = optima[0]
-        _, facts = residuals_and_information(problem, top.x, top.positions)
-        if facts.rank < len(problem):
-            wider = 1.0
-            break
-        wider, better = widening(problem, top, facts)
-        if better is None or walk == _WALKS:
-            break
-        # the old one lies in the same valley, on the way to this
-        optima[0] = better
-        optima = [one for one in optima if one.deviance >= better.deviance]
-    others = [(one.deviance - top.deviance, one) for one in optima[1:]]
-    refuse_if_open(problem, top, facts, wider, others)
-    undecided = [
-        Answer(one.x, one.deviance - top.deviance, None if k else wider * facts.factor)
-        for k, one in enumerate(optima)
-        if one.deviance - top.deviance <= DECIDED
-    ]
-    return frame_ranges(
-        name,
-        problem,
-        undecided,
-        state,
-        describe(problem, top.x, facts, wider),
-        fit_report(problem, optima, facts, wider),
-    )
+    problem = fit_problem(task.sensor, task.scene, task.frames.select(state != SATURATED))
+    return likelihood_answer(name, problem, find_optima(problem), state)
 
 
 def _differential_obstacle(

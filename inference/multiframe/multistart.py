@@ -14,11 +14,11 @@ from inference.multiframe.polish import polish
 from inference.multiframe.problem import FitProblem
 from inference.multiframe.screen import screen
 
-__all__ = ["Optimum", "find_optima", "optimum_from"]
+__all__ = ["BREADTH", "Optimum", "climb_from", "find_optima", "optimum_from"]
 
 Array = NDArray[np.float64]
 
-_BREADTH = 1.3  # of the screen against the priors
+BREADTH = 1.3  # of the screen against the priors
 _ANCHORS = 2
 _JUDGES = 12  # frames that score a point of the screen
 _FRAMES = 48  # that take part while optima are looked for
@@ -121,7 +121,7 @@ def _starts(problem: FitProblem, count: int) -> Array:
     empty = np.flatnonzero(~problem.present)
     anchors = _spread(order, _ANCHORS)
     uniform = _low_discrepancy(count, len(parameters) + anchors.size)
-    z = special.ndtri(uniform[:, : len(parameters)]) * _BREADTH
+    z = special.ndtri(uniform[:, : len(parameters)]) * BREADTH
     columns = [parameters.names.index(name) for name in problem.names]
     points = problem.coordinates(parameters.natural(z)[:, columns])
     low, high = np.log(problem.support)
@@ -155,7 +155,7 @@ def _starts(problem: FitProblem, count: int) -> Array:
     return np.asarray(points[best[np.isfinite(scores[best])]])
 
 
-def _climb(problem: FitProblem, x: Array, steps: int) -> Optimum:
+def climb_from(problem: FitProblem, x: Array, steps: int) -> Optimum:
     """Climb from a point by Levenberg-Marquardt steps.
 
     Parameters
@@ -214,7 +214,7 @@ def optimum_from(problem: FitProblem, x: Array) -> Optimum:
     Optimum
         Its deviance is inf where the start has no likelihood.
     """
-    return _to_the_top(problem, _climb(problem, x, _MUCH.many))
+    return _to_the_top(problem, climb_from(problem, x, _MUCH.many))
 
 
 def _second_wave(problem: FitProblem, best: Optimum, starts: Array) -> list[Optimum]:
@@ -227,10 +227,10 @@ def _second_wave(problem: FitProblem, best: Optimum, starts: Array) -> list[Opti
             x = best.x.copy()
             x[j] = value
             smaller, rest = held(problem, j, x)
-            there = _climb(smaller, rest, _MUCH.many // 2)
+            there = climb_from(smaller, rest, _MUCH.many // 2)
             if there.deviance < best.deviance + _PROMISING:
                 whole = released(problem, smaller, there.x)
-                found.append(_climb(problem, whole, _MUCH.many // 2))
+                found.append(climb_from(problem, whole, _MUCH.many // 2))
     found.sort(key=lambda optimum: optimum.deviance)
     return [_to_the_top(problem, optimum) for optimum in found[:_FOLLOWED]]
 
@@ -270,9 +270,9 @@ def find_optima(problem: FitProblem) -> tuple[Optimum, ...]:
     few = problem.select(chosen) if chosen.size < problem.present.size else problem
     effort = _LITTLE if len(problem) <= _EASY else _MUCH
     starts = _starts(few, effort.points)
-    first = [_climb(few, x, effort.few) for x in starts[: effort.climbs]]
+    first = [climb_from(few, x, effort.few) for x in starts[: effort.climbs]]
     first.sort(key=lambda optimum: optimum.deviance)
-    second = [_climb(problem, optimum.x, effort.many) for optimum in first[: effort.kept]]
+    second = [climb_from(problem, optimum.x, effort.many) for optimum in first[: effort.kept]]
     second.sort(key=lambda optimum: optimum.deviance)
     last = [_to_the_top(problem, optimum) for optimum in second[: effort.polished]]
     last = [optimum for optimum in last if np.isfinite(optimum.deviance)]

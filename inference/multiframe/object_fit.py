@@ -2,6 +2,8 @@
 
 1 / Phi = x1 r^2 + x2 r^3 + x3 r^4 with x1 = 1 / c2, x2 = c1 / (c0 c2), x3 = 1 / (c0 c2). Ranges
 come from conventional time of flight, or from background intensity before a known background.
+Their noise is treated to first order here; from the values found the likelihood of all frames is
+climbed, in which every range is unknown.
 """
 
 import math
@@ -10,9 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
+from inference.multiframe.counts import linear_obstacle
+from inference.multiframe.likelihood_answer import likelihood_answer_from
 from inference.multiframe.linear_answer import linear_answer, without_warnings
 from inference.multiframe.problem import unknowns_of
-from inference.multiframe.weighted import Equations, LinearFit, Observed, fit_equations
+from inference.multiframe.weighted import (
+    Equations,
+    LinearFit,
+    Observed,
+    fit_equations,
+    refuse_at_rest,
+)
 from inference.realtime.background_intensity import BACKGROUND_INTENSITY
 from inference.realtime.conventional import CONVENTIONAL
 from inference.realtime.known import Known
@@ -34,6 +44,8 @@ _BACKGROUND = (
     "background.shadow.c1",
 )
 _SIGNIFICANT = 3.0  # standard deviations that a coefficient must be above zero
+_NARROW = 0.1  # relative standard deviation of a range up to which first order describes it
+_POWER_LAW = 0.15  # distance of the exponent from a whole number
 
 
 def gains(frames: Frames) -> Array:
@@ -95,11 +107,27 @@ def _map(unknown: tuple[str, ...], known: Known) -> tuple[Array, Array]:
     return np.stack(columns, axis=1), t
 
 
-def _open(x: Array, sd: Array, unknown: tuple[str, ...], reach: float) -> dict[str, str]:
+def _exponent(task: Task, fit: LinearFit) -> float:
+    """Return the power of 1/r with which the flux falls over the ranges of a fit."""
+    used = task.frames.select(np.flatnonzero(fit.used))
+    r = fit.ranges[fit.used]
+    light = np.log(np.maximum(_flux(task, r, used), np.finfo(float).tiny))
+    return -float(np.polynomial.polynomial.polyfit(np.log(r), light, 1)[1])
+
+
+def _open(
+    x: Array, sd: Array, unknown: tuple[str, ...], reach: float, exponent: float
+) -> dict[str, str]:
     """Return which members are not identified, and why."""
     square = x[2] <= _SIGNIFICANT * sd[2] or x[2] * reach * reach <= 1e-12 * abs(x[0])
     fourth = x[0] <= _SIGNIFICANT * sd[0]
     missing: dict[str, str] = {}
+    if (square and abs(exponent - 2) > _POWER_LAW) or (fourth and abs(exponent - 4) > _POWER_LAW):
+        reason = (
+            f"the flux falls as r^-{exponent:.2g} over these ranges, and noise hides how that "
+            "changes: too uncertain; move the object nearer and farther, or lower the noise"
+        )
+        return dict.fromkeys(unknown, reason)
     if square:
         reason = "the flux follows a square law over these ranges: c0 and c1 not identifiable"
         missing |= {path: reason for path in _OBJECT[:2] if path in unknown}
@@ -140,16 +168,22 @@ def _solve(task: Task) -> TechniqueResult:
         size = task.sensor.gain * gains(frames) * _flux(task, r, frames)
         return np.asarray(size[:, None] * carrier(task.sensor, r))
 
-    fit, single = fit_equations(Equations(technique, task, equation, signal, unknown))
+    fit, single = fit_equations(Equations(technique, task, equation, signal, unknown, _NARROW))
+    refuse_at_rest(fit, single, unknown)
     x = to_x @ fit.x + fixed
     sd = np.linalg.norm(to_x @ fit.factor, axis=1)
-    missing = _open(x, np.where(fixed != 0, 0.0, sd), unknown, float(np.nanmax(fit.ranges)))
+    reach = float(np.nanmax(fit.ranges))
+    missing = _open(x, np.where(fixed != 0, 0.0, sd), unknown, reach, _exponent(task, fit))
     if len(missing) == len(unknown) and not missing.get("object.c1", "").startswith("the flux"):
         raise RefusedError("; ".join(dict.fromkeys(missing.values())))
     if "object.c0" in missing and "object.c2" not in missing and "object.c2" in unknown:
         fit, x, to_x = _square_law(task, technique, fit, x, to_x)
     with np.errstate(divide="ignore", invalid="ignore"):
         natural = _natural(x, to_x)
+    if not missing:
+        # the ranges that were regressed on are no truth: the likelihood knows their noise
+        values = {path: natural[path][0] for path in unknown}
+        return likelihood_answer_from("object_fit", task, values)
     kept = {path: natural[path] for path in unknown if path not in missing}
     return linear_answer("object_fit", task, fit, kept, single, missing)
 
@@ -166,7 +200,7 @@ def _square_law(
         size = task.sensor.gain * gains(frames) * _flux(task, r, frames)
         return np.asarray(size[:, None] * carrier(task.sensor, r))
 
-    flat, _ = fit_equations(Equations(technique, task, equation, signal, ("object.c2",)))
+    flat, _ = fit_equations(Equations(technique, task, equation, signal, ("object.c2",), _NARROW))
     # a cubic term without a fourth-order one is no square law: keep the whole fit's c2
     if flat.chi_square - fit.chi_square > _SIGNIFICANT**2 * 2:
         return fit, x, to_x
@@ -175,8 +209,9 @@ def _square_law(
 
 def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None) -> str | None:
     unknown = unknowns_of(sensor, scene)
-    if scene.motion == "tangential":
-        return "needs a constant object, and the scene's amplitude changes"
+    unserved = linear_obstacle(scene, unknown)
+    if unserved:
+        return unserved
     if scene.background is not None:
         missing = [path for path in _BACKGROUND if not known.has(path)]
         if missing:

@@ -170,20 +170,27 @@ def _quantities(scene: Scene) -> list[Quantity | None]:
 
 
 def _supports(
-    sensor: Sensor, scene: Scene, support: tuple[float, float], loudest: float, unit: float
+    sensor: Sensor, scene: Scene, support: tuple[float, float], light: tuple[float, float]
 ) -> tuple[Array, Array]:
-    """Least and largest value of each slot: support of the prior, and what ranges can tell."""
+    """Least and largest value of each slot: support of the prior, and what ranges can tell.
+
+    Object and background are readings at gain factor 1: ``light`` is the loudest reading at the
+    largest gain factor of the frames, and the loudest one of each frame's reading over its own.
+    """
     near, far = support
     wide = (near * near / _WIDEST, far * far * _WIDEST)
-    bright = loudest * unit / sensor.gain
+    dim, bright = light
     farthest = sensor.r0 if isinstance(sensor, PulsedSensor) else math.inf
     box = [
         wide,
         (-math.inf, math.inf),
-        (bright * near * near * 1e-12, bright * far**4 / wide[0] * 1e6),
+        (
+            dim / sensor.gain * near * near * 1e-12,
+            bright / sensor.gain * far**4 / wide[0] * 1e6,
+        ),
         (-math.inf, math.inf),
         (-math.inf, math.inf),
-        (loudest * unit * 1e-9, loudest * unit * 1e3),
+        (dim * 1e-9, bright * 1e3),
         (near * 1e-3, farthest),
         wide,
         # a shadow of which nothing is stated has c1' >= 0 (its default prior)
@@ -208,7 +215,6 @@ def _supports(
         c1 = quantities[k + 1]
         if isinstance(c1, float | int) and c1 < 0.0:
             low[k] = max(low[k], 0.25 * c1 * c1 * (1 + 1e-9))
-    low[3:6], high[3:6] = low[3:6] / unit, high[3:6] / unit
     return low, high
 
 
@@ -251,8 +257,11 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
             "and of the noise's `read`, or leave out frames that something else has spoilt"
         )
     readings = np.ascontiguousarray(np.column_stack([scaled, gain]))
-    loudest = max(float(np.abs(readings[:, :2]).max()), 1.0)
-    low, high = _supports(sensor, scene, (near, far), loudest, unit)
+    loudest = np.maximum(np.abs(scaled).max(axis=1), 1.0) * unit
+    with np.errstate(over="ignore"):
+        light = float(loudest.max() / gain.max()), float((loudest / gain).max())
+    low, high = _supports(sensor, scene, (near, far), light)
+    low[3:6], high[3:6] = low[3:6] / unit, high[3:6] / unit
     index, known = np.full(SLOTS, KNOWN, dtype=np.int64), np.zeros(SLOTS)
     paths = _paths(sensor)
     names = tuple(path for path in paths if path in parameters.names)

@@ -12,6 +12,7 @@ from inference.identifiability.information import Information
 from inference.multiframe.information import residuals_and_information
 from inference.multiframe.multistart import Optimum
 from inference.multiframe.problem import FitProblem
+from inference.multiframe.ranges import WITHIN
 
 __all__ = ["FALSE_ALARM", "describe", "entry", "fit_report"]
 
@@ -29,7 +30,11 @@ def _typical_light(problem: FitProblem, x: Array) -> float:
 
 
 def describe(
-    problem: FitProblem, x: Array, facts: Information, wider: float = 1.0
+    problem: FitProblem,
+    top: Optimum,
+    facts: Information,
+    wider: float = 1.0,
+    undecided: Sequence[Optimum] = (),
 ) -> dict[str, Any]:
     """Return value, standard deviation and status of every unknown.
 
@@ -37,29 +42,36 @@ def describe(
     ----------
     problem : FitProblem
         The problem.
-    x : ndarray, shape (d,)
-        Coordinates.
+    top : Optimum
+        Its best optimum.
     facts : Information
         There.
     wider : float
         Factor on all standard deviations (`widening`).
+    undecided : sequence of Optimum
+        Other values that are not decided against: standard deviations are widened until such
+        values lie as far out as their deviance says, or in the interval of 95 % if that reaches
+        them.
 
     Returns
     -------
     dict
-        By scene path: ``value`` and ``sd`` (Cramer-Rao bound, ranges eliminated, times ``wider``)
-        in SI or reading units, and ``status``: identified (sd below a tenth), weak, not_identified
-        (above 1), of the logarithm of what is positive, of crosstalk against the light of the
-        scene.
+        By scene path: ``value`` and ``sd`` (Cramer-Rao bound, ranges eliminated, times ``wider``,
+        or what ``undecided`` asks for) in SI or reading units, and ``status``: identified (sd
+        below a tenth), weak, not_identified (above 1), of the logarithm of what is positive, of
+        crosstalk against the light of the scene.
     """
-    functionals = problem.chain(x)[problem.slots] * problem.units[:, None]
+    functionals = problem.chain(top.x)[problem.slots] * problem.units[:, None]
     sds = wider * facts.sd_of(functionals)
-    values = problem.natural(x)
-    relative = (
-        wider
-        * facts.sd
-        / np.where(np.isin(problem.slots, _CROSSTALK), max(_typical_light(problem, x), 1e-300), 1.0)
-    )
+    values = problem.natural(top.x)
+    relative = wider * facts.sd
+    for other in undecided:
+        reach = math.sqrt(max(other.deviance - top.deviance, WITHIN))
+        with np.errstate(over="ignore", invalid="ignore"):
+            sds = np.fmax(sds, np.abs(problem.natural(other.x) - values) / reach)
+            relative = np.fmax(relative, np.abs(other.x - top.x) / reach)
+    light = max(_typical_light(problem, top.x), 1e-300)
+    relative = relative / np.where(np.isin(problem.slots, _CROSSTALK), light, 1.0)
     found: dict[str, Any] = {}
     for name, value, sd, size in zip(problem.names, values, sds, relative, strict=True):
         found[name] = entry(float(value), float(sd), float(size))

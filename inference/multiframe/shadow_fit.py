@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
+from inference.multiframe.counts import linear_obstacle
 from inference.multiframe.linear_answer import linear_answer, without_warnings
 from inference.multiframe.object_fit import carrier, gains
 from inference.multiframe.problem import unknowns_of
-from inference.multiframe.weighted import Equations, Observed, fit_equations
+from inference.multiframe.weighted import Equations, Observed, fit_equations, refuse_at_rest
 from inference.realtime.background_cancelling import BACKGROUND_CANCELLING
 from inference.realtime.known import Known
+from inference.realtime.net import SATURATED, rule_out
 from inference.realtime.technique import Task, Technique
 from simulator.errors import RefusedError
 from simulator.frames import Frames
@@ -74,6 +76,7 @@ def _solve(task: Task) -> TechniqueResult:
         return _signal(task, r, frames)
 
     fit, single = fit_equations(Equations(BACKGROUND_CANCELLING, task, equation, signal, unknown))
+    refuse_at_rest(fit, single, unknown)
     y = to_y @ fit.x + fixed
     sd = np.linalg.norm(to_y @ fit.factor, axis=1)
     missing: dict[str, str] = {}
@@ -103,13 +106,14 @@ def _solve(task: Task) -> TechniqueResult:
 
 def _solve_strength(task: Task) -> TechniqueResult:
     c0, c1 = task.known.get(_C0), task.known.get(_C1)
+    clipped = rule_out(task.sensor, task.frames) == SATURATED
 
     def equation(r: Array, frames: Frames) -> Observed:
         visible = _visible(task, r, frames)
         share = r * (r + c1) / (r * (r + c1) + c0)
-        # an empty scene shows all of it
+        # an empty scene shows all of it, unless it is beyond full scale
         empty = ~frames.present
-        bare = _visible_of_empty(task, frames)
+        bare = np.where(clipped, np.nan, _visible_of_empty(task, frames))
         share, visible = np.where(empty, 1.0, share), np.where(empty, bare, visible)
         return Observed(share[:, None], visible)
 
@@ -140,8 +144,9 @@ def _visible_of_empty(task: Task, frames: Frames) -> Array:
 
 def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None) -> str | None:
     unknown = unknowns_of(sensor, scene)
-    if scene.motion == "tangential":
-        return "needs a constant object, and the scene's amplitude changes"
+    unserved = linear_obstacle(scene, unknown)
+    if unserved:
+        return unserved
     if not unknown:
         return "fits the shadow or the background's strength, and both are known"
     if _STRENGTH in unknown and len(unknown) > 1:

@@ -6,6 +6,7 @@ changes with both readings, the range along with them, and the weights from a fi
 """
 
 import dataclasses
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -14,7 +15,7 @@ from scipy import linalg
 
 from inference.estimates import TechniqueResult
 from inference.realtime.technique import Task, Technique
-from simulator.errors import RefusedError
+from simulator.errors import RefusedError, listed
 from simulator.frames import Frames
 from simulator.sensor import PulsedSensor, Sensor
 
@@ -24,7 +25,9 @@ __all__ = [
     "Observed",
     "covariances",
     "fit_equations",
+    "refuse_at_rest",
     "solve_weighted",
+    "whitener_of",
 ]
 
 Array = NDArray[np.float64]
@@ -32,6 +35,7 @@ Array = NDArray[np.float64]
 _PASSES = 20
 _STEP = 0.05  # standard deviations of a reading by which it is moved to see what follows
 _ROUNDING = 1e-12
+_STILL = 4.0  # variance of the ranges over that of their noise up to which an object is at rest
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -105,6 +109,31 @@ def covariances(sensor: Sensor, readings: Array, signal: Array) -> Array:
     return np.asarray(out)
 
 
+def whitener_of(own: Array, common: Array) -> Array:
+    """Return W with W^T W the inverse of own + the sum of a a^T over a of common.
+
+    Parameters
+    ----------
+    own : ndarray, shape (n, 2, 2)
+        Covariances.
+    common : ndarray, shape (k, n, 2)
+        May be a million times the rest: never added to it.
+
+    Returns
+    -------
+    ndarray, shape (n, 2, 2)
+    """
+    result = np.linalg.inv(np.linalg.cholesky(own))
+    for along in common:
+        w = np.einsum("nij,nj->ni", result, along)
+        root = np.hypot(1.0, np.hypot(w[:, 0], w[:, 1]))
+        # (I + w w^T)^(-1/2) = I - w w^T / (root (1 + root))
+        shrunk = w / root[:, None] / (1.0 + root)[:, None]
+        across = np.einsum("nj,nji->ni", w, result)
+        result = result - shrunk[:, :, None] * across[:, None, :]
+    return np.asarray(result)
+
+
 def solve_weighted(matrix: Array, target: Array) -> tuple[Array, Array, int]:
     """Solve least squares by QR with scaled columns.
 
@@ -148,6 +177,9 @@ class Equations:
         (ranges, frames) -> the object's part of the readings, shape (n, 2).
     unknowns : tuple of str
         Names, one a column of the equation.
+    widest : float
+        Relative standard deviation of a range above which its frame takes no part: first order
+        does not describe what its noise does to the equation.
     """
 
     technique: Technique
@@ -155,6 +187,7 @@ class Equations:
     equation: Callable[[Array, Frames], Observed]
     signal: Callable[[Array, Frames], Array]
     unknowns: tuple[str, ...]
+    widest: float = math.inf
 
     def slopes(self, ranges: Array) -> tuple[Observed, Observed, Array]:
         """Return how the equations change with the first and the second reading.
@@ -230,7 +263,9 @@ def fit_equations(equations: Equations) -> tuple[LinearFit, TechniqueResult]:
         if (result.root_count > 1).any():
             last = np.maximum(result.root_count - 1, 0)
             starts.append(result.roots_m[np.arange(last.size), last])
-        fits = [_fit_from(equations, result.roots_m, start) for start in starts]
+        usable = result.roots_sd_m <= equations.widest * result.roots_m
+        roots = np.where(usable | (equations.widest == math.inf), result.roots_m, np.nan)
+        fits = [_fit_from(equations, roots, start) for start in starts]
     good = [fit for fit in fits if fit.rank == len(unknowns)]
     if not good:
         raise RefusedError(
@@ -282,3 +317,40 @@ def _best_roots(equations: Equations, roots: Array, x: Array) -> Array:
         misses.append(np.where(np.isnan(miss), np.inf, miss))
     index = np.argmin(np.stack(misses, axis=1), axis=1)
     return np.asarray(roots[np.arange(roots.shape[0]), index])
+
+
+def refuse_at_rest(fit: LinearFit, single: TechniqueResult, unknowns: tuple[str, ...]) -> None:
+    """Refuse where the ranges differ by no more than their own noise.
+
+    They are regressed on: where their differences are noise, what follows from them is noise too,
+    and surer of itself the more frames there are. Of a still object `_STILL` is exceeded in at
+    most 1e-3 of sets of four frames or more.
+
+    Parameters
+    ----------
+    fit : LinearFit
+        The fit.
+    single : TechniqueResult
+        Ranges of single frames, of which the fit has chosen.
+    unknowns : tuple of str
+        What is fitted.
+
+    Raises
+    ------
+    RefusedError
+        There, with the remedy; never for one unknown, which one range tells.
+    """
+    if len(unknowns) < 2:
+        return
+    r = fit.ranges[fit.used]
+    roots, sds = single.roots_m[fit.used], single.roots_sd_m[fit.used]
+    chosen = np.nanargmin(np.abs(roots - r[:, None]), axis=1)
+    own = float(np.nanmedian(sds[np.arange(r.size), chosen] / r)) ** 2
+    between = float(np.var(np.log(r)))
+    if not between > _STILL * own:
+        raise RefusedError(
+            "the object hardly moves: the ranges of single frames differ by "
+            f"{math.sqrt(between):.2g} of themselves and are uncertain by {math.sqrt(own):.2g}; "
+            f"{listed(list(unknowns))} need distinct ranges; move the object nearer and farther, "
+            f"or state {'one' if len(unknowns) == 2 else len(unknowns) - 1} of them as known"
+        )

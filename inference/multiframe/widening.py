@@ -16,7 +16,7 @@ from inference.multiframe.held import held, released
 from inference.multiframe.multistart import Optimum, optimum_from
 from inference.multiframe.problem import FitProblem
 
-__all__ = ["widening"]
+__all__ = ["BETTER", "loosely_told", "shift_of", "widening"]
 
 Array = NDArray[np.float64]
 
@@ -27,9 +27,42 @@ _HELD = 2  # unknowns that are held in turn
 _ENOUGH = 4.0  # deviance that two standard deviations cost
 _LEAST = 0.01  # below which rounding of an optimum counts
 _FARTHEST = 1.0  # change of the mean log range beyond which nothing more need be known
-_BETTER = 0.05  # deviance by which another optimum is better
+BETTER = 0.05  # deviance by which another optimum is better
 _STRIDE = 1.0  # most that a coordinate is moved ahead
 _CROSSTALK = (3, 4)
+
+
+def loosely_told(problem: FitProblem, facts: Information) -> bool:
+    """Tell whether anything but crosstalk is so uncertain that curvature may not tell everything.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    facts : Information
+        At its best optimum.
+    """
+    return bool((facts.sd[~np.isin(problem.slots, _CROSSTALK)] >= _LINEAR).any())
+
+
+def shift_of(problem: FitProblem, top: Optimum, facts: Information, other: Optimum) -> float:
+    """Return how far other values shift the ranges, in standard deviations of their common scale.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    top : Optimum
+        Its best optimum.
+    facts : Information
+        There, of full rank.
+    other : Optimum
+        Other values.
+    """
+    present = problem.present & np.isfinite(top.positions) & np.isfinite(other.positions)
+    spread = float(np.linalg.norm(facts.response[present].mean(axis=0) @ facts.factor))
+    shift = abs(float(np.mean(other.positions[present] - top.positions[present])))
+    return shift / spread if spread > 0.0 else 0.0
 
 
 def widening(problem: FitProblem, top: Optimum, facts: Information) -> tuple[float, Optimum | None]:
@@ -50,9 +83,7 @@ def widening(problem: FitProblem, top: Optimum, facts: Information) -> tuple[flo
         At least 1, and 1 where the unknowns are fixed so well that curvature tells everything;
         and a better optimum, if the walk met one.
     """
-    d = len(problem)
-    logarithms = ~np.isin(problem.slots, _CROSSTALK)
-    if d < 2 or not (facts.sd[logarithms] >= _LINEAR).any():
+    if len(problem) < 2 or not loosely_told(problem, facts):
         return 1.0, None
     present = problem.present & np.isfinite(top.positions)
     mean = facts.response[present].mean(axis=0)
@@ -89,7 +120,7 @@ def _walk(
         if not math.isfinite(found.deviance):
             break
         cost = found.deviance - top.deviance
-        if cost < -_BETTER:
+        if cost < -BETTER:
             better = optimum_from(problem, released(problem, smaller, found.x))
             return widest, better if better.deviance < top.deviance else None
         shift = abs(float(np.mean(found.positions[present] - top.positions[present])))

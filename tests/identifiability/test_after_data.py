@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from inference.identifiability.after_data import judge_draws
+from inference.identifiability.after_data import _is_still, judge_draws
 from inference.identifiability.status import Identifiability
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import parse_scene
@@ -48,6 +48,26 @@ def test_more_spread_than_the_curvature_says() -> None:
     row = judged(z, log_r)["object.c2"]
     assert row.status == "not_identified"
     assert "there are several solutions, or one valley that bends" in row.reason
+
+
+@pytest.mark.parametrize("stretch", [0.3, 0.6, 1.0])
+def test_a_way_whose_length_is_uncertain_is_a_way(stretch: float) -> None:
+    """Draws that shift and stretch the whole way together differ in that, not frame by frame.
+
+    Of ranges at rest, by contrast, each scatters as far from draw to draw as from frame to frame.
+    """
+    rng = np.random.default_rng(6)
+    way = np.linspace(-0.35, 0.35, 8)
+    factor = 1.0 + stretch * rng.standard_normal((2000, 1))
+    shift = 0.3 * rng.standard_normal((2000, 1))
+    own = 0.02 * rng.standard_normal((2000, 8))
+    assert not _is_still(factor * way + shift + own)
+    for frames in (2, 3, 8, 400):
+        # their mean ranges scatter by as much: four times that in 1e-3 of cases of 8 frames
+        means = 0.02 * np.sqrt(frames / (frames - 1)) * np.where(np.arange(frames) % 2, 1.0, -1.0)
+        noise = 0.02 * rng.standard_normal((2000, frames))
+        assert _is_still(means + shift + noise)
+        assert not _is_still(5 * means + shift + noise)
 
 
 @pytest.mark.parametrize("law", ["loguniform", "reference"])

@@ -105,6 +105,24 @@ def test_spread_of_a_stroke_known_exactly() -> None:
         assert found.sd[j] == pytest.approx(own / math.sqrt(1 + own**2), rel=1e-3)
 
 
+@pytest.mark.parametrize("frames", [2, 200])
+def test_one_range_read_often_tells_no_more_of_a_stroke_than_one_range(frames: int) -> None:
+    """Of a static object there is one draw from the law, however often it is seen.
+
+    What noise of 1e-4 leaves open of log r is 1e-8 of the variance of the law.
+    """
+    scene = {
+        "object": {"c0": 0.0769, "c1": -0.123, "c2": 0.0957},
+        "motion": "static",
+        "range_m": {"prior": "stroke", "low": 0.2, "high": 2.0},
+    }
+    sensor = sensor_of("pulsed", 1e6)
+    one, many = (
+        identifiability(sensor, parse_scene(scene), [0.7] * n).prediction.sd for n in (1, frames)
+    )
+    assert many == pytest.approx(one, rel=1e-6)
+
+
 def test_error_of_the_flux() -> None:
     """A smooth error of the flux widens all bounds, more the larger it is; a vanishing one none."""
     scene = {"object": {"c0": 0.0769, "c1": -0.123, "c2": 0.0957}, "crosstalk": UNKNOWN_CROSSTALK}

@@ -104,7 +104,7 @@ def test_crosstalk_and_a_far_background_look_alike() -> None:
     found = rows(foresee(scene, STROKE))
     for name in ("crosstalk.w2", "background.distance_m"):
         assert found[name].status != "identified"
-        assert "crosstalk and a far background look alike" in found[name].reason
+        assert "crosstalk and a background at 3 m look alike" in found[name].reason
     assert "knowing the crosstalk would lower the bound" in found["background.distance_m"].reason
     # without crosstalk they do not, and all is identified
     alone = foresee({"object": OBJECT, "background": BACKGROUND | known}, STROKE)
@@ -120,6 +120,21 @@ def test_square_law() -> None:
     near = rows(foresee(large, np.geomspace(0.1, 1.0, 40).tolist()))
     assert "falls as r^-2, whatever c0 and c1" in near["object.c0"].reason
     assert near["object.c2"].status == "identified"
+
+
+@pytest.mark.parametrize("member", ["c0", "c2"])
+def test_a_fourth_law_tells_the_one_that_is_unknown_of_two(member: str) -> None:
+    """Its product with the known one is told, so that their product hides nothing."""
+    known = {key: value for key, value in OBJECT.items() if key != member}
+    scene = {"object": known, "crosstalk": UNKNOWN_CROSSTALK}
+    found = rows(foresee(scene, np.geomspace(3.0, 10.0, 40).tolist()))
+    row = found[f"object.{member}"]
+    assert row.status != "identified"
+    assert "alone tell it to" in row.reason or "order of magnitude" in row.reason
+    assert "c0 c2 alone" not in row.reason
+    shape = {"object": {"c0": OBJECT["c0"], "c2": OBJECT["c2"]}}
+    reason = rows(foresee(shape, np.geomspace(3.0, 10.0, 40).tolist()))["object.c1"].reason
+    assert "falls as r^-4, whatever c1" in reason
 
 
 def test_a_longer_stroke() -> None:

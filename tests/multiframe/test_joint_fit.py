@@ -11,7 +11,7 @@ from scipy import special
 from inference.estimate import estimate
 from inference.estimates import Status, TechniqueResult
 from inference.identifiability.experiment import Experiment, information
-from inference.multiframe import joint_fit
+from inference.multiframe import likelihood_answer
 from inference.multiframe.information import residuals_and_information
 from inference.multiframe.multistart import Optimum, find_optima, optimum_from
 from inference.multiframe.problem import fit_problem
@@ -299,7 +299,7 @@ def test_walks_without_end_leave_an_answer_in_one_piece(monkeypatch: pytest.Monk
     def restless(_: Any, top: Optimum, __: Any) -> tuple[float, Optimum]:
         return 1.0, dataclasses.replace(top, x=top.x * (1 + 1e-4), deviance=top.deviance - 1.0)
 
-    monkeypatch.setattr(joint_fit, "widening", restless)
+    monkeypatch.setattr(likelihood_answer, "widening", restless)
     sensor = sensor_of("pulsed")
     result = fitted(sensor, {}, data(sensor, {"object": OBJECT}, path(16)))
     assert result.parameters is not None
@@ -307,3 +307,27 @@ def test_walks_without_end_leave_an_answer_in_one_piece(monkeypatch: pytest.Monk
     for name, value in result.fit["optima"][0]["parameters"].items():
         assert result.parameters[name]["value"] == value
     assert result.fit["optima"][0]["excess_deviance"] == 0.0
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_a_gain_factor_scales_what_is_found_and_nothing_else(factor: float) -> None:
+    """Readings at a millionth of the gain are those of a millionth of the light at full gain."""
+    sensor = sensor_of("pulsed", 1e4)
+    frames = data(sensor, {"object": OBJECT, "background": WALL}, path(12, 2))
+    scaled = dataclasses.replace(frames, gain=np.full(len(frames), factor))
+    found = []
+    for gain, shown in ((1.0, frames), (1.0 / factor, scaled)):
+        strength = {"prior": "lognormal", "median": 0.03 * gain, "sigma": 1.0}
+        scene = {
+            "object": {key: OBJECT[key] for key in ("c0", "c1")},
+            "background": {**WALL, "strength": strength},
+        }
+        other = sensor.model_copy(update={"gain": gain})
+        (result,) = estimate(other, parse_scene(scene), shown, ["joint_fit"]).results
+        assert result.parameters is not None
+        item = result.parameters["background.strength"]
+        found.append([item["value"] / gain, item["sd"] / gain])
+        assert (result.status[:12] == Status.UNIQUE).all()
+    # both stop within 1e-3 of the deviance at the top: 0.03 sd
+    assert abs(found[1][0] - found[0][0]) < 0.1 * found[0][1]
+    assert found[1][1] == pytest.approx(found[0][1], rel=1e-3)

@@ -11,13 +11,24 @@ from scipy import special
 
 from inference.estimate import estimate
 from inference.estimates import Status, TechniqueResult
-from inference.multiframe.crosstalk_fit import _whitener
+from inference.multiframe.weighted import whitener_of
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
 from simulator.scene import parse_scene
 from simulator.sensor import Sensor, parse_sensor
 from simulator.simulate import mean_readings
-from tests.multiframe.scenes import KINDS, OBJECT, VAGUE, WALL, data, path, sensor_of, values_of
+from simulator.trajectories import SampledTrajectory
+from tests.multiframe.scenes import (
+    KINDS,
+    OBJECT,
+    SIGNAL_AT_1M,
+    VAGUE,
+    WALL,
+    data,
+    path,
+    sensor_of,
+    values_of,
+)
 
 pytestmark = pytest.mark.xdist_group("multiframe")  # compile each kernel once
 
@@ -169,6 +180,125 @@ def test_crosstalk_fit_attains_its_stated_scatter(kind: str, known: tuple[str, .
     assert chi_square < 1.05 * special.chdtri(freedom, 1e-5)
 
 
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+@pytest.mark.parametrize("distance", [0.3, 0.7])
+def test_noise_of_a_still_object_is_not_its_law(kind: str, distance: float) -> None:
+    """Ten sets of 200 frames; more frames would make an answer surer, not better."""
+    sensor = sensor_of(kind, SIGNAL_AT_1M / 1e-5)
+    for seed in range(10):
+        frames = data(sensor, {"object": OBJECT}, path(200, span=(distance, distance)), seed)
+        found = estimate(sensor, parse_scene({}), frames, ["object_fit"])
+        assert not found.results
+        (left,) = (item for item in found.left_out if item.name == "object_fit")
+        assert "hardly moves" in left.reason
+    # with c2 alone unknown one range tells all: 6 standard deviations, false alarm 2e-9
+    scene = {"object": {key: OBJECT[key] for key in ("c0", "c1")}}
+    (result,) = served(sensor, scene, frames, ["object_fit"])
+    assert result.parameters is not None
+    item = result.parameters["object.c2"]
+    assert abs(item["value"] - OBJECT["c2"]) < 6 * item["sd"]
+
+
+def test_the_shadow_of_a_still_object() -> None:
+    """One range tells one number of it, and noise the other."""
+    sensor = sensor_of("pulsed", SIGNAL_AT_1M / 1e-5)
+    scene = parse_scene({"object": OBJECT, "background": {**WALL, "shadow": {}}})
+    for seed in range(5):
+        truth = {"object": OBJECT, "background": WALL}
+        frames = data(sensor, truth, path(40, span=(0.6, 0.6)), seed)
+        found = estimate(sensor, scene, frames, ["shadow_fit"])
+        assert not found.results
+        (left,) = (item for item in found.left_out if item.name == "shadow_fit")
+        assert "hardly moves" in left.reason
+
+
+def test_a_flux_between_square_and_fourth_law_is_called_neither() -> None:
+    """About 0.3 m it falls as r^-3.1."""
+    sensor = sensor_of("pulsed", SIGNAL_AT_1M / 1e-5)
+    said = set()
+    for seed in range(8):
+        frames = data(sensor, {"object": OBJECT}, path(40, span=(0.28, 0.32)), seed)
+        (result,) = served(sensor, {}, frames, ["object_fit"])
+        assert result.parameters is not None
+        said |= {item.get("reason", "") for item in result.parameters.values()}
+    assert any("r^-3.1" in reason for reason in said)
+    assert not any("law" in reason for reason in said)
+
+
+@pytest.mark.parametrize("snr", [77.0, 386.0])
+def test_ranges_that_are_themselves_uncertain_are_no_misfit(snr: float) -> None:
+    """At 2 m one is uncertain by its own size. Two misfits of 20 healthy sets: once in 5,000.
+
+    Each parameter's sum of squares over the sets, false alarm 1e-5 at either end.
+    """
+    sensor = sensor_of("pulsed", snr)
+    truth = {"object": OBJECT}
+    sets, misfits = 20, 0
+    total = dict.fromkeys(("object.c0", "object.c1", "object.c2"), 0.0)
+    for seed in range(sets):
+        (result,) = served(sensor, {}, data(sensor, truth, path(40), seed), ["object_fit"])
+        assert result.fit is not None
+        assert result.parameters is not None
+        misfits += result.fit["misfit"]
+        for key, value in values_of(sensor, truth).items():
+            item = result.parameters[key]
+            total[key] += ((item["value"] - value) / item["sd"]) ** 2
+    assert misfits < 2
+    assert max(total.values()) < special.chdtri(sets, 1e-5)
+
+
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+def test_crosstalk_from_differences_in_time_is_as_certain_as_said(kind: str) -> None:
+    """Sum of squares of each parameter over 20 sets; false alarm 1e-5 each at the upper end."""
+    sensor = sensor_of(kind, SIGNAL_AT_1M / 1e-5)
+    truth = {"object": OBJECT, "crosstalk": [0.01, 0.02]}
+    scene = {"object": {key: OBJECT[key] for key in ("c0", "c1")}, "crosstalk": [VAGUE, VAGUE]}
+    time = np.linspace(0.0, 2.0, 200)
+    way = SampledTrajectory(range_m=(0.8 - 0.5 * np.cos(np.pi * time)).tolist())
+    sets = 20
+    total: dict[str, float] = {}
+    for seed in range(sets):
+        frames = dataclasses.replace(data(sensor, truth, way, seed), time_s=time)
+        (result,) = served(sensor, scene, frames, ["crosstalk_fit"])
+        assert result.parameters is not None
+        for key, item in result.parameters.items():
+            miss = (item["value"] - values_of(sensor, truth)[key]) / item["sd"]
+            total[key] = total.get(key, 0.0) + miss**2
+    assert len(total) == 3
+    assert max(total.values()) < special.chdtri(sets, 1e-5)
+
+
+def test_crosstalk_from_differences_that_explain_nothing_is_refused() -> None:
+    """Ten readings are off by a hundred standard deviations."""
+    sensor = sensor_of("pulsed", SIGNAL_AT_1M / 1e-5)
+    truth = {"object": OBJECT, "crosstalk": [0.01, 0.02]}
+    scene = {"object": {key: OBJECT[key] for key in ("c0", "c1")}, "crosstalk": [VAGUE, VAGUE]}
+    time = np.linspace(0.0, 1.0, 100)
+    frames = data(sensor, truth, path(100, span=(0.3, 1.0)))
+    frames.readings[::10, 0] += 1e-3
+    timed = dataclasses.replace(frames, time_s=time)
+    found = estimate(sensor, parse_scene(scene), timed, ["crosstalk_fit"])
+    assert not found.results
+    (left,) = (item for item in found.left_out if item.name == "crosstalk_fit")
+    assert "do not explain the readings; take joint_fit" in left.reason
+
+
+def test_empty_frames_beyond_full_scale_tell_no_strength() -> None:
+    """What is clipped at nine tenths of the wall alone would pull the strength down."""
+    sensor = sensor_of("pulsed", 1e3)
+    truth = {"object": {**OBJECT, "c2": 5e-4}, "background": WALL}
+    scene = {**truth, "background": {**WALL, "strength": PRIOR}}
+    frames = data(sensor, truth, path(10, 3, span=(0.3, 0.45)))
+    full = 0.9 * WALL["strength"]
+    assert frames.readings[:10, 1].max() < full < frames.readings[10:, 1].min()
+    limited = sensor.model_copy(update={"full_scale": (1.0, full)})
+    clipped = dataclasses.replace(frames, readings=np.minimum(frames.readings, (1.0, full)))
+    (result,) = served(limited, scene, clipped, ["shadow_fit"])
+    (without,) = served(sensor, scene, frames.select(np.arange(10)), ["shadow_fit"])
+    assert (result.status[10:] == Status.SATURATED).all()
+    assert result.parameters == without.parameters
+
+
 def test_obstacles_name_what_is_missing() -> None:
     sensor = sensor_of("pulsed", 1e4)
     frames = data(sensor, {"object": OBJECT}, path(6))
@@ -178,6 +308,17 @@ def test_obstacles_name_what_is_missing() -> None:
         found = estimate(sensor, parse_scene(scene), shown, names)
         return {item.name: item.reason for item in found.left_out}
 
+    wanted = reasons({"motion": "static"})
+    assert "move the object" in wanted["object_fit"]
+    wanted = reasons({"object": OBJECT, "background": {**WALL, "shadow": {}}, "motion": "static"})
+    assert "move the object" in wanted["shadow_fit"]
+    for name, scene in (
+        ("object_fit", {}),
+        ("crosstalk_fit", {"object": OBJECT, "crosstalk": [VAGUE, VAGUE]}),
+        ("shadow_fit", {"object": OBJECT, "background": {**WALL, "shadow": {}}}),
+    ):
+        timed = dataclasses.replace(frames, time_s=np.arange(6.0))
+        assert "discrepancy" in reasons({**scene, "discrepancy": 0.02}, timed)[name]
     assert "is known" in reasons({"object": OBJECT})["object_fit"]
     assert "crosstalk" in reasons({"crosstalk": [VAGUE, VAGUE]})["object_fit"]
     wall = {**WALL, "strength": PRIOR}
@@ -200,7 +341,7 @@ def test_weights_where_the_range_is_far_less_certain_than_the_readings(noise: fl
     rng = np.random.default_rng(1)
     own = noise**2 * np.array([[[1.0, 0.3], [0.3, 2.0]]])
     common = rng.standard_normal((2, 1, 2)) * np.array([noise, 1e-3])[:, None, None]
-    found = _whitener(own, common)[0]
+    found = whitener_of(own, common)[0]
     with mpmath.workdps(50):
         total = mpmath.matrix(own[0].tolist())
         for part in common[:, 0]:

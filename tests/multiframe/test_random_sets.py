@@ -1,5 +1,7 @@
 """The small version of the study in `benchmarks/joint_fit.py`."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from inference.multiframe.information import residuals_and_information
 from inference.multiframe.multistart import find_optima, optimum_from
 from inference.multiframe.problem import fit_problem
 from inference.multiframe.ranges import WITHIN, Answer, frame_ranges
+from inference.multiframe.report import describe
 from inference.multiframe.widening import widening
 from tests.multiframe.random_sets import CLASSES, outcome_of, random_set
 
@@ -25,10 +28,24 @@ def test_a_fit_without_a_guess_finds_the_optimum_of_a_start_at_the_truth(kind: s
     assert sum(right) >= 13
 
 
-def test_it_does_so_with_everything_unknown() -> None:
-    """Of 4 sets more than 2 fail in 4e-3 of cases where 90 % are right."""
-    right = [outcome_of(random_set("everything", "pulsed", seed)).right for seed in range(4)]
-    assert sum(right) >= 2
+@pytest.mark.parametrize("seed", [3, 5, 13, 17])
+def test_it_does_so_with_everything_unknown(seed: int) -> None:
+    """Four sets that tell enough to be answered: two thirds of such sets are rightly refused.
+
+    A median of |z| over the frames, which share their errors, is above 3.3 in 1e-3 of sets.
+    """
+    outcome = outcome_of(random_set("everything", "pulsed", seed))
+    assert not outcome.refused
+    assert outcome.right
+    assert len(outcome.misses) > 20
+    assert np.median(np.abs(outcome.misses)) < 3.3
+
+
+def test_what_is_open_with_everything_unknown_is_refused() -> None:
+    """Two sets of which the truth leaves the ranges open by half of the limit and more."""
+    outcomes = [outcome_of(random_set("everything", "pulsed", seed)) for seed in (0, 1)]
+    assert all(outcome.refused for outcome in outcomes)
+    assert all(outcome.right for outcome in outcomes)
 
 
 def test_values_that_fit_nearly_as_well_and_leave_the_ranges_open_are_a_reason_to_refuse() -> None:
@@ -71,6 +88,27 @@ def test_widened_intervals_reach_as_far_as_a_profile_walked_in_small_steps() -> 
     # curvature alone reaches half as far; the walk looks at a few points, not at this one
     assert spread < 0.6 * reach
     assert 0.85 * reach < wider * spread < 1.5 * reach
+
+
+@pytest.mark.parametrize("excess", [0.5, 2.0, 8.0])
+def test_parameters_reach_as_far_as_optima_that_are_not_decided_against(excess: float) -> None:
+    """In standard deviations by the root of what they cost, inside of 95 % by the interval's."""
+    one = random_set("object", "pulsed", 0)
+    problem = fit_problem(one.sensor, one.scene, one.simulation.frames)
+    top = find_optima(problem)[0]
+    _, there = residuals_and_information(problem, top.x, top.positions)
+    alone = describe(problem, top, there)
+    x = top.x.copy()
+    x[problem.names.index("object.c0")] += 3.0
+    other = dataclasses.replace(top, x=x, deviance=top.deviance + excess)
+    both = describe(problem, top, there, 1.0, [other])
+    reach = np.sqrt(max(excess, WITHIN))
+    value = alone["object.c0"]["value"]
+    assert both["object.c0"]["value"] == value
+    # of c0 = exp(x)
+    assert both["object.c0"]["sd"] == pytest.approx(value * np.expm1(3.0) / reach, rel=1e-9)
+    assert both["object.c0"]["status"] == "not_identified"  # 3 / reach is above one
+    assert both["object.c2"] == alone["object.c2"]
 
 
 def test_a_mode_merged_with_a_less_certain_one_takes_over_its_interval() -> None:
