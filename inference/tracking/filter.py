@@ -26,10 +26,10 @@ from inference.tracking.motion import Rules, motion_over, presence_over
 from inference.tracking.report import OUTLIER, STATUS, SURPRISE, report
 from inference.tracking.shared_error import ANCHOR, certainty
 from inference.tracking.square_root import drop_lightest, merge, merge_equals, move
-from inference.tracking.state import COUNT
 from simulator.compiled import compiled
 
 __all__ = [
+    "COUNT",
     "EMPTY",
     "EMPTY_SATURATED",
     "PENDING",
@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 # what is known of a frame before it is looked at
 USABLE, SATURATED, EMPTY, EMPTY_SATURATED = range(4)
 # places in the state's numbers
-TIME, PENDING, RUNNING = range(3)
+TIME, PENDING, RUNNING, COUNT = range(4)
 _NEVER = -math.inf
 _LEAST = -700.0  # log of a weight that underflows
 _ODD = math.log(1e-2)  # log weight from which on a frame may have been an outlier

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.archive import pack, unpack
+from inference.tracking.filter import COUNT
 from simulator.errors import InvalidInputError
 
 __all__ = ["TrackState", "check_state", "state_from_bytes", "state_to_bytes"]
@@ -28,7 +29,6 @@ _BROKEN = (
     zipfile.BadZipFile,
     zlib.error,
 )
-COUNT = 3  # place of the number of hypotheses in the state's numbers
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
