@@ -41,6 +41,21 @@ def test_estimate(capsys: pytest.CaptureFixture[str], scene: Path, frames: Path)
     assert [result["technique"] for result in body["results"]] == ["conventional", "intensity"]
 
 
+def test_an_estimate_that_no_technique_serves_is_no_answer(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, frames: Path
+) -> None:
+    unknown = [{"prior": "normal", "mean": 0.0, "sd": 1.0}] * 2
+    path = tmp_path / "still.json"
+    path.write_text(
+        json.dumps({"sensor": SENSOR, "scene": {"crosstalk": unknown, "motion": "static"}})
+    )
+    code, out, err = run(capsys, "estimate", frames, "--scene", path)
+    assert (code, err) == (3, "")
+    body = json.loads(out)
+    assert body["chosen"] is None
+    assert any("needs motion" in item["reason"] for item in body["left_out"])
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".ndjson", ".json"])
 def test_a_file_that_opens_but_cannot_be_read_is_named(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path, suffix: str
