@@ -58,7 +58,7 @@ REFUSED: dict[str, tuple[Body, str]] = {
     ),
     "too many frames": (
         body({}, {"w1": [0.01] * 2001, "w2": [0.5] * 2001}),
-        "every 2th",
+        "one frame in 2",
     ),
 }
 

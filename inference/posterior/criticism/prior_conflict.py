@@ -191,8 +191,7 @@ def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
     )
     chosen = _few(z)
     gain = np.median(_best_fit(wide, chosen) - _best_fit(density, chosen), axis=0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        out = np.abs(distribution.to_normal(np.where(np.isnan(middle), ends.mean(), middle)))
+    out = _deviations(distribution, np.where(np.isnan(middle), ends.mean(), middle))
     # at most 1.1e-5 of runs in each direction, however many frames there are
     tail = -float(special.ndtri(special.ndtr(-_TAIL) / max(np.isfinite(middle).sum(), 1)))
     reasons = []
@@ -211,6 +210,18 @@ def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
                 "they would fit far better: widen range_m"
             )
     return tuple(reasons)
+
+
+def _deviations(law: Distribution, r: Array) -> Array:
+    """Return by how many standard deviations ranges lie out in a law that fades; else zero.
+
+    Ends are no tails: an object may well stand where its prior begins.
+    """
+    if law.base != "normal":
+        return np.zeros(r.shape)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        place = np.abs(((np.log(r) if law.log else r) - law.loc) / law.scale)
+        return np.asarray(np.minimum(place, np.abs(law.to_normal(r))))
 
 
 def _best_fit(density: CollapsedDensity, z: Array) -> Array:
