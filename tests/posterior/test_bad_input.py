@@ -198,7 +198,6 @@ def test_priors_and_readings_that_contradict_one_another_are_named(name: str) ->
     posterior = infer(SENSOR, parse_scene(scene), frames, QUICK)
     dragged = [reason for reason in posterior.verdict.reasons if "widen its prior" in reason]
     assert posterior.fit.misfit or dragged
-    assert (posterior.to_json()["fit"]["p_value"] < 1e-3) is posterior.fit.misfit
     assert posterior.verdict.converged is not bool(dragged)
 
 

@@ -12,7 +12,7 @@ from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
-from tests.posterior.scenes import OBJECT, data, example, sensor_of
+from tests.posterior.scenes import example
 
 SETTINGS = SamplerSettings(seed=1)
 STRENGTH = 1 / (50 * math.pi)
@@ -91,14 +91,21 @@ def test_an_object_whose_intensity_turns_back() -> None:
 
 
 def test_saturated_and_empty_frames_have_none() -> None:
-    plain = sensor_of("pulsed")
-    frames = data(plain, frames=4).frames
-    limit = float(np.sort(frames.readings[:, 1])[-1])
-    sensor = parse_sensor({**plain.model_dump(exclude_none=True), "full_scale": [limit, limit]})
-    present = np.array([True, True, False, True])
-    told = Frames(frames.readings, object_present=present)
-    job = prepare(sensor, parse_scene({"object": OBJECT}), told, SETTINGS)
-    log_r = np.where(present[job.usable], math.log(0.5), math.nan)[None]
-    found = near_fold(job, job.density(), np.empty((1, 0)), log_r)
-    assert found.shape == (4,)
-    assert not found.any()
+    """And what is said of a frame stands in the place of that frame."""
+    noise = {"read": [1e-7, 1e-7]}
+    sensor = parse_sensor(
+        {"kind": "sine_wave", "frequency_hz": 20e6, "noise": noise, "full_scale": [1.0, 1.0]}
+    )
+    scene = parse_scene({"object": {"c0": 0.0817, "c1": 0.0574, "c2": 0.103}, "background": WALL})
+    saturated, dark = [1.0, 1.0], [0.0, 0.0]
+    for readings, present, log_r, wanted in (
+        # an empty frame would tell the strength, and with it there is no fold
+        ([saturated, saturated, dark], [True] * 3, [math.log(HUMP)], [False, False, True]),
+        ([saturated, dark, dark], [True, False, True], [math.nan, math.log(HUMP)], [False] * 3),
+    ):
+        frames = Frames(np.array(readings), object_present=np.array(present))
+        job = prepare(sensor, scene, frames, SETTINGS)
+        density = job.density()
+        z = np.zeros((4, len(density.parameters)))
+        found = near_fold(job, density, z, np.repeat([log_r], 4, axis=0))
+        assert found.tolist() == wanted
