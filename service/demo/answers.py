@@ -76,7 +76,9 @@ def of_estimates(name: str, truth_m: Sequence[float], frames: Sequence[dict[str,
         middle, half = _number(frame["range_m"]), _Z90 * _number(frame["sd_m"])
         roots = tuple((root, 1 / len(frame["roots_m"])) for root in frame["roots_m"])
         status = frame["status"]
-        points.append(Point(truth, middle, middle - half, middle + half, status, roots))
+        # there is no range below zero, however wide a normal interval is
+        low = max(middle - half, 0.0) if math.isfinite(half) else math.nan
+        points.append(Point(truth, middle, low, middle + half, status, roots))
     return Answer(name, tuple(points))
 
 

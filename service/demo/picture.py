@@ -131,6 +131,8 @@ def draw(episodes: Sequence[Episode], path: Path) -> None:
         axes.set_title("error, with 90 % intervals", fontsize=10)
     # the conventional errors grow to 90 %: they go out of the picture
     panels[1, 1].set_ylim(-12, 12)
+    farthest = max(point.truth_m for answer in crosstalk.answers for point in answer.points)
+    panels[0, 1].set_ylim(0.0, 1.3 * farthest)
     _panel(panels[0, 2], derivatives, "upper center")
     panels[0, 2].margins(y=0.2)
     _panel(panels[1, 2], phases, "lower right")
