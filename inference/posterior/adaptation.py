@@ -17,7 +17,6 @@ __all__ = ["adapt", "is_slow", "set_out"]
 # steps of autocorrelation above which the proposal is adapted: as often as there are entries
 _SLOW = (10.0, 10.0, 40.0)
 _PILOT_DRAWS = 10_000
-_PARTS = 4  # of a population: as many ensembles begin in parts of their own
 _MAP_SHARE = 0.55  # of the steps that are independent jumps through a map
 
 
@@ -47,10 +46,11 @@ def set_out(job: Job, checkpoint: Checkpoint) -> Checkpoint:
         transport = fit_map(np.concatenate(arrived), shear_of(density))
         proposal = dataclasses.replace(proposal, transport=transport, share=_MAP_SHARE)
         orders = [job.stream(10, k).permutation(len(z)) for k, z in enumerate(arrived)]
+        sharing = -(-(count - 1) // len(arrived))
         for k in range(count - 1):
-            # ensembles that share a population begin at different members of it
+            # ensembles that share a population begin in parts of their own
             turn, which = divmod(k, len(arrived))
-            order = np.roll(orders[which], -turn * len(arrived[which]) // _PARTS)
+            order = np.roll(orders[which], -(turn * len(arrived[which]) // sharing))
             starts[k] = arrived[which][order]
     ensembles = new_ensembles(density, proposal, tuple(starts), job)
     return dataclasses.replace(
