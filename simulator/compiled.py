@@ -1,13 +1,14 @@
 """One way to compile a numerical kernel.
 
 Kernels call one another across files, but numba's own cache looks at the caller's file alone: after
-an edit of the callee it would go on running the old machine code. The cache directory is therefore
-named by a digest of every file that holds a kernel.
+an edit of the callee it would go on running the old machine code. The cache directory of a file is
+therefore named by a digest of it and of every file of kernels that it uses, directly or not.
 """
 
 import functools
 import hashlib
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
@@ -20,25 +21,52 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 _config: Any = numba.config  # its attributes are made at import, out of a type checker's sight
-_PACKAGES = ("simulator", "inference")
+_ROOT = Path(__file__).resolve().parents[1]
 _MARK = b"from simulator.compiled import compiled"
+_IMPORT = re.compile(rb"^from ((?:simulator|inference)[\w.]*) import ", re.MULTILINE)
 
 
 @functools.cache
-def _cache_directory() -> str | None:
+def _read(path: Path) -> tuple[bytes, tuple[Path, ...]]:
+    """Return the source of a file of kernels and the files that it imports; neither of others."""
+    if not path.is_file():
+        return b"", ()
+    source = path.read_bytes()
+    if _MARK not in source:
+        return b"", ()
+    used: list[Path] = []
+    for name in _IMPORT.findall(source):
+        there = _ROOT.joinpath(*name.decode().split("."))
+        # of a package any module may be meant
+        used += sorted(there.glob("*.py")) if there.is_dir() else [there.with_suffix(".py")]
+    return source, tuple(used)
+
+
+@functools.cache
+def _digest(path: Path) -> str:
+    """Return a digest of a file and of every file of kernels that it uses, directly or not."""
+    seen: set[Path] = set()
+    ahead = [path]
+    while ahead:
+        here = ahead.pop()
+        if here not in seen:
+            seen.add(here)
+            ahead += _read(here)[1]
+    digest = hashlib.sha256(path.read_bytes())
+    for one in sorted(seen):
+        source, _ = _read(one)
+        if source:
+            digest.update(os.path.relpath(one, _ROOT).encode())
+            digest.update(source)
+    return digest.hexdigest()[:16]
+
+
+def _cache_directory(path: Path) -> str | None:
     """Directory for machine code of exactly these sources; None where nothing can be written."""
-    root = Path(__file__).resolve().parents[1]
-    digest = hashlib.sha256()
-    for package in _PACKAGES:
-        for path in sorted((root / package).rglob("*.py")):
-            source = path.read_bytes()
-            if _MARK in source:
-                digest.update(str(path.relative_to(root)).encode())
-                digest.update(source)
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     try:
         directory = (Path(base) if base else Path.home() / ".cache") / "hybridtof"
-        directory = directory / digest.hexdigest()[:16]
+        directory = directory / _digest(path)
         directory.mkdir(parents=True, exist_ok=True)
     except (OSError, RuntimeError):  # no home, or a read-only one: compile in memory
         return None
@@ -53,7 +81,7 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     zero gives inf or nan as in numpy; the interpreter lock is released; no fast-math, because
     error-free transformations and tests for nan must survive.
     """
-    directory = _cache_directory()
+    directory = _cache_directory(Path(function.__code__.co_filename).resolve())
     previous = _config.CACHE_DIR
     _config.CACHE_DIR = directory or previous
     try:

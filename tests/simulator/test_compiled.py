@@ -1,4 +1,4 @@
-"""Machine code is kept under a digest of all kernels, or in memory where nothing can be kept."""
+"""Machine code is kept under a digest of what it is made of, or in memory where nothing can be."""
 
 import ast
 import importlib.util
@@ -42,20 +42,46 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return root
 
 
-def directory_of(root: Path) -> str:
-    directory = loaded_from(root)._cache_directory()
+TOP = Path("inference") / "density" / "collapsed.py"
+"""A file of kernels that use many others."""
+
+
+def directory_of(root: Path, path: Path = TOP) -> str:
+    directory = loaded_from(root)._cache_directory(root / path)
     assert isinstance(directory, str)
     return directory
 
 
-def test_an_edit_of_any_kernel_file_changes_the_directory(tree: Path) -> None:
-    seen = {directory_of(tree)}
-    assert {directory_of(tree)} == seen
-    for number, path in enumerate(KERNELS):
+def used_by(path: Path) -> set[Path]:
+    """Return every file of kernels whose names a file of kernels imports, directly or not."""
+    seen: set[Path] = set()
+    ahead = [path]
+    while ahead:
+        here = ahead.pop()
+        if here in seen or here not in KERNELS:
+            continue
+        seen.add(here)
+        ahead += [
+            ROOT / (node.module.replace(".", "/") + ".py")
+            for node in ast.parse(here.read_text()).body
+            if isinstance(node, ast.ImportFrom) and node.module
+        ]
+    return seen
+
+
+def test_an_edit_changes_the_directory_of_all_that_use_the_file_and_of_no_other(
+    tree: Path,
+) -> None:
+    used = used_by(ROOT / TOP)
+    assert 3 < len(used) < len(KERNELS)
+    before = directory_of(tree)
+    assert directory_of(tree) == before
+    for path in KERNELS:
         copy = tree / path.relative_to(ROOT)
-        copy.write_text(copy.read_text() + "\n# another comment\n")
-        seen.add(directory_of(tree))
-        assert len(seen) == number + 2
+        source = copy.read_text()
+        copy.write_text(source + "\n# another comment\n")
+        assert (directory_of(tree) != before) == (path in used), path
+        copy.write_text(source)
 
 
 def test_other_files_do_not_change_it(tree: Path) -> None:
@@ -66,9 +92,11 @@ def test_other_files_do_not_change_it(tree: Path) -> None:
     assert directory_of(tree) == before
 
 
-def test_a_new_or_renamed_kernel_file_changes_it(tree: Path) -> None:
+def test_every_module_of_a_package_that_is_imported_from_counts(tree: Path) -> None:
+    top = tree / TOP
+    top.write_text(top.read_text() + "\nfrom inference.density import gaussian\n")
     before = directory_of(tree)
-    new = tree / "inference" / "new_kernel.py"
+    new = tree / "inference" / "density" / "new_kernel.py"
     new.write_text(MARK)
     with_new = directory_of(tree)
     new.rename(new.with_name("newer_kernel.py"))
@@ -100,18 +128,22 @@ def test_kernels_work_where_nothing_can_be_written(
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "below"))
     module = loaded_from(tree)
-    assert module._cache_directory() is None
+    assert module._cache_directory(Path(__file__)) is None
     assert module.compiled(half)(3.0) == 1.5
     monkeypatch.delenv("NUMBA_CACHE_DIR")
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setattr(Path, "home", no_home)
-    assert loaded_from(tree)._cache_directory() is None
+    assert loaded_from(tree)._cache_directory(Path(__file__)) is None
 
 
 def test_machine_code_is_kept_where_it_can_be(tree: Path) -> None:
     module = loaded_from(tree)
     assert module.compiled(half)(3.0) == 1.5
-    kept = {path.suffix for path in Path(module._cache_directory()).rglob("*") if path.is_file()}
+    kept = {
+        path.suffix
+        for path in Path(module._cache_directory(Path(__file__))).rglob("*")
+        if path.is_file()
+    }
     assert {".nbi", ".nbc"} <= kept
 
 
