@@ -9,7 +9,7 @@ frame and linear least squares for c2 and crosstalk. It gets what it needs and t
 not: exact derivatives free of noise (so its ranges are better than any from the readings), and a
 start within a factor of two of the truth. CPU times of whole estimates, compilation not counted.
 
-Second table: random data sets (`tests.multiframe.random_sets`). Right is the same optimum (deviance
+Second table: random data sets (`tests.fits.random_sets`). Right is the same optimum (deviance
 within 0.1, or a better one) as that of a start at the truth, or a refusal where the ranges are open
 by the truth as well. Inside: share of unique ranges within 1.96 standard deviations of the truth.
 """
@@ -22,15 +22,15 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from inference.estimate import estimate
-from inference.multiframe.multistart import optimum_from
-from inference.multiframe.problem import fit_problem
+from inference.fits.likelihood.multistart import optimum_from
+from inference.fits.likelihood.problem import fit_problem
 from simulator.frames import Frames
 from simulator.object_model import object_flux_slope
 from simulator.scene import parse_scene
 from simulator.sensor import PulsedSensor, parse_sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
-from tests.multiframe.random_sets import CLASSES, outcome_of, random_set
+from tests.fits.random_sets import CLASSES, outcome_of, random_set
 
 Array = NDArray[np.float64]
 

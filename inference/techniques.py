@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from inference.multiframe.registry import MULTIFRAME
+from inference.fits.techniques.registry import FITS
 from inference.realtime.registry import TECHNIQUES
 from inference.realtime.technique import Technique
 
 __all__ = ["ALL_TECHNIQUES", "ELSEWHERE"]
 
-ALL_TECHNIQUES: Mapping[str, Technique] = MappingProxyType({**TECHNIQUES, **MULTIFRAME})
+ALL_TECHNIQUES: Mapping[str, Technique] = MappingProxyType({**TECHNIQUES, **FITS})
 
 # names of the contract that are not answered at once, and why they are left out
 ELSEWHERE: Mapping[str, str] = MappingProxyType(

@@ -15,8 +15,8 @@ ALLOWED = {
     "inference/identifiability": ["inference.identifiability", "simulator"],
     "inference/realtime": ["inference.realtime", "inference.estimates", "simulator"],
     "inference/density": ["inference.density", "inference.identifiability", "simulator"],
-    "inference/multiframe": [
-        "inference.multiframe",
+    "inference/fits": [
+        "inference.fits",
         "inference.density",
         "inference.identifiability",
         "inference.realtime",

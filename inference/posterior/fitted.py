@@ -1,6 +1,6 @@
 """Optima of the fit over all frames as starting points of a posterior.
 
-The fit (`inference.multiframe`) knows no priors, but its multistart guesses ranges as well as
+The fit (`inference.fits`) knows no priors, but its multistart guesses ranges as well as
 unknowns and finds its way where the readings lie a million times above their noise: the screen of
 the prior then sees only false valleys, which can lie thousands of nats below the true one.
 """
@@ -8,8 +8,8 @@ the prior then sees only false valleys, which can lie thousands of nats below th
 import numpy as np
 
 from inference.density.collapsed import CollapsedDensity
-from inference.multiframe.multistart import find_optima
-from inference.multiframe.problem import fit_problem
+from inference.fits.likelihood.multistart import find_optima
+from inference.fits.likelihood.problem import fit_problem
 from inference.posterior.job import Job
 from inference.posterior.sampling.start import Optimum, climb, refine
 

@@ -1,0 +1,166 @@
+"""Whether frames are enough for what is unknown, told before anything is fitted.
+
+Every frame holds two readings and one range, so that one number is left for the unknowns; an empty
+scene has no range, but shows nothing but the sum of crosstalk and background.
+"""
+
+import math
+
+import numpy as np
+
+from inference.fits.likelihood.problem import unknowns_of
+from inference.realtime.known import Known
+from inference.realtime.net import SATURATED, rule_out
+from simulator.errors import listed
+from simulator.frames import Frames
+from simulator.parameters import parameters_of
+from simulator.scene import Scene
+from simulator.sensor import Sensor, SineWaveSensor
+
+__all__ = [
+    "frames_needed",
+    "joint_obstacle",
+    "linear_obstacle",
+    "ranges_needed",
+    "unmodelled_error",
+]
+
+_MOST_FRAMES = 20_000
+_MOST_HALF_TURNS = 1000.0
+
+
+# how the two readings of an empty scene move with what they show, at no special place: crosstalk
+# adds to one of them, the strength moves both, the distance of a pulse's background the first
+_OF_EMPTY = {
+    "crosstalk.w1": (1.0, 0.0),
+    "crosstalk.w2": (0.0, 1.0),
+    "crosstalk.i": (1.0, 0.0),
+    "crosstalk.q": (0.0, 1.0),
+    "background.strength": (0.6, 0.8),
+}
+_OF_DISTANCE = {"pulsed": (1.0, 0.0), "sine_wave": (-0.8, 0.6)}
+
+
+def ranges_needed(kind: str, unknowns: tuple[str, ...], empty: bool) -> int:
+    """Return how many distinct ranges determine the unknowns.
+
+    Parameters
+    ----------
+    kind : str
+        Of the sensor.
+    unknowns : tuple of str
+        Scene paths of what is unknown besides the ranges.
+    empty : bool
+        Whether there are frames without an object: they tell as many numbers as the rank of what
+        moves their readings.
+    """
+    if not empty:
+        return len(unknowns)
+    moves = {**_OF_EMPTY, "background.distance_m": _OF_DISTANCE[kind]}
+    shown = [moves[path] for path in unknowns if path in moves]
+    return len(unknowns) - (int(np.linalg.matrix_rank(np.array(shown))) if shown else 0)
+
+
+def frames_needed(kind: str, unknowns: tuple[str, ...], empty: bool) -> int:
+    """Return the least number of frames with an object: one more than determines the unknowns.
+
+    Parameters
+    ----------
+    kind : str
+        Of the sensor.
+    unknowns : tuple of str
+        Scene paths of what is unknown besides the ranges.
+    empty : bool
+        Whether there are frames without an object.
+
+    Returns
+    -------
+    int
+        Exactly determined systems have several exact solutions, so one more is asked for.
+    """
+    return ranges_needed(kind, unknowns, empty) + 1
+
+
+def unmodelled_error(scene: Scene) -> str | None:
+    """Return why a fit over frames does not serve a scene whose object errs, None if it serves.
+
+    Parameters
+    ----------
+    scene : Scene
+        A stated discrepancy is one error for all frames, which noise of each frame cannot stand
+        for: a fit without a term for it would be surer than it may be.
+    """
+    if scene.discrepancy is None:
+        return None
+    return "has no term for the scene's discrepancy; use a posterior"
+
+
+def linear_obstacle(scene: Scene, unknowns: tuple[str, ...]) -> str | None:
+    """Return why no fit linear in an object's numbers serves a scene, None if one does.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    unknowns : tuple of str
+        Scene paths of what is fitted.
+    """
+    if scene.motion == "tangential":
+        return "needs a constant object, and the scene's amplitude changes"
+    if scene.motion == "static" and len(unknowns) > 1:
+        return (
+            "needs an object whose range changes, and the scene's motion is static: one range "
+            f"tells one of {listed(list(unknowns))}; move the object, or state all of them but one "
+            "as known"
+        )
+    return unmodelled_error(scene)
+
+
+def joint_obstacle(
+    sensor: Sensor, scene: Scene, _known: Known, frames: Frames | None
+) -> str | None:
+    """Return why no joint fit can be made, None if one can be tried.
+
+    Parameters
+    ----------
+    sensor, scene : Sensor, Scene
+        The request.
+    _known : Known
+        The scene's known numbers, not used.
+    frames : Frames, optional
+        Left out: enough are supposed.
+    """
+    if scene.motion != "radial":
+        return (
+            f"needs an object whose range changes, and the scene's motion is {scene.motion}; "
+            "ranges, crosstalk and background cannot be told apart otherwise"
+        )
+    unmodelled = unmodelled_error(scene)
+    if unmodelled:
+        return unmodelled
+    if scene.optional_terms:
+        return (
+            f"keeps every term, and the scene leaves {' and '.join(scene.optional_terms)} to the "
+            "data; use a posterior"
+        )
+    unknowns = unknowns_of(sensor, scene)
+    if not unknowns:
+        return "nothing but the ranges is unknown: a technique of single frames serves"
+    far = min(parameters_of(sensor, scene).range_prior.high, sensor.max_range_m)
+    if isinstance(sensor, SineWaveSensor) and sensor.wave_number * far > _MOST_HALF_TURNS * math.pi:
+        return "the scene's ranges hold more than a thousand half turns of phase; narrow range_m"
+    if frames is None:
+        return None
+    if len(frames) > _MOST_FRAMES:
+        return f"serves up to {_MOST_FRAMES} frames, not {len(frames)}; send a part of them"
+    usable = rule_out(sensor, frames) != SATURATED
+    empty = bool((usable & ~frames.present).any())
+    objects = int(np.count_nonzero(usable & frames.present))
+    needed = frames_needed(sensor.kind, unknowns, empty)
+    if objects < needed:
+        return (
+            f"needs at least {needed} unsaturated frames with the object at different ranges for "
+            f"{', '.join(unknowns)}, and has {objects}; send more, state more numbers as known, "
+            "or use a posterior with priors"
+        )
+    return None

@@ -1,0 +1,140 @@
+"""Whether frames determine what is unknown, told after the fit with the reason and the remedy."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from inference.fits.answer.counts import ranges_needed
+from inference.fits.answer.motion_seen import numbers_shown
+from inference.fits.answer.ranges import WITHIN
+from inference.fits.answer.report import describe
+from inference.fits.likelihood.information import residuals_and_information
+from inference.fits.likelihood.multistart import Optimum
+from inference.fits.likelihood.problem import FitProblem
+from inference.identifiability.information import Information
+from simulator.errors import RefusedError, listed
+
+__all__ = ["LIMIT", "refuse_if_open", "refuse_if_undetermined"]
+
+_SEEN_WITHOUT_OBJECT = (3, 4, 5, 6)  # crosstalk, strength and distance of the background
+
+_SHOWN = {
+    1.0: "the object does not move: all frames read the same but for noise",
+    2.0: "the object moves too little for this noise: all frames read along a straight line",
+}
+
+LIMIT = 0.1  # relative standard deviation of the ranges that the unknowns share out
+
+
+def _other_frames(problem: FitProblem) -> str:
+    """Say which other frames would tell more: empty ones, where there are none and they tell."""
+    told = problem.present.all() and np.isin(problem.slots, _SEEN_WITHOUT_OBJECT).any()
+    empty = ", add frames of the empty scene (object_present false)" if told else ""
+    return f"move the object nearer and farther{empty}"
+
+
+def _remedy(problem: FitProblem, numbers: int) -> str:
+    """Say what would help where so many numbers are missing."""
+    count = "one" if numbers == 1 else str(numbers)
+    return f"{_other_frames(problem)}, or state {count} of them as known"
+
+
+def _less_noise(problem: FitProblem) -> str:
+    """Say what would help where noise hides what is unknown."""
+    return (
+        f"{_other_frames(problem)}, lower the noise, state a number as known, or use a posterior "
+        "with priors"
+    )
+
+
+def refuse_if_undetermined(problem: FitProblem, top: Optimum, facts: Information) -> None:
+    """Refuse where frames tell fewer numbers than are unknown.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    top : Optimum
+        Its best optimum.
+    facts : Information
+        There.
+
+    Raises
+    ------
+    RefusedError
+        Where the Jacobian has not full rank, or the readings do not show enough motion.
+    """
+    shown = numbers_shown(problem, top)
+    if facts.rank < len(problem):
+        weights = np.abs(facts.null_space).max(axis=1)
+        names = [name for name, w in zip(problem.names, weights, strict=True) if w > 0.05]
+        cause = _SHOWN.get(shown, "the frames do not tell them apart")
+        raise RefusedError(
+            f"{listed(names or list(problem.names))} cannot be determined (rank {facts.rank} of "
+            f"{len(problem)}): {cause}; {_remedy(problem, len(problem) - facts.rank)}"
+        )
+    kind = "pulsed" if problem.instrument[1] is None else "sine_wave"
+    needed = ranges_needed(kind, problem.names, not problem.present.all())
+    if shown < needed:
+        raise RefusedError(
+            f"{listed(list(problem.names))} cannot be determined: {_SHOWN[shown]}, and that tells "
+            f"{shown:g} of the {needed} numbers that are missing; "
+            f"{_remedy(problem, needed - int(shown))}"
+        )
+
+
+def refuse_if_open(
+    problem: FitProblem,
+    top: Optimum,
+    facts: Information,
+    wider: float,
+    others: Sequence[tuple[float, Optimum]] = (),
+) -> None:
+    """Refuse what the frames determine too badly.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    top : Optimum
+        Its best optimum.
+    facts : Information
+        There.
+    wider : float
+        Factor on all standard deviations (`widening`).
+    others : sequence of (float, Optimum)
+        Optima that are nearly as good, with their deviance above the best.
+
+    Raises
+    ------
+    RefusedError
+        Where the ranges share a relative standard deviation above `LIMIT`, there or at another
+        optimum as far as the intervals of 95 % reach.
+    """
+    present = problem.present & np.isfinite(top.positions)
+    shared = facts.sd_of(facts.response[present])
+    typical = wider * float(np.median(shared)) if shared.size else math.inf
+    if not typical <= LIMIT:
+        open_ones = [
+            name
+            for name, item in describe(problem, top, facts, wider).items()
+            if item["status"] != "identified"
+        ]
+        raise RefusedError(
+            f"the ranges would have a common relative standard deviation of {typical:.2g}, more "
+            f"than {LIMIT:g}: {listed(open_ones or list(problem.names))} are too uncertain; "
+            f"{_less_noise(problem)}"
+        )
+    for excess, other in others:
+        if not excess < WITHIN:
+            continue
+        _, there = residuals_and_information(problem, other.x, other.positions)
+        shared = there.sd_of(there.response[problem.present & np.isfinite(other.positions)])
+        typical = float(np.median(shared)) * math.sqrt(1.0 - excess / WITHIN)
+        if not typical <= LIMIT:
+            raise RefusedError(
+                f"other values of the unknowns explain the frames nearly as well (chi-square "
+                f"{excess:.2g} higher), and with them the ranges would have a common relative "
+                f"standard deviation of {typical:.2g}, more than {LIMIT:g}; {_less_noise(problem)}"
+            )

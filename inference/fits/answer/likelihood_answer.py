@@ -1,0 +1,114 @@
+"""From optima of the likelihood of all frames to a result, or to a refusal."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.estimates import TechniqueResult
+from inference.fits.answer.determined import refuse_if_open, refuse_if_undetermined
+from inference.fits.answer.inflation import shift_of, widening
+from inference.fits.answer.profile_scan import elsewhere
+from inference.fits.answer.ranges import DECIDED, WITHIN, Answer, frame_ranges
+from inference.fits.answer.report import describe, fit_report
+from inference.fits.likelihood.information import residuals_and_information
+from inference.fits.likelihood.multistart import Optimum, optimum_from
+from inference.fits.likelihood.problem import FitProblem, fit_problem
+from inference.realtime.net import SATURATED, rule_out
+from inference.realtime.technique import Task
+from simulator.errors import RefusedError
+
+__all__ = ["likelihood_answer", "likelihood_answer_from"]
+
+_WALKS = 3  # that may meet a better optimum than the last
+
+
+def likelihood_answer_from(name: str, task: Task, values: dict[str, float]) -> TechniqueResult:
+    """Climb the likelihood of all frames from values that another fit has found.
+
+    Parameters
+    ----------
+    name : str
+        The technique.
+    task : Task
+        The request.
+    values : dict
+        By scene path, all that is unknown besides the ranges.
+
+    Raises
+    ------
+    RefusedError
+        As `likelihood_answer`; and where the values are no object.
+    """
+    state = rule_out(task.sensor, task.frames)
+    problem = fit_problem(task.sensor, task.scene, task.frames.select(state != SATURATED))
+    x = problem.coordinates(np.array([[values[path] for path in problem.names]]))[0]
+    if not np.isfinite(x).all():
+        raise RefusedError("the best fit is no object: a size or reflectance is not positive")
+    return likelihood_answer(name, problem, [optimum_from(problem, x)], state)
+
+
+def likelihood_answer(
+    name: str, problem: FitProblem, found: Iterable[Optimum], state: NDArray[np.uint8]
+) -> TechniqueResult:
+    """Build the result of a fit by likelihood.
+
+    Parameters
+    ----------
+    name : str
+        The technique.
+    problem : FitProblem
+        With the frames that were fitted.
+    found : iterable of Optimum
+        The best first.
+    state : ndarray of uint8, shape (frames of the request,)
+        What rules frames out (`inference.realtime.net.rule_out`).
+
+    Returns
+    -------
+    TechniqueResult
+        Without run time.
+
+    Raises
+    ------
+    RefusedError
+        Where the frames do not determine what is unknown.
+    """
+    optima = [optimum for optimum in found if np.isfinite(optimum.deviance)]
+    if not optima:
+        raise RefusedError(
+            "no values of the unknowns give the readings a likelihood that can be computed; check "
+            "gain, noise and range_m"
+        )
+    points: list[Optimum] = []
+    for walk in range(_WALKS + 1):
+        top = optima[0]
+        _, facts = residuals_and_information(problem, top.x, top.positions)
+        refuse_if_undetermined(problem, top, facts)
+        wider, better = widening(problem, top, facts)
+        if better is None:
+            points, better = elsewhere(problem, top, facts)
+        if better is None or walk == _WALKS:
+            break
+        # the old one lies in the same valley, on the way to this
+        optima[0] = better
+        optima = [one for one in optima if one.deviance >= better.deviance]
+    for point in points:
+        reach = np.sqrt(max(point.deviance - top.deviance, WITHIN))
+        wider = max(wider, shift_of(problem, top, facts, point) / reach)
+    others = [(one.deviance - top.deviance, one) for one in optima[1:]]
+    refuse_if_open(problem, top, facts, wider, others)
+    undecided = [
+        Answer(one.x, one.deviance - top.deviance, None if k else wider * facts.factor)
+        for k, one in enumerate(optima)
+        if one.deviance - top.deviance <= DECIDED
+    ]
+    other = [one for one in [*optima[1:], *points] if one.deviance - top.deviance <= DECIDED]
+    return frame_ranges(
+        name,
+        problem,
+        undecided,
+        state,
+        describe(problem, top, facts, wider, other),
+        fit_report(problem, optima, facts, wider),
+    )

@@ -1,0 +1,191 @@
+"""From the optima of a fit to a result: roots of every frame, their standard deviations, a status.
+
+Each mode of a frame is a range that explains it; how well all frames are explained together
+decides between modes and between optima of the fit. What the decision leaves stays ambiguous.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from inference.estimates import Status, TechniqueResult
+from inference.fits.likelihood.frame_modes import MOST, frame_modes
+from inference.fits.likelihood.information import residuals_and_information
+from inference.fits.likelihood.problem import FitProblem
+from inference.realtime.net import ABSENT, COMMON_REASONS, SATURATED
+
+__all__ = ["DECIDED", "WITHIN", "Answer", "frame_ranges"]
+
+Array = NDArray[np.float64]
+
+DECIDED = 9.0  # deviance by which something must be worse to be decided against: 3 sd
+WITHIN = special.chdtri(1, 0.05)  # deviance that intervals of 95 % reach: 1.96 sd
+_IMPOSSIBLE = 36.0  # chi-square of a single frame that nothing explains
+_ONE = 1.0  # standard deviations below which two modes are one
+
+_REASONS = (
+    *COMMON_REASONS,
+    "more than one range explains the readings, and the fit over all frames does not decide",
+    "no range explains the readings within six standard deviations",
+    "the best range lies at the end of the ranges of the scene",
+)
+_AMBIGUOUS, _UNEXPLAINED, _EDGE = range(len(COMMON_REASONS), len(_REASONS))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Answer:
+    """One set of values of the unknowns.
+
+    Attributes
+    ----------
+    x : ndarray, shape (d,)
+        Coordinates.
+    excess : float
+        Deviance above the best answer's.
+    covariance_factor : ndarray, shape (d, m), optional
+        F with F F^T the covariance of the coordinates; left out: that of the fit's information.
+    """
+
+    x: Array
+    excess: float
+    covariance_factor: Array | None = None
+
+
+def _modes(problem: FitProblem, answers: Sequence[Answer]) -> tuple[Array, Array, Array]:
+    """Log ranges, their standard deviations and deviance above the best; (n, answers * MOST)."""
+    positions, sds, excesses = [], [], []
+    best = np.full(problem.frames.shape[0], np.inf)
+    for answer in answers:
+        u, deviance = frame_modes(problem, answer.x)
+        sd = np.full(u.shape, np.nan)
+        for k in range(MOST):
+            if not np.isfinite(u[:, k]).any():
+                break
+            _, facts = residuals_and_information(problem, answer.x, u[:, k])
+            factor = facts.factor if answer.covariance_factor is None else answer.covariance_factor
+            with np.errstate(invalid="ignore"):
+                shared = np.einsum("nk,nk->n", facts.response @ factor, facts.response @ factor)
+                sd[:, k] = np.sqrt(facts.own_variance + shared)
+        positions.append(u)
+        sds.append(sd)
+        # the other frames are as they are: a worse mode of this one costs what it costs here
+        with np.errstate(invalid="ignore"):
+            excesses.append(answer.excess + deviance - deviance[:, :1])
+        best = np.minimum(best, deviance[:, 0])
+    excess = np.concatenate(excesses, axis=1)
+    return (
+        np.concatenate(positions, axis=1),
+        np.concatenate(sds, axis=1),
+        np.where(np.isnan(excess), np.inf, excess),
+    )
+
+
+def _merged(u: Array, sd: Array, excess: Array) -> tuple[list[int], bool]:
+    """Return the indices of a frame's distinct modes, best first, and whether some were merged.
+
+    What explains the readings nearly as well as the mode that it is merged with may be far less
+    certain: ``sd`` of the mode that stays is widened until its interval of 95 % holds that of the
+    other, as far as the deviance lets it reach.
+    """
+    kept: list[int] = []
+    merged = False
+    for k in np.argsort(excess, kind="stable"):
+        if not excess[k] <= DECIDED:
+            break
+        width = sd[k] if np.isfinite(sd[k]) else 0.0
+        twins = [i for i in kept if abs(u[i] - u[k]) <= _ONE * max(width, np.nan_to_num(sd[i]))]
+        if twins or any(abs(u[i] - u[k]) < 1e-9 for i in kept):
+            merged = merged or any(abs(u[i] - u[k]) > 1e-6 for i in twins)
+            if excess[k] < WITHIN:
+                for i in twins:
+                    reach = abs(u[i] - u[k]) + width * math.sqrt(WITHIN - excess[k])
+                    sd[i] = max(sd[i], reach / math.sqrt(WITHIN))
+        else:
+            kept.append(int(k))
+    return kept, merged
+
+
+def frame_ranges(
+    name: str,
+    problem: FitProblem,
+    answers: Sequence[Answer],
+    state: NDArray[np.uint8],
+    parameters: Mapping[str, Any],
+    fit: Mapping[str, Any],
+) -> TechniqueResult:
+    """Build the result of a technique of many frames.
+
+    Parameters
+    ----------
+    name : str
+        The technique.
+    problem : FitProblem
+        With the frames that were fitted.
+    answers : sequence of Answer
+        The best first; those that the fit leaves undecided.
+    state : ndarray of uint8, shape (frames of the request,)
+        What rules frames out (`inference.realtime.net.rule_out`); the others without an object
+        or saturated are, in order, those of the problem.
+    parameters, fit : mapping
+        As in `TechniqueResult`.
+
+    Returns
+    -------
+    TechniqueResult
+        Without run time.
+    """
+    used = np.flatnonzero(state != SATURATED)
+    u, sd, excess = _modes(problem, answers)
+    n = state.size
+    kept: list[list[int]] = [[] for _ in range(n)]
+    near = np.zeros(n, dtype=np.bool_)
+    reason = state.copy()
+    residual, _ = residuals_and_information(problem, answers[0].x, u[:, 0])
+    chi_square = np.einsum("ni,ni->n", residual, residual)
+    low, high = np.log(problem.support)
+    single = np.count_nonzero(excess <= DECIDED, axis=1) <= 1
+    for row, frame in enumerate(used):
+        if reason[frame]:
+            continue
+        if single[row]:
+            kept[frame] = [int(np.argmin(excess[row]))]
+        else:
+            kept[frame], near[frame] = _merged(u[row], sd[row], excess[row])
+        if len(kept[frame]) > 1:
+            reason[frame] = _AMBIGUOUS
+        elif not np.isfinite(u[row, kept[frame][0]]) or chi_square[row] > _IMPOSSIBLE:
+            kept[frame], reason[frame] = [], _UNEXPLAINED
+        elif not low + 1e-9 < u[row, kept[frame][0]] < high - 1e-9:
+            kept[frame], reason[frame] = [], _EDGE
+    count = np.array([len(modes) for modes in kept], dtype=np.intp)
+    width = max(int(count.max(initial=0)), 1)
+    roots, roots_sd = np.full((n, width), np.nan), np.full((n, width), np.nan)
+    for row, frame in enumerate(used):
+        modes = np.array(kept[frame], dtype=np.intp)
+        modes = modes[np.argsort(u[row, modes])]
+        roots[frame, : modes.size] = np.exp(u[row, modes])
+        with np.errstate(invalid="ignore", over="ignore"):
+            roots_sd[frame, : modes.size] = np.exp(u[row, modes]) * sd[row, modes]
+    roots_sd[~np.isfinite(roots_sd)] = np.nan
+    status = np.where(
+        count == 1, Status.UNIQUE, np.where(count > 1, Status.AMBIGUOUS, Status.NONE)
+    ).astype(np.uint8)
+    status[state == SATURATED] = Status.SATURATED
+    reason[state == ABSENT] = ABSENT
+    return TechniqueResult(
+        technique=name,
+        status=status,
+        roots_m=roots,
+        roots_sd_m=roots_sd,
+        root_count=count,
+        near_fold=near,
+        reason=reason,
+        reasons=_REASONS,
+        parameters=parameters,
+        fit=fit,
+    )

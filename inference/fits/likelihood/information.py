@@ -1,0 +1,56 @@
+"""Residuals, rank and Cramer-Rao bounds of a fit at one point."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.fits.likelihood.linearisation import whitened_slopes
+from inference.fits.likelihood.problem import FitProblem
+from inference.identifiability.information import Information, eliminate
+
+__all__ = ["residuals_and_information"]
+
+Array = NDArray[np.float64]
+
+
+def residuals_and_information(
+    problem: FitProblem, x: Array, positions: Array
+) -> tuple[Array, Information]:
+    """Linearise at given coordinates and ranges.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    x : ndarray, shape (d,)
+        Coordinates.
+    positions : ndarray, shape (n,)
+        log r of every frame; nan without an object.
+
+    Returns
+    -------
+    (ndarray, Information)
+        Whitened residuals, shape (n, 2), and the information in the fit's coordinates. A range at
+        the end of its support counts as known.
+    """
+    n, d = problem.frames.shape[0], len(problem)
+    jacobian, along, residual = np.empty((n, 2, d)), np.empty((n, 2)), np.empty((n, 2))
+    values = problem.values(x)
+    near, far = problem.support
+    if problem.background is not None:
+        near = max(near, -float(values[8]))
+    whitened_slopes(
+        jacobian,
+        along,
+        residual,
+        values,
+        problem.chain(x),
+        np.ascontiguousarray(positions),
+        problem.frames,
+        (math.log(near) + 1e-9, math.log(far) - 1e-9),
+        problem.gain,
+        problem.background,
+        *problem.instrument,
+    )
+    return residual, eliminate(problem.names, jacobian, along)

@@ -1,0 +1,166 @@
+"""The last stretch to an optimum: Newton's method with the exact curvature of the profile.
+
+Levenberg-Marquardt takes the curvature from first derivatives alone. Where a frame's readings
+barely move with its range (near a fold, or a weak object before a bright background), that misses
+most of it, and the steps zigzag along flat valleys. Here the Hessian comes from differences of
+exact gradients along directions in which the first-order information is the unit matrix.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from inference.fits.likelihood.coordinates import bounds_of
+from inference.fits.likelihood.problem import FitProblem
+from inference.fits.likelihood.profile_slopes import profile_slopes
+
+__all__ = ["polish"]
+
+Array = NDArray[np.float64]
+
+_STEPS = 40
+_DIFFERENCE = 0.05  # standard deviations
+_LONGEST = 1.0  # change of a logarithm along one unit of a direction
+_ENOUGH = 5e-5  # half deviance that a whole step would still gain
+_CROSSTALK = (3, 4)
+
+
+class _Profile:
+    """Half the deviance as a function of the coordinates, and its gradient."""
+
+    def __init__(self, problem: FitProblem) -> None:
+        self.problem = problem
+        self.work = problem.work()
+        n, d = problem.frames.shape[0], len(problem)
+        rows = n * (2 if problem.instrument[3] is None else 5)
+        self.best, self.matrix = np.empty((1, n, 3)), np.empty((rows, d + 1))
+
+    def __call__(self, x: Array) -> tuple[float, Array]:
+        p = self.problem
+        value = profile_slopes(
+            x,
+            self.best,
+            self.matrix,
+            p.layout,
+            self.work,
+            p.support[0],
+            p.gain,
+            p.background,
+            p.frames,
+            p.present,
+            p.instrument,
+        )
+        return 0.5 * value, -(self.matrix[:, :-1].T @ self.matrix[:, -1])
+
+    def bounds(self, x: Array) -> tuple[Array, Array]:
+        low, high = np.empty(x.size), np.empty(x.size)
+        bounds_of(low, high, self.problem.values(x), self.problem.layout)
+        return low, high
+
+
+def _directions(jacobian: Array, slots: NDArray[np.int64], free: NDArray[np.bool_]) -> Array:
+    """Columns along which the first-order information is the unit matrix or less, (d, free)."""
+    j = jacobian[:, free]
+    scale = np.linalg.norm(j, axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    triangle = linalg.qr(j / scale, mode="r")[0][: j.shape[1]]
+    _, sizes, right = linalg.svd(triangle)
+    sizes = np.concatenate([sizes, np.zeros(j.shape[1] - sizes.size)])
+    columns = (right.T / np.maximum(sizes, 1e-12)) / scale[:, None]
+    logarithms = ~np.isin(slots[free], _CROSSTALK)
+    if logarithms.any():
+        longest = np.abs(columns[logarithms]).max(axis=0)
+        columns = columns / np.maximum(longest / _LONGEST, 1.0)
+    out = np.zeros((jacobian.shape[1], j.shape[1]))
+    out[free] = columns
+    return out
+
+
+def _step(gradient: Array, hessian: Array, radius: float) -> tuple[Array, float]:
+    """Minimise a quadratic in a ball; the step and its predicted decrease."""
+    values, vectors = linalg.eigh(hessian)
+    along = vectors.T @ gradient
+
+    def at(shift: float) -> Array:
+        return np.asarray(-along / np.maximum(values + shift, 1e-14))
+
+    shift = max(0.0, 1e-8 - float(values[0]))
+    if np.linalg.norm(at(shift)) > radius:
+        low, high = shift, shift + float(np.linalg.norm(along)) / radius
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            if np.linalg.norm(at(middle)) > radius:
+                low = middle
+            else:
+                high = middle
+        shift = high
+    s = at(shift)
+    return vectors @ s, float(-(along @ s) - 0.5 * s @ (values * s))
+
+
+def polish(problem: FitProblem, x: Array) -> tuple[Array, float, float, Array]:
+    """Climb to the top by Newton steps in a trust region.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    x : ndarray, shape (d,)
+        A point on the way to an optimum.
+
+    Returns
+    -------
+    (ndarray, float, float, ndarray)
+        Coordinates, deviance, deviance that a whole step would still gain, and best log ranges.
+    """
+    profile = _Profile(problem)
+    x = x.copy()
+    value, gradient = profile(x)
+    radius, predicted = 3.0, np.inf
+    for _ in range(_STEPS):
+        if not (np.isfinite(value) and np.isfinite(gradient).all()):
+            break
+        low, high = profile.bounds(x)
+        free = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
+        if not free.any():
+            predicted = 0.0
+            break
+        basis = _directions(profile.matrix[:, :-1], problem.slots, free)
+        columns = []
+        for k in range(basis.shape[1]):
+            trial = np.clip(x + _DIFFERENCE * basis[:, k], low, high)
+            change = trial - x
+            if np.linalg.norm(change) < 0.5 * _DIFFERENCE * np.linalg.norm(basis[:, k]):
+                change = np.clip(x - _DIFFERENCE * basis[:, k], low, high) - x
+            other = profile(x + change)[1]
+            along = _DIFFERENCE * np.sign(change @ basis[:, k])
+            # where the bounds leave no step either way this is nan, and the walk ends below
+            with np.errstate(invalid="ignore", divide="ignore"):
+                columns.append(basis.T @ (other - gradient) / along)
+        hessian = np.array(columns)
+        if not np.isfinite(hessian).all():
+            break
+        hessian = 0.5 * (hessian + hessian.T)
+        moved = False
+        for _ in range(8):
+            step, predicted = _step(basis.T @ gradient, hessian, radius)
+            if predicted < _ENOUGH and radius > 0.5:
+                break
+            trial = np.clip(x + basis @ step, low, high)
+            low_there, high_there = profile.bounds(trial)
+            trial = np.clip(trial, low_there, high_there)
+            trial_value, trial_gradient = profile(trial)
+            if trial_value < value:
+                moved = True
+                gained = value - trial_value
+                x, value, gradient = trial, trial_value, trial_gradient
+                if gained > 0.7 * predicted:
+                    radius = min(2.0 * radius, 1e3)
+                break
+            radius = 0.25 * min(radius, float(np.linalg.norm(step)))
+        if not moved:
+            break
+        if gained < 0.25 * predicted:
+            radius *= 0.5
+    value, _ = profile(x)
+    return x, 2.0 * value, 2.0 * predicted, profile.best[0, :, 0].copy()

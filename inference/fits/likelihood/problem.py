@@ -1,0 +1,293 @@
+"""What a fit over frames works on: unknowns of a scene as coordinates, usable frames, sensor."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.fits.likelihood.coordinates import KNOWN, SAME, Layout, bounds_of, chain, physical
+from inference.fits.likelihood.deviance import Instrument
+from inference.fits.likelihood.slopes import SLOTS
+from simulator.errors import RefusedError
+from simulator.frames import Frames
+from simulator.parameters import Parameters, parameters_of
+from simulator.scene import Quantity, Scene
+from simulator.sensor import PulsedSensor, Sensor, instrument
+
+__all__ = ["FitProblem", "fit_problem", "unknowns_of"]
+
+Array = NDArray[np.float64]
+
+_LOUDEST = 1e100  # times the noise: squares of readings, and bounds made from them, are numbers
+_WIDEST = 1e6  # of a square length against the ranges of the scene
+_CROSSTALK = (3, 4)
+_IN_READINGS = (3, 4, 5)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FitProblem:
+    """Everything unknown of a scene, and the frames that tell of it.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Scene path of each coordinate.
+    slots : ndarray of int, shape (d,)
+        Slot (`slopes.SLOTS`) of each coordinate.
+    layout : Layout
+        As the kernels take it; readings in ``unit``.
+    unit : float
+        A power of two near the read noise [reading units].
+    frames : ndarray, shape (n, 3)
+        Readings in ``unit`` and gain factor; saturated frames left out.
+    present : ndarray of bool, shape (n,)
+        Where an object may be.
+    gain : float
+        Sensor's gain in ``unit``.
+    instrument : Instrument
+        Sensor, readings in ``unit``.
+    background : bool or None
+        None where the scene has none.
+    support : (float, float)
+        Ranges that the scene allows [m].
+    parameters : Parameters
+        The scene's priors, from which starting points are drawn.
+    """
+
+    names: tuple[str, ...]
+    slots: NDArray[np.int64]
+    layout: Layout
+    unit: float
+    frames: Array
+    present: NDArray[np.bool_]
+    gain: float
+    instrument: Instrument
+    background: bool | None
+    support: tuple[float, float]
+    parameters: Parameters
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def work(self) -> tuple[Any, ...]:
+        """Return fresh work space for the kernels."""
+        low, high = self.support
+        law = np.array([[0.0, -1.0, 0.0, 0.0, 0.0, 0.0, low, high]])
+        rows = None if self.background is None else np.empty((1, 4))
+        return np.empty((1, 3)), np.empty((1, 2)), rows, law
+
+    def values(self, x: Array) -> Array:
+        """Return the physical values of all slots, readings in ``unit``, shape (SLOTS + 1,)."""
+        values = np.ones(SLOTS + 1)
+        physical(values, x, self.layout)
+        return values
+
+    def chain(self, x: Array) -> Array:
+        """Return the derivatives of all slots along the coordinates, shape (SLOTS, d)."""
+        values, low, high = self.values(x), np.empty(x.size), np.empty(x.size)
+        out = np.empty((SLOTS, x.size))
+        bounds_of(low, high, values, self.layout)
+        chain(out, values, x, self.layout, low, high)
+        return out
+
+    @property
+    def units(self) -> Array:
+        """Size of one unit of each unknown's value in SI or reading units, shape (d,)."""
+        return np.where(np.isin(self.slots, _IN_READINGS), self.unit, 1.0)
+
+    def natural(self, x: Array) -> Array:
+        """Return the unknowns in SI or reading units, shape (d,)."""
+        return np.asarray(self.values(x)[self.slots] * self.units)
+
+    def coordinates(self, natural: Array) -> Array:
+        """Return coordinates of given unknowns, shape (m, d) for (m, d); nan where impossible."""
+        x = np.empty_like(natural)
+        columns = {int(slot): natural[:, j] for j, slot in enumerate(self.slots)}
+        with np.errstate(all="ignore"):
+            for j, slot in enumerate(self.slots.tolist()):
+                value = natural[:, j]
+                if slot in _CROSSTALK:
+                    x[:, j] = value / self.unit
+                elif slot in (1, 8):
+                    c0 = columns.get(slot - 1, self.layout[1][slot - 1])
+                    x[:, j] = np.log1p(value / (2 * np.sqrt(c0)))
+                else:
+                    x[:, j] = np.log(value / (self.unit if slot in _IN_READINGS else 1.0))
+        return x
+
+    def select(self, index: NDArray[np.intp]) -> "FitProblem":
+        """Return the same problem with some of the frames."""
+        return dataclasses.replace(
+            self,
+            frames=np.ascontiguousarray(self.frames[index]),
+            present=np.ascontiguousarray(self.present[index]),
+        )
+
+
+def _paths(sensor: Sensor) -> tuple[str, ...]:
+    first, second = sensor.columns
+    return (
+        "object.c0",
+        "object.c1",
+        "object.c2",
+        f"crosstalk.{first}",
+        f"crosstalk.{second}",
+        "background.strength",
+        "background.distance_m",
+        "background.shadow.c0",
+        "background.shadow.c1",
+    )
+
+
+def unknowns_of(sensor: Sensor, scene: Scene) -> tuple[str, ...]:
+    """Return the scene paths of everything unknown but the ranges.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        Names the two crosstalks.
+    scene : Scene
+        The scene, checked.
+
+    Returns
+    -------
+    tuple of str
+        In the order object, crosstalk, background, shadow.
+    """
+    names = set(parameters_of(sensor, scene).names)
+    return tuple(path for path in _paths(sensor) if path in names)
+
+
+def _quantities(scene: Scene) -> list[Quantity | None]:
+    """Quantities of all slots; a member that the scene leaves out is None."""
+    crosstalk = scene.crosstalk_values or (0.0, 0.0)
+    found: list[Quantity | None] = [scene.object.c0, scene.object.c1, scene.object.c2, *crosstalk]
+    if scene.background is None or scene.shadow is None:
+        return [*found, 0.0, 0.0, 0.0, 0.0]
+    return [*found, scene.background.strength, scene.background.distance_m, *scene.shadow]
+
+
+def _supports(
+    sensor: Sensor, scene: Scene, support: tuple[float, float], light: tuple[float, float]
+) -> tuple[Array, Array]:
+    """Least and largest value of each slot: support of the prior, and what ranges can tell.
+
+    Object and background are readings at gain factor 1: ``light`` is the loudest reading at the
+    largest gain factor of the frames, and the loudest one of each frame's reading over its own.
+    """
+    near, far = support
+    wide = (near * near / _WIDEST, far * far * _WIDEST)
+    dim, bright = light
+    farthest = sensor.r0 if isinstance(sensor, PulsedSensor) else math.inf
+    box = [
+        wide,
+        (-math.inf, math.inf),
+        (
+            dim / sensor.gain * near * near * 1e-12,
+            bright / sensor.gain * far**4 / wide[0] * 1e6,
+        ),
+        (-math.inf, math.inf),
+        (-math.inf, math.inf),
+        (dim * 1e-9, bright * 1e3),
+        (near * 1e-3, farthest),
+        wide,
+        # a shadow of which nothing is stated has c1' >= 0 (its default prior)
+        (0.0, math.inf),
+    ]
+    low, high = np.empty(SLOTS), np.empty(SLOTS)
+    for k, quantity in enumerate(_quantities(scene)):
+        a, b = box[k]
+        if quantity is not None and not isinstance(quantity, float | int):
+            law = quantity.distribution()
+            if k == 8:
+                a = -math.inf
+            a, b = max(a, law.low), min(b, law.high)
+            if not a < b:  # the scene allows only what the box leaves out
+                a, b = law.low, law.high
+        low[k], high[k] = a, b
+    if not isinstance(sensor, PulsedSensor):
+        # beyond a wrap the background looks the same
+        high[6] = min(high[6], max(low[6], 0.0) + sensor.max_range_m)
+    quantities = _quantities(scene)
+    for k in (0, 7):
+        c1 = quantities[k + 1]
+        if isinstance(c1, float | int) and c1 < 0.0:
+            low[k] = max(low[k], 0.25 * c1 * c1 * (1 + 1e-9))
+    return low, high
+
+
+def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
+    """Set a fit up.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The sensor.
+    scene : Scene
+        The scene; of its priors only the supports bound the fit.
+    frames : Frames
+        Usable frames, at least one.
+
+    Returns
+    -------
+    FitProblem
+
+    Raises
+    ------
+    InvalidInputError
+        Where the scene breaks a rule.
+    RefusedError
+        Where squares of a reading in units of its noise would overflow.
+    """
+    parameters = parameters_of(sensor, scene)
+    noise = sensor.noise
+    unit = 2.0 ** round(math.log2(noise.read[1]))
+    r0, wave = instrument(sensor)
+    varies = noise.shot > 0 or noise.relative > 0
+    near, far = parameters.range_prior.low, min(parameters.range_prior.high, sensor.max_range_m)
+    near = max(near, far * 1e-6)
+    gain = np.ones(len(frames)) if frames.gain is None else frames.gain
+    with np.errstate(over="ignore"):
+        scaled = frames.readings / unit
+    if not (np.abs(scaled) < _LOUDEST).all():
+        raise RefusedError(
+            f"a reading is more than {_LOUDEST:g} times its noise: check the units of the readings "
+            "and of the noise's `read`, or leave out frames that something else has spoilt"
+        )
+    readings = np.ascontiguousarray(np.column_stack([scaled, gain]))
+    loudest = np.maximum(np.abs(scaled).max(axis=1), 1.0) * unit
+    with np.errstate(over="ignore"):
+        light = float(loudest.max() / gain.max()), float((loudest / gain).max())
+    low, high = _supports(sensor, scene, (near, far), light)
+    low[3:6], high[3:6] = low[3:6] / unit, high[3:6] / unit
+    index, known = np.full(SLOTS, KNOWN, dtype=np.int64), np.zeros(SLOTS)
+    paths = _paths(sensor)
+    names = tuple(path for path in paths if path in parameters.names)
+    for k, path in enumerate(paths):
+        if path in names:
+            index[k] = names.index(path)
+        elif path in parameters.known:
+            known[k] = parameters.known[path] / (unit if k in _IN_READINGS else 1.0)
+    if parameters.shadow_is_object:
+        index[7:] = SAME
+    return FitProblem(
+        names=names,
+        slots=np.flatnonzero(index >= 0),
+        layout=(index, known, low, high),
+        unit=unit,
+        frames=readings,
+        present=frames.present,
+        gain=sensor.gain / unit,
+        instrument=(
+            r0,
+            wave,
+            (noise.read[0] / unit, noise.read[1] / unit),
+            noise.shot / unit if varies else None,
+            noise.relative if varies else None,
+        ),
+        background=True if parameters.has_background else None,
+        support=(near, far),
+        parameters=parameters,
+    )

@@ -1,0 +1,1 @@
+"""The techniques of many frames, one file each, and their registry."""

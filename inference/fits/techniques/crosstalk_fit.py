@@ -1,0 +1,222 @@
+"""Crosstalk and c2 by linear least squares on ranges from derivatives (5.13).
+
+Ranges come from differential time of flight, which crosstalk does not reach; given them, readings
+are linear in both crosstalks and c2. Errors of the ranges enter the weights as a rank-one part of
+each frame's covariance along the direction in which its readings move with the range. Where the
+derivatives are differences of the readings themselves, the result is but a start for the
+likelihood of all frames.
+"""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.estimates import TechniqueResult
+from inference.fits.answer.counts import unmodelled_error
+from inference.fits.answer.likelihood_answer import likelihood_answer_from
+from inference.fits.likelihood.problem import unknowns_of
+from inference.fits.linear.linear_answer import linear_answer, without_warnings
+from inference.fits.linear.weighted import LinearFit, covariances, solve_weighted, whitener_of
+from inference.fits.techniques.object_fit import carrier, gains
+from inference.realtime.differential import DIFFERENTIAL
+from inference.realtime.known import Known
+from inference.realtime.net import SATURATED, rule_out
+from inference.realtime.technique import Task, Technique
+from simulator.errors import RefusedError
+from simulator.frames import Frames
+from simulator.scene import Scene
+from simulator.sensor import PulsedSensor, Sensor
+
+__all__ = ["CROSSTALK_FIT"]
+
+Array = NDArray[np.float64]
+
+_PASSES = 50
+_NARROW = 0.1  # relative standard deviation of a range up to which first order describes it
+
+
+def _unit_signal(task: Task, r: Array) -> tuple[Array, Array]:
+    """Return the object's readings for c2 = 1, and their derivative along log r; each (n, 2)."""
+    c0, c1 = task.known.get("object.c0"), task.known.get("object.c1")
+    q = r * (r + c1) + c0
+    size = (task.sensor.gain * gains(task.frames) * c0 / (r * r * q))[:, None]
+    slope = (-2.0 - r * (2.0 * r + c1) / q)[:, None]
+    unit = carrier(task.sensor, r)
+    if isinstance(task.sensor, PulsedSensor):
+        turn = np.stack([np.where(r < task.sensor.r0, unit[:, 0], 0.0), np.zeros(r.size)], axis=1)
+    else:
+        angle = (task.sensor.wave_number * r)[:, None]
+        turn = angle * np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+    return size * unit, size * (slope * unit + turn)
+
+
+def _fit(
+    task: Task, roots: Array, sds: Array, chosen: NDArray[np.intp], unknown: tuple[str, ...]
+) -> LinearFit:
+    """Fit on chosen roots; choose and weigh anew until nothing changes."""
+    sensor, frames = task.sensor, task.frames
+    n = len(frames)
+    usable = rule_out(sensor, frames) != SATURATED
+    empty = usable & ~frames.present
+    first, second = sensor.columns
+    paths = (f"crosstalk.{first}", f"crosstalk.{second}", "object.c2")
+    values = np.array([_known(task, path) for path in paths])
+    free = np.array([path in unknown for path in paths])
+    x = np.zeros(3)
+    x[~free] = values[~free]
+    fit = LinearFit(np.empty(0), np.empty((0, 0)), 0, np.empty(0), usable, np.full(n, np.nan))
+    rows = np.arange(n)
+    index = chosen
+    shift = np.zeros(n)  # log r of the fit less that of the derivatives
+    for _ in range(_PASSES):
+        spread = sds[rows, index] / roots[rows, index]
+        r = roots[rows, index] * np.exp(shift)
+        unit, slope = _unit_signal(task, r)
+        unit[empty], slope[empty], spread[empty] = 0.0, 0.0, 0.0
+        used = usable & np.isfinite(unit).all(axis=1) & (spread < _NARROW)
+        if int((used & ~empty).sum()) <= int(free.sum()):
+            return dataclasses.replace(fit, rank=0)
+        own = covariances(sensor, frames.readings, np.zeros_like(unit))
+        common = np.stack([sensor.noise.relative * x[2] * unit, x[2] * spread[:, None] * slope])
+        used &= np.isfinite(own).all(axis=(1, 2)) & np.isfinite(common).all(axis=(0, 2))
+        # linear in the range about the fitted one
+        expected = unit - shift[:, None] * slope
+        design = np.zeros((n, 2, 3))
+        design[:, 0, 0] = design[:, 1, 1] = 1.0
+        design[:, :, 2] = expected
+        whitener = whitener_of(own[used], common[:, used])
+        matrix = np.einsum("nij,njk->nik", whitener, design[used])
+        target = np.einsum("nij,nj->ni", whitener, frames.readings[used])
+        target = target - matrix[:, :, ~free] @ x[~free]
+        flat = matrix[:, :, free].reshape(-1, int(free.sum()))
+        solution, factor, rank = solve_weighted(flat, target.ravel())
+        residuals = flat @ solution - target.ravel()
+        last, last_shift = x.copy(), shift
+        x[free] = solution
+        fit = LinearFit(solution, factor, rank, residuals, used, np.where(used & ~empty, r, np.nan))
+        if rank < solution.size:
+            break
+        miss = frames.readings - x[:2] - x[2] * expected
+        pull = np.zeros((n, 2))
+        white = np.einsum("nij,nj->ni", whitener, miss[used])
+        pull[used] = np.einsum("nji,nj->ni", whitener, white)
+        gain = x[2] * spread**2 * np.einsum("ni,ni->n", slope, pull)
+        shift = np.where(used, np.clip(gain, -3 * _NARROW, 3 * _NARROW), 0.0)
+        better = _best_roots(task, roots, x)
+        if not np.array_equal(better, index):
+            index, shift = better, np.zeros(n)
+        elif np.allclose(last, x, rtol=1e-10, atol=0.0) and np.allclose(
+            last_shift, shift, rtol=0.0, atol=1e-9
+        ):
+            break
+    return fit
+
+
+def _best_roots(task: Task, roots: Array, x: Array) -> NDArray[np.intp]:
+    """Return the index of the root of each frame whose readings lie nearest to the fit."""
+    misses = []
+    for k in range(roots.shape[1]):
+        there = x[:2] + x[2] * _unit_signal(task, roots[:, k])[0]
+        miss = np.abs(task.frames.readings - there).sum(axis=1)
+        misses.append(np.where(np.isnan(miss), np.inf, miss))
+    return np.asarray(np.argmin(np.stack(misses, axis=1), axis=1))
+
+
+def _known(task: Task, path: str) -> float:
+    if path == "object.c2":
+        return task.known.numbers.get(path, 0.0)
+    crosstalk = task.scene.crosstalk_values
+    if crosstalk is None:
+        return 0.0
+    value = crosstalk[0] if path.endswith(("w1", ".i")) else crosstalk[1]
+    return float(value) if isinstance(value, float | int) else 0.0
+
+
+def _solve(task: Task) -> TechniqueResult:
+    unknown = unknowns_of(task.sensor, task.scene)
+    single = DIFFERENTIAL.solve(task)
+    solved = int(np.count_nonzero(single.root_count))
+    if solved < len(unknown) + 1:
+        raise RefusedError(
+            f"needs at least {len(unknown) + 1} frames whose derivatives give a range for "
+            f"{', '.join(unknown)}, and has {solved}; move the object faster, or take joint_fit"
+        )
+    last = np.maximum(single.root_count - 1, 0)
+    with np.errstate(all="ignore"):
+        fits = [
+            _fit(task, single.roots_m, single.roots_sd_m, start, unknown)
+            for start in {tuple(start): start for start in (np.zeros_like(last), last)}.values()
+        ]
+    good = [fit for fit in fits if fit.rank == len(unknown)]
+    if not good:
+        raise RefusedError(
+            f"the frames do not tell {', '.join(unknown)} apart, or fewer than {len(unknown) + 1} "
+            "have derivatives that fix the range to 10 %: move the object nearer and farther, or "
+            "take joint_fit"
+        )
+    fit = min(good, key=lambda one: one.chi_square)
+    first, second = task.sensor.columns
+    order = [
+        path
+        for path in (f"crosstalk.{first}", f"crosstalk.{second}", "object.c2")
+        if path in unknown
+    ]
+    values = dict(zip(order, fit.x.tolist(), strict=True))
+    if values.get("object.c2", 1.0) <= 0.0:
+        raise RefusedError(
+            "the best fit has a negative c2: the readings do not fall with range as the object's "
+            "c0 and c1 say; check them, or take joint_fit"
+        )
+    if task.frames.derivatives is None:
+        # differences of the readings tell nothing that the readings do not, and their errors are
+        # neither small nor independent: they serve to find where the likelihood is climbed from
+        answer = likelihood_answer_from("crosstalk_fit", task, values)
+        if answer.fit is not None and answer.fit["misfit"]:
+            raise RefusedError(
+                "the ranges by differences in time lead to values that do not explain the "
+                "readings; take joint_fit, which starts from everywhere"
+            )
+        return answer
+    light = float(np.median(np.abs(task.frames.readings - np.median(task.frames.readings, axis=0))))
+    natural = {
+        path: (values[path], np.eye(len(order))[k], light if path != "object.c2" else values[path])
+        for k, path in enumerate(order)
+    }
+    return linear_answer("crosstalk_fit", task, fit, natural, single, {})
+
+
+def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None) -> str | None:
+    if scene.motion != "radial":
+        return f"needs radial motion, and the scene's is {scene.motion}"
+    unmodelled = unmodelled_error(scene)
+    if unmodelled:
+        return unmodelled
+    if scene.optional_terms:
+        return "keeps crosstalk, and the scene leaves it to the data; use a posterior"
+    unknown = unknowns_of(sensor, scene)
+    if not any(path.startswith("crosstalk.") for path in unknown):
+        return "fits crosstalk, and the scene's is known"
+    if frames is not None and int(frames.present.sum()) < len(unknown) + 1:
+        return (
+            f"needs at least {len(unknown) + 1} frames with the object at different ranges for "
+            f"{', '.join(unknown)}, and has {int(frames.present.sum())}; send more"
+        )
+    del known
+    return None
+
+
+CROSSTALK_FIT = Technique(
+    name="crosstalk_fit",
+    kinds=("pulsed", "sine_wave"),
+    observables="both readings and their derivatives in time, of all frames",
+    needs=("object.c0", "object.c1"),
+    immune_to=("crosstalk",),
+    uses_background=False,
+    differential=True,
+    cost=8e4,
+    equations="5.13: readings linear in crosstalk and c2 on ranges by `differential`",
+    roots="as `differential`; the fit decides between several",
+    solve=without_warnings(_solve),
+    obstacle=_obstacle,
+)

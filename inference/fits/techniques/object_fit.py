@@ -1,0 +1,242 @@
+"""Object parameters by linear least squares on ranges that need no object (5.6-5.8).
+
+1 / Phi = x1 r^2 + x2 r^3 + x3 r^4 with x1 = 1 / c2, x2 = c1 / (c0 c2), x3 = 1 / (c0 c2). Ranges
+come from conventional time of flight, or from background intensity before a known background.
+Their noise is treated to first order here; from the values found the likelihood of all frames is
+climbed, in which every range is unknown.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.estimates import TechniqueResult
+from inference.fits.answer.counts import linear_obstacle
+from inference.fits.answer.likelihood_answer import likelihood_answer_from
+from inference.fits.likelihood.problem import unknowns_of
+from inference.fits.linear.linear_answer import linear_answer, without_warnings
+from inference.fits.linear.weighted import (
+    Equations,
+    LinearFit,
+    Observed,
+    fit_equations,
+    refuse_at_rest,
+)
+from inference.realtime.background_intensity import BACKGROUND_INTENSITY
+from inference.realtime.conventional import CONVENTIONAL
+from inference.realtime.known import Known
+from inference.realtime.technique import Task, Technique
+from simulator.errors import RefusedError
+from simulator.frames import Frames
+from simulator.scene import Scene
+from simulator.sensor import PulsedSensor, Sensor
+
+__all__ = ["OBJECT_FIT", "carrier", "gains", "visible_background"]
+
+Array = NDArray[np.float64]
+
+_OBJECT = ("object.c0", "object.c1", "object.c2")
+_BACKGROUND = (
+    "background.strength",
+    "background.distance_m",
+    "background.shadow.c0",
+    "background.shadow.c1",
+)
+_SIGNIFICANT = 3.0  # standard deviations that a coefficient must be above zero
+_NARROW = 0.1  # relative standard deviation of a range up to which first order describes it
+_POWER_LAW = 0.15  # distance of the exponent from a whole number
+
+
+def gains(frames: Frames) -> Array:
+    """Return the gain factor of every frame, shape (n,)."""
+    return np.ones(len(frames)) if frames.gain is None else frames.gain
+
+
+def carrier(sensor: Sensor, r: Array) -> Array:
+    """Return what one unit of flux from range r reads, shape (n, 2)."""
+    if isinstance(sensor, PulsedSensor):
+        return np.stack([np.minimum(r / sensor.r0, 1.0), np.ones_like(r)], axis=1)
+    phase = sensor.wave_number * r + sensor.phase_offset_rad
+    return np.stack([np.cos(phase), np.sin(phase)], axis=1)
+
+
+def visible_background(task: Task, r: Array, frames: Frames) -> Array:
+    """Return the known background's readings behind an object at range r, shape (n, 2)."""
+    if task.scene.background is None:
+        return np.zeros((r.size, 2))
+    strength, distance, c0, c1 = (task.known.get(path) for path in _BACKGROUND)
+    visible = r * (r + c1) / (r * (r + c1) + c0)
+    bare = carrier(task.sensor, np.full(1, distance))
+    return np.asarray(strength * (gains(frames) * visible)[:, None] * bare)
+
+
+def _flux(task: Task, r: Array, frames: Frames) -> Array:
+    """Phi / (Phi0 A_D) of the object, shape (n,) [1/m^2]."""
+    crosstalk = task.known.crosstalk
+    assert crosstalk is not None  # noqa: S101  # the plan leaves the technique out
+    net = frames.readings - np.asarray(crosstalk) - visible_background(task, r, frames)
+    if isinstance(task.sensor, PulsedSensor):
+        size = net[:, 1]
+    else:
+        size = np.einsum("ni,ni->n", net, carrier(task.sensor, r))
+    return np.asarray(size / gains(frames) / task.sensor.gain)
+
+
+def _map(unknown: tuple[str, ...], known: Known) -> tuple[Array, Array]:
+    """Return T and t with (x1, x2, x3) = T y + t for the unknown members, whichever they are."""
+    c0, c1, c2 = (known.numbers.get(path) for path in _OBJECT)
+    t, columns = np.zeros(3), []
+    if c2 is not None:
+        t[0] = 1.0 / c2
+    if c0 is not None and c2 is not None:
+        t[2] = 1.0 / (c0 * c2)
+        columns.append(np.array([0.0, 1.0, 0.0]))
+    elif c0 is not None:
+        # x1 = c0 x3
+        columns.append(np.array([c0, c1 if c1 is not None else 0.0, 1.0]))
+        if c1 is None:
+            columns.append(np.array([0.0, 1.0, 0.0]))
+    else:
+        if c2 is None:
+            columns.append(np.array([1.0, 0.0, 0.0]))
+        if c1 is None:
+            columns.append(np.array([0.0, 1.0, 0.0]))
+        columns.append(np.array([0.0, c1 if c1 is not None else 0.0, 1.0]))
+    assert len(columns) == len(unknown)  # noqa: S101
+    return np.stack(columns, axis=1), t
+
+
+def _exponent(task: Task, fit: LinearFit) -> float:
+    """Return the power of 1/r with which the flux falls over the ranges of a fit."""
+    used = task.frames.select(np.flatnonzero(fit.used))
+    r = fit.ranges[fit.used]
+    light = np.log(np.maximum(_flux(task, r, used), np.finfo(float).tiny))
+    return -float(np.polynomial.polynomial.polyfit(np.log(r), light, 1)[1])
+
+
+def _open(
+    x: Array, sd: Array, unknown: tuple[str, ...], reach: float, exponent: float
+) -> dict[str, str]:
+    """Return which members are not identified, and why."""
+    square = x[2] <= _SIGNIFICANT * sd[2] or x[2] * reach * reach <= 1e-12 * abs(x[0])
+    fourth = x[0] <= _SIGNIFICANT * sd[0]
+    missing: dict[str, str] = {}
+    if (square and abs(exponent - 2) > _POWER_LAW) or (fourth and abs(exponent - 4) > _POWER_LAW):
+        reason = (
+            f"the flux falls as r^-{exponent:.2g} over these ranges, and noise hides how that "
+            "changes: too uncertain; move the object nearer and farther, or lower the noise"
+        )
+        return dict.fromkeys(unknown, reason)
+    if square:
+        reason = "the flux follows a square law over these ranges: c0 and c1 not identifiable"
+        missing |= {path: reason for path in _OBJECT[:2] if path in unknown}
+    if fourth:
+        reason = "the flux follows a fourth law over these ranges: only c0 c2 is identifiable"
+        missing |= {path: reason for path in (_OBJECT[0], _OBJECT[2]) if path in unknown}
+    if not missing and not x[1] / x[2] > -2.0 * math.sqrt(x[0] / x[2]):
+        reason = "the best fit has c1 <= -2 sqrt(c0), where the flux would have poles"
+        missing |= {path: reason for path in _OBJECT[:2] if path in unknown}
+    return missing
+
+
+def _natural(x: Array, factor: Array) -> dict[str, tuple[float, Array, float]]:
+    """Values of c0, c1, c2 with gradients along the fit's coordinates; ``factor`` is dx/dy."""
+    c2, c1, c0 = 1.0 / x[0], x[1] / x[2], x[0] / x[2]
+    g0 = (factor[0] - c0 * factor[2]) / x[2]
+    g1 = (factor[1] - c1 * factor[2]) / x[2]
+    g2 = -c2 * c2 * factor[0]
+    root = math.sqrt(abs(c0))
+    return {
+        "object.c0": (c0, g0, abs(c0)),
+        "object.c1": (c1, g1, c1 + 2 * root),
+        "object.c2": (c2, g2, abs(c2)),
+    }
+
+
+def _solve(task: Task) -> TechniqueResult:
+    technique = CONVENTIONAL if task.scene.background is None else BACKGROUND_INTENSITY
+    unknown = unknowns_of(task.sensor, task.scene)
+    to_x, fixed = _map(unknown, task.known)
+
+    def equation(r: Array, frames: Frames) -> Observed:
+        flux = _flux(task, r, frames)
+        powers = np.stack([r**2, r**3, r**4], axis=1) * flux[:, None]
+        return Observed(powers @ to_x, 1.0 - powers @ fixed)
+
+    def signal(r: Array, frames: Frames) -> Array:
+        size = task.sensor.gain * gains(frames) * _flux(task, r, frames)
+        return np.asarray(size[:, None] * carrier(task.sensor, r))
+
+    fit, single = fit_equations(Equations(technique, task, equation, signal, unknown, _NARROW))
+    refuse_at_rest(fit, single, unknown)
+    x = to_x @ fit.x + fixed
+    sd = np.linalg.norm(to_x @ fit.factor, axis=1)
+    reach = float(np.nanmax(fit.ranges))
+    missing = _open(x, np.where(fixed != 0, 0.0, sd), unknown, reach, _exponent(task, fit))
+    if len(missing) == len(unknown) and not missing.get("object.c1", "").startswith("the flux"):
+        raise RefusedError("; ".join(dict.fromkeys(missing.values())))
+    if "object.c0" in missing and "object.c2" not in missing and "object.c2" in unknown:
+        fit, x, to_x = _square_law(task, technique, fit, x, to_x)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        natural = _natural(x, to_x)
+    if not missing:
+        # the ranges that were regressed on are no truth: the likelihood knows their noise
+        values = {path: natural[path][0] for path in unknown}
+        return likelihood_answer_from("object_fit", task, values)
+    kept = {path: natural[path] for path in unknown if path not in missing}
+    return linear_answer("object_fit", task, fit, kept, single, missing)
+
+
+def _square_law(
+    task: Task, technique: Technique, fit: LinearFit, x: Array, to_x: Array
+) -> tuple[LinearFit, Array, Array]:
+    """Fit c2 alone where nothing else is seen."""
+
+    def equation(r: Array, frames: Frames) -> Observed:
+        return Observed((r**2 * _flux(task, r, frames))[:, None], np.ones(r.size))
+
+    def signal(r: Array, frames: Frames) -> Array:
+        size = task.sensor.gain * gains(frames) * _flux(task, r, frames)
+        return np.asarray(size[:, None] * carrier(task.sensor, r))
+
+    flat, _ = fit_equations(Equations(technique, task, equation, signal, ("object.c2",), _NARROW))
+    # a cubic term without a fourth-order one is no square law: keep the whole fit's c2
+    if flat.chi_square - fit.chi_square > _SIGNIFICANT**2 * 2:
+        return fit, x, to_x
+    return flat, np.array([flat.x[0], 0.0, 0.0]), np.array([[1.0], [0.0], [0.0]])
+
+
+def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None) -> str | None:
+    unknown = unknowns_of(sensor, scene)
+    unserved = linear_obstacle(scene, unknown)
+    if unserved:
+        return unserved
+    if scene.background is not None:
+        missing = [path for path in _BACKGROUND if not known.has(path)]
+        if missing:
+            return f"needs a background that is known, and {', '.join(missing)} is not"
+    if not any(path in _OBJECT for path in unknown):
+        return "fits the object, and the scene's is known"
+    if frames is not None and int(frames.present.sum()) < len(unknown) + 1:
+        return (
+            f"needs at least {len(unknown) + 1} frames with the object at different ranges for "
+            f"{', '.join(unknown)}, and has {int(frames.present.sum())}; send more"
+        )
+    return None
+
+
+OBJECT_FIT = Technique(
+    name="object_fit",
+    kinds=("pulsed", "sine_wave"),
+    observables="w1 and w2, or i and q, of all frames",
+    needs=(),
+    immune_to=("background",),
+    uses_background=False,
+    differential=False,
+    cost=5e4,
+    equations="5.6-5.8 with errata: 1/Phi linear in 1/c2, c1/(c0 c2), 1/(c0 c2)",
+    roots="as `conventional`, or `background_intensity` before a known background",
+    solve=without_warnings(_solve),
+    obstacle=_obstacle,
+)

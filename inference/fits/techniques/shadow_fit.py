@@ -1,0 +1,177 @@
+"""The shadow, or the background's strength, by linear least squares (5.2.3 and Table 5.1).
+
+Ranges come from background cancelling, which needs the object and the background's distance but
+not what is fitted here. With S the visible share, S / (1 - S) = r^2 / c0' + r c1' / c0' is linear
+in 1 / c0' and c1' / c0'; with a known shadow the readings are linear in the strength.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.estimates import TechniqueResult
+from inference.fits.answer.counts import linear_obstacle
+from inference.fits.likelihood.problem import unknowns_of
+from inference.fits.linear.linear_answer import linear_answer, without_warnings
+from inference.fits.linear.weighted import Equations, Observed, fit_equations, refuse_at_rest
+from inference.fits.techniques.object_fit import carrier, gains
+from inference.realtime.background_cancelling import BACKGROUND_CANCELLING
+from inference.realtime.known import Known
+from inference.realtime.net import SATURATED, rule_out
+from inference.realtime.technique import Task, Technique
+from simulator.errors import RefusedError
+from simulator.frames import Frames
+from simulator.scene import Scene
+from simulator.sensor import PulsedSensor, Sensor
+
+__all__ = ["SHADOW_FIT"]
+
+Array = NDArray[np.float64]
+
+_C0, _C1 = "background.shadow.c0", "background.shadow.c1"
+_STRENGTH = "background.strength"
+_SIGNIFICANT = 3.0
+
+
+def _signal(task: Task, r: Array, frames: Frames) -> Array:
+    """Return the known object's readings, shape (n, 2)."""
+    c0, c1, c2 = (task.known.get(f"object.{name}") for name in ("c0", "c1", "c2"))
+    flux = c0 * c2 / (r * r * (r * (r + c1) + c0))
+    size = task.sensor.gain * gains(frames) * flux
+    return np.asarray(size[:, None] * carrier(task.sensor, r))
+
+
+def _visible(task: Task, r: Array, frames: Frames) -> Array:
+    """Return the background's reading (w2 or its component towards it) over the gain factor."""
+    crosstalk = task.known.crosstalk
+    assert crosstalk is not None  # noqa: S101  # the plan leaves the technique out
+    net = frames.readings - np.asarray(crosstalk) - _signal(task, r, frames)
+    if isinstance(task.sensor, PulsedSensor):
+        return np.asarray(net[:, 1] / gains(frames))
+    bare = carrier(task.sensor, np.full(1, task.known.get("background.distance_m")))[0]
+    return np.asarray(net @ bare / gains(frames))
+
+
+def _solve(task: Task) -> TechniqueResult:
+    unknown = unknowns_of(task.sensor, task.scene)
+    if unknown == (_STRENGTH,):
+        return _solve_strength(task)
+    strength = task.known.get(_STRENGTH)
+    c0, c1 = (task.known.numbers.get(path) for path in (_C0, _C1))
+    # (y1, y2) = (1 / c0', c1' / c0') = T y + t
+    if c0 is not None:
+        to_y, fixed = np.array([[0.0], [1.0]]), np.array([1.0 / c0, 0.0])
+    elif c1 is not None:
+        to_y, fixed = np.array([[1.0], [c1]]), np.zeros(2)
+    else:
+        to_y, fixed = np.eye(2), np.zeros(2)
+
+    def equation(r: Array, frames: Frames) -> Observed:
+        share = _visible(task, r, frames) / strength
+        powers = np.stack([r**2, r], axis=1) * (1.0 - share)[:, None]
+        return Observed(powers @ to_y, share - powers @ fixed)
+
+    def signal(r: Array, frames: Frames) -> Array:
+        return _signal(task, r, frames)
+
+    fit, single = fit_equations(Equations(BACKGROUND_CANCELLING, task, equation, signal, unknown))
+    refuse_at_rest(fit, single, unknown)
+    y = to_y @ fit.x + fixed
+    sd = np.linalg.norm(to_y @ fit.factor, axis=1)
+    missing: dict[str, str] = {}
+    if y[0] <= _SIGNIFICANT * sd[0] and fixed[0] == 0.0:
+        reason = "no term in r^2 is seen over these ranges: the shadow is not identifiable"
+        missing = dict.fromkeys(unknown, reason)
+    elif not y[1] / y[0] > -2.0 / math.sqrt(y[0]):
+        reason = "the best fit has c1' <= -2 sqrt(c0'), where the shadow would have poles"
+        missing = dict.fromkeys(unknown, reason)
+    if missing:
+        raise RefusedError(
+            "; ".join(dict.fromkeys(missing.values()))
+            + "; move the object nearer, lower the noise, or use a posterior with priors"
+        )
+    fitted0, fitted1 = 1.0 / y[0], y[1] / y[0]
+    natural = {
+        _C0: (fitted0, -fitted0 * fitted0 * to_y[0], fitted0),
+        _C1: (
+            fitted1,
+            (to_y[1] - fitted1 * to_y[0]) / y[0],
+            fitted1 + 2.0 * math.sqrt(fitted0),
+        ),
+    }
+    kept = {path: natural[path] for path in unknown}
+    return linear_answer("shadow_fit", task, fit, kept, single, {})
+
+
+def _solve_strength(task: Task) -> TechniqueResult:
+    c0, c1 = task.known.get(_C0), task.known.get(_C1)
+    clipped = rule_out(task.sensor, task.frames) == SATURATED
+
+    def equation(r: Array, frames: Frames) -> Observed:
+        visible = _visible(task, r, frames)
+        share = r * (r + c1) / (r * (r + c1) + c0)
+        # an empty scene shows all of it, unless it is beyond full scale
+        empty = ~frames.present
+        bare = np.where(clipped, np.nan, _visible_of_empty(task, frames))
+        share, visible = np.where(empty, 1.0, share), np.where(empty, bare, visible)
+        return Observed(share[:, None], visible)
+
+    def signal(r: Array, frames: Frames) -> Array:
+        return np.where(frames.present[:, None], _signal(task, r, frames), 0.0)
+
+    fit, single = fit_equations(
+        Equations(BACKGROUND_CANCELLING, task, equation, signal, (_STRENGTH,))
+    )
+    value = float(fit.x[0])
+    if not value > 0.0:
+        raise RefusedError(
+            f"the best fit has a background of strength {value:.3g}; leave the background out of "
+            "the scene, or use a posterior with priors"
+        )
+    natural = {_STRENGTH: (value, np.ones(1), value)}
+    return linear_answer("shadow_fit", task, fit, natural, single, {})
+
+
+def _visible_of_empty(task: Task, frames: Frames) -> Array:
+    crosstalk = task.known.crosstalk
+    assert crosstalk is not None  # noqa: S101
+    net = frames.readings - np.asarray(crosstalk)
+    bare = carrier(task.sensor, np.full(1, task.known.get("background.distance_m")))[0]
+    size = net[:, 1] if isinstance(task.sensor, PulsedSensor) else net @ bare
+    return np.asarray(size / gains(frames))
+
+
+def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None) -> str | None:
+    unknown = unknowns_of(sensor, scene)
+    unserved = linear_obstacle(scene, unknown)
+    if unserved:
+        return unserved
+    if not unknown:
+        return "fits the shadow or the background's strength, and both are known"
+    if _STRENGTH in unknown and len(unknown) > 1:
+        return "strength and shadow together are not linear in the readings: take joint_fit"
+    if not known.has(_STRENGTH) and _STRENGTH not in unknown:
+        return "needs background.strength as a number, or as an unknown of a term that stays"
+    if frames is not None and int(frames.present.sum()) < len(unknown) + 1:
+        return (
+            f"needs at least {len(unknown) + 1} frames with the object at different ranges for "
+            f"{', '.join(unknown)}, and has {int(frames.present.sum())}; send more"
+        )
+    return None
+
+
+SHADOW_FIT = Technique(
+    name="shadow_fit",
+    kinds=("pulsed", "sine_wave"),
+    observables="w1 and w2, or i and q, of all frames",
+    needs=("object.c0", "object.c1", "object.c2", "background.distance_m"),
+    immune_to=("background",),
+    uses_background=True,
+    differential=False,
+    cost=2e4,
+    equations="Table 5.1: S/(1-S) linear in 1/c0', c1'/c0'; or readings linear in the strength",
+    roots="as `background_cancelling`; the fit decides between several",
+    solve=without_warnings(_solve),
+    obstacle=_obstacle,
+)

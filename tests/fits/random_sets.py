@@ -1,0 +1,170 @@
+"""Random data sets of five kinds of scenes, and whether a fit that got no guess found its way."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.estimate import estimate
+from inference.fits.answer.determined import LIMIT
+from inference.fits.answer.inflation import widening
+from inference.fits.likelihood.information import residuals_and_information
+from inference.fits.likelihood.multistart import optimum_from
+from inference.fits.likelihood.problem import fit_problem
+from simulator.scene import Scene, parse_scene
+from simulator.sensor import Sensor, parse_sensor
+from simulator.simulate import Simulation, simulate
+from simulator.trajectories import SampledTrajectory
+from tests.fits.scenes import values_of
+
+Array = NDArray[np.float64]
+
+CLASSES = ("object", "crosstalk", "known background", "free shadow", "everything")
+_NOISE = {"free shadow": (3.0, 5.0), "everything": (4.0, 6.0)}  # decades of SNR, else 2 to 4
+_SAME = 0.1
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RandomSet:
+    """One data set.
+
+    Attributes
+    ----------
+    sensor : Sensor
+    scene : Scene
+        What the fit is told.
+    truth : dict
+        The scene with all its numbers.
+    simulation : Simulation
+        Frames and true ranges.
+    """
+
+    sensor: Sensor
+    scene: Scene
+    truth: dict[str, Any]
+    simulation: Simulation
+
+
+def random_set(name: str, kind: str, seed: int) -> RandomSet:
+    """Draw a data set: object, ranges, noise, and what stands before and behind.
+
+    Parameters
+    ----------
+    name : str
+        One of `CLASSES`. "known background": strength, distance and shadow known, object not;
+        "free shadow": strength and distance known; "everything": crosstalk, object, strength,
+        distance and shadow unknown, half of the sets with empty scenes.
+    kind : str
+        Of the sensor.
+    seed : int
+        Of all that is random.
+    """
+    rng = np.random.default_rng(seed)
+    c0 = math.exp(rng.normal(math.log(0.08), 0.8))
+    c1 = 2 * math.sqrt(c0) * math.expm1(rng.normal(0.0, 0.25))
+    c2 = math.exp(rng.normal(math.log(0.1), 0.5))
+    count = int(rng.integers(12, 41))
+    near = math.exp(rng.uniform(math.log(0.08), math.log(0.2)))
+    far = min(near * math.exp(rng.uniform(math.log(4), math.log(20))), 2.4)
+    ranges = np.exp(rng.uniform(math.log(near), math.log(far), count))
+    middle = near * far
+    signal = c0 * c2 / middle / (middle + c1 * math.sqrt(middle) + c0)
+    read = signal / 10 ** rng.uniform(*_NOISE.get(name, (2.0, 4.0)))
+    timing = {"pulse_width_s": 1e-7} if kind == "pulsed" else {"frequency_hz": 1e7}
+    sensor = parse_sensor({"kind": kind, **timing, "noise": {"read": [read, read]}})
+    truth: dict[str, Any] = {"object": {"c0": c0, "c1": c1, "c2": c2}}
+    scene: dict[str, Any] = {"range_m": {"prior": "loguniform", "low": 0.02, "high": 7.0}}
+    if name in ("crosstalk", "everything"):
+        truth["crosstalk"] = (rng.normal(0.0, 1.0, 2) * signal).tolist()
+        scene["crosstalk"] = [{"prior": "normal", "mean": 0.0, "sd": 3 * signal}] * 2
+    if name in ("known background", "free shadow", "everything"):
+        distance = float(rng.uniform(2.6, 7.0))
+        wall: dict[str, Any] = {
+            "strength": math.exp(rng.normal(0.0, 0.7)) / (2 * math.pi * distance**2),
+            "distance_m": distance,
+            "shadow": {
+                "c0": c0 * math.exp(rng.normal(math.log(0.75), 0.3)),
+                "c1": math.sqrt(c0) * abs(rng.normal(0.0, 0.2)),
+            },
+        }
+        truth["background"] = wall
+        scene["background"] = dict(wall)
+        if name != "known background":
+            del scene["background"]["shadow"]
+        if name == "everything":
+            scene["background"]["strength"] = {"prior": "lognormal", "median": 0.02, "sigma": 1.0}
+            scene["background"]["distance_m"] = {"prior": "uniform", "low": 2.5, "high": 7.4}
+    present = np.ones(count, dtype=bool)
+    if name == "everything" and rng.random() < 0.5:
+        present[-3:] = False
+    trajectory = SampledTrajectory(range_m=ranges.tolist(), object_present=present.tolist())
+    simulation = simulate(sensor, parse_scene(truth), trajectory, seed)
+    return RandomSet(sensor, parse_scene(scene), truth, simulation)
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """What became of one data set.
+
+    Attributes
+    ----------
+    excess : float
+        Deviance above that of a start at the truth; nan where the fit was refused.
+    refused : bool
+        Whether the fit was refused.
+    shared : float
+        Common relative standard deviation of the ranges: the larger one of the Cramer-Rao bound
+        at the truth and of what a fit that starts there finds.
+    misses : tuple of float
+        (log r - truth) / standard deviation of every range that is unique.
+    seconds : float
+        Run time as the result states it.
+    """
+
+    excess: float
+    refused: bool
+    shared: float
+    misses: tuple[float, ...]
+    seconds: float
+
+    @property
+    def right(self) -> bool:
+        """Same optimum (or a better one) as from the truth, or refused where the truth is open.
+
+        Half the limit at the truth still counts as open: the bound at an optimum scatters.
+        """
+        return self.shared > LIMIT / 2 if self.refused else self.excess <= _SAME
+
+
+def outcome_of(one: RandomSet) -> Outcome:
+    """Fit without and with a start at the truth.
+
+    Parameters
+    ----------
+    one : RandomSet
+        The data set.
+    """
+    frames = one.simulation.frames
+    problem = fit_problem(one.sensor, one.scene, frames)
+    known = values_of(one.sensor, one.truth)
+    truth = problem.coordinates(np.array([[known[name] for name in problem.names]]))[0]
+    _, facts = residuals_and_information(problem, truth, np.log(one.simulation.range_m))
+    shared = float(np.median(facts.sd_of(facts.response[problem.present])))
+    reference = optimum_from(problem, truth)
+    _, there = residuals_and_information(problem, reference.x, reference.positions)
+    if there.rank == len(problem):
+        wider, _ = widening(problem, reference, there)
+        own = float(np.median(there.sd_of(there.response[problem.present])))
+        shared = max(shared, wider * own)
+    found = estimate(one.sensor, one.scene, frames, ["joint_fit"])
+    if not found.results:
+        return Outcome(math.nan, True, shared, (), math.nan)
+    (result,) = found.results
+    assert result.fit is not None
+    best = result.fit["deviance"]
+    excess = best - reference.deviance
+    miss = np.log(result.range_m / one.simulation.range_m) / (result.sd_m / result.range_m)
+    misses = tuple(miss[np.isfinite(miss)].tolist())
+    return Outcome(float(excess), False, shared, misses, result.runtime_s)

@@ -1,0 +1,156 @@
+"""The pieces of a fit: slopes, coordinates, triangles, profile."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from inference.fits.likelihood.coordinates import bounds_of, chain, physical
+from inference.fits.likelihood.polish import _Profile
+from inference.fits.likelihood.problem import FitProblem, fit_problem
+from inference.fits.likelihood.slopes import SLOTS, frame_slopes
+from inference.fits.likelihood.triangle import damped_step, solve_least_squares, triangularise
+from simulator.scene import parse_scene
+from tests.fits.scenes import OBJECT, VAGUE, WALL, data, path, sensor_of
+
+pytestmark = pytest.mark.xdist_group("fits")  # compile each kernel once
+
+EVERYTHING: dict[str, Any] = {
+    "crosstalk": [VAGUE, VAGUE],
+    "background": {
+        "strength": {"prior": "lognormal", "median": 0.02, "sigma": 1.0},
+        "distance_m": {"prior": "uniform", "low": 2.2, "high": 8.0},
+    },
+}
+TRUTH = {"object": OBJECT, "crosstalk": [0.002, -0.003], "background": WALL}
+
+
+def problem_of(
+    kind: str, scene: dict[str, Any], truth: dict[str, Any], **noise: float
+) -> FitProblem:
+    sensor = sensor_of(kind, **noise)
+    return fit_problem(sensor, parse_scene(scene), data(sensor, truth, path(14, 2)))
+
+
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+@pytest.mark.parametrize("present", [True, False])
+def test_slopes_are_those_of_central_differences(kind: str, present: bool) -> None:
+    """Truncation h^2 and rounding eps / h are 1e-10 and 1e-11 of the derivatives' size."""
+    problem = problem_of(kind, EVERYTHING, TRUTH)
+    values = np.array([0.07, -0.1, 0.1, 30.0, -20.0, 500.0, 3.0, 0.05, 0.02, 1.3])
+    u = np.log(0.7) if present else np.nan
+    r0, wave = problem.instrument[:2]
+    out, plus, minus = (np.empty((SLOTS + 2, 4)) for _ in range(3))
+    frame_slopes(out, u, values, problem.gain, True, r0, wave)
+    for k in range(SLOTS + 1):
+        if k == SLOTS and not present:
+            assert (out[k] == 0).all()
+            continue
+        h = 1e-5 * (abs(values[k]) if k < SLOTS else 1.0)
+        sides = []
+        for sign, table in ((1.0, plus), (-1.0, minus)):
+            moved = values.copy()
+            if k < SLOTS:
+                moved[k] += sign * h
+            frame_slopes(
+                table, u + (sign * h if k == SLOTS else 0.0), moved, problem.gain, True, r0, wave
+            )
+            sides.append(table[SLOTS + 1].copy())
+        wanted = (sides[0] - sides[1]) / (2 * h)
+        scale = np.abs(out[SLOTS + 1]).max() / (abs(values[k]) if k < SLOTS else 1.0)
+        np.testing.assert_allclose(out[k], wanted, atol=1e-8 * scale, rtol=1e-8)
+
+
+@pytest.mark.parametrize("shadow", ["object", "free"])
+def test_chain_is_the_derivative_of_the_physical_values(shadow: str) -> None:
+    scene: dict[str, Any] = dict(EVERYTHING)
+    if shadow == "object":
+        scene["background"] = {**EVERYTHING["background"], "shadow": "object"}
+    problem = problem_of("pulsed", scene, TRUTH)
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        x = rng.normal(0, 0.5, len(problem))
+        x[-1] = abs(x[-1]) + 0.01  # a default shadow has c1' >= 0
+        at = problem.chain(x)
+        for j in range(x.size):
+            step = 1e-6 * np.eye(x.size)[j]
+            wanted = (problem.values(x + step) - problem.values(x - step))[:SLOTS] / 2e-6
+            np.testing.assert_allclose(at[:, j], wanted, rtol=1e-7, atol=1e-8)
+
+
+def test_coordinates_are_the_inverse_of_natural() -> None:
+    problem = problem_of("pulsed", EVERYTHING, TRUTH)
+    natural = np.array([[0.2, -0.3, 0.4, 1e-3, -2e-3, 0.02, 3.0, 0.1, 0.05]])
+    x = problem.coordinates(natural)
+    np.testing.assert_allclose(problem.natural(x[0]), natural[0], rtol=1e-12)
+
+
+def test_bounds_follow_the_support_of_a_prior() -> None:
+    """c1 in [-0.05, 0.2] bounds log(1 + c1 / (2 sqrt c0)) for every c0."""
+    scene = {"object": {"c1": {"prior": "uniform", "low": -0.05, "high": 0.2}}}
+    problem = problem_of("pulsed", scene, {"object": OBJECT})
+    x = np.array([np.log(0.04), 0.0, -2.0])
+    values, low, high = problem.values(x), np.empty(3), np.empty(3)
+    bounds_of(low, high, values, problem.layout)
+    for end, c1 in ((low, -0.05), (high, 0.2)):
+        x[1] = end[1]
+        assert problem.values(x)[1] == pytest.approx(c1, rel=1e-12)
+    out = np.empty((SLOTS, 3))
+    chain(out, problem.values(x), x, problem.layout, low, high)
+    assert out[1, 0] == 0.0  # a c1 that its bound holds does not move with c0
+    assert physical(values, x, problem.layout)
+
+
+def test_triangles_solve_graded_least_squares() -> None:
+    """Columns over 24 orders of magnitude; error bound: condition (scaled) squared times eps."""
+    rng = np.random.default_rng(2)
+    for n in (1, 3, 9):
+        scales = 10.0 ** rng.uniform(-12, 12, n)
+        plain = rng.standard_normal((30, n))
+        target = rng.standard_normal(30)
+        matrix = np.column_stack([plain * scales, target])
+        solution = np.empty(n)
+        solve_least_squares(solution, matrix.copy())
+        wanted = np.linalg.lstsq(plain, target, rcond=None)[0]
+        tolerance = 100 * np.linalg.cond(plain) ** 2 * np.finfo(float).eps
+        np.testing.assert_allclose(solution * scales, wanted, rtol=tolerance, atol=tolerance)
+        triangularise(matrix, n)
+        norms = np.linalg.norm(plain * scales, axis=0)
+        for damping in (0.0, 0.3):
+            damped_step(solution, matrix[:n], norms, damping)
+            stacked = np.concatenate(
+                [plain / np.linalg.norm(plain, axis=0), np.sqrt(damping) * np.eye(n)]
+            )
+            wanted = np.linalg.lstsq(stacked, np.concatenate([target, np.zeros(n)]), rcond=None)[0]
+            np.testing.assert_allclose(solution * norms, wanted, rtol=1e-9, atol=1e-10)
+
+
+def test_a_held_coordinate_stays() -> None:
+    matrix = np.random.default_rng(1).standard_normal((10, 4))
+    matrix[:, 1] = 0.0
+    triangularise(matrix, 3)
+    step = np.empty(3)
+    damped_step(step, matrix[:3], np.array([1.0, 0.0, 1.0]), 0.0)
+    assert step[1] == 0.0
+    assert np.isfinite(step).all()
+
+
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+@pytest.mark.parametrize("noise", [{}, {"shot": 1e-6, "relative": 0.01}])
+def test_gradient_of_the_profile_is_exact(kind: str, noise: dict[str, float]) -> None:
+    """The likelihood at best ranges has the gradient that the projected rows give.
+
+    The best ranges are found to 1e-3 standard deviations, so the profile is exact to 1e-6 a frame,
+    and its central difference over 0.02 standard deviations to 1e-6 * 16 / 0.02 < 1e-3.
+    """
+    problem = problem_of(kind, EVERYTHING, TRUTH, **noise)
+    natural = np.array([[0.07, -0.1, 0.1, 0.0021, -0.0028, 0.018, 3.1, 0.05, 0.02]])
+    x = problem.coordinates(natural)[0]
+    profile = _Profile(problem)
+    _, gradient = profile(x)
+    sizes = np.linalg.norm(profile.matrix[:, :-1], axis=0)
+    for j in range(x.size):
+        h = 0.02 / sizes[j]
+        step = h * np.eye(x.size)[j]
+        slope = (profile(x + step)[0] - profile(x - step)[0]) / (2 * h)
+        assert slope / sizes[j] == pytest.approx(gradient[j] / sizes[j], rel=2e-3, abs=3e-3)
