@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from inference.estimate import estimate
-from inference.realtime.conventional import conventional_range
 from inference.realtime.registry import TECHNIQUES
+from inference.realtime.techniques.conventional import conventional_range
 from simulator.frames import Frames
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import PulsedSensor, Sensor, parse_sensor

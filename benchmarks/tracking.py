@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimate import estimate
-from inference.realtime.conventional import conventional_range
+from inference.realtime.techniques.conventional import conventional_range
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.track import step
 from inference.tracking.tracker import Tracker, tracker

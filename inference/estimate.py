@@ -5,10 +5,10 @@ import time
 from collections.abc import Sequence
 
 from inference.estimates import Estimates, LeftOut, TechniqueResult
+from inference.known import known_of
 from inference.plan import obstacle, plan
-from inference.realtime.known import known_of
 from inference.realtime.registry import TECHNIQUES
-from inference.realtime.technique import Task
+from inference.technique import Task
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.errors import InvalidInputError, Problem, RefusedError
 from simulator.frames import Frames

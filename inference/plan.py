@@ -4,8 +4,8 @@ import dataclasses
 import math
 
 from inference.estimates import LeftOut
-from inference.realtime.known import Known, known_of
-from inference.realtime.technique import Technique
+from inference.known import Known, known_of
+from inference.technique import Technique
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.errors import listed
 from simulator.frames import Frames

@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 from inference.fits.techniques.registry import FITS
 from inference.realtime.registry import TECHNIQUES
-from inference.realtime.technique import Technique
+from inference.technique import Technique
 
 __all__ = ["ALL_TECHNIQUES", "ELSEWHERE"]
 

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.realtime.assemble import NOISE_BAND, Candidates
-from inference.realtime.invert import invert
-from inference.realtime.pieces import pieces_of
-from inference.realtime.technique import Task
+from inference.realtime.solving.invert import invert
+from inference.realtime.solving.monotone_intervals import pieces_of
+from inference.technique import Task
 
 __all__ = ["candidates_of", "widened"]
 

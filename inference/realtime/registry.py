@@ -3,15 +3,15 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from inference.realtime.background_cancelling import BACKGROUND_CANCELLING
-from inference.realtime.background_cancelling_differential import (
+from inference.realtime.techniques.background_cancelling import BACKGROUND_CANCELLING
+from inference.realtime.techniques.background_cancelling_differential import (
     BACKGROUND_CANCELLING_DIFFERENTIAL,
 )
-from inference.realtime.background_intensity import BACKGROUND_INTENSITY
-from inference.realtime.conventional import CONVENTIONAL
-from inference.realtime.differential import DIFFERENTIAL
-from inference.realtime.intensity import INTENSITY, INTENSITY_W1
-from inference.realtime.technique import Technique
+from inference.realtime.techniques.background_intensity import BACKGROUND_INTENSITY
+from inference.realtime.techniques.conventional import CONVENTIONAL
+from inference.realtime.techniques.differential import DIFFERENTIAL
+from inference.realtime.techniques.intensity import INTENSITY, INTENSITY_W1
+from inference.technique import Technique
 
 __all__ = ["TECHNIQUES"]
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inference.realtime import curves
-from inference.realtime.exact import cycles_phase, difference_of_products
-from inference.realtime.pieces import pieces_of
-from inference.realtime.polynomials import real_roots
+from inference.realtime.solving import curves
+from inference.realtime.solving.exact import cycles_phase, difference_of_products
+from inference.realtime.solving.monotone_intervals import pieces_of
+from inference.realtime.solving.polynomials import real_roots
 
 # c0, c1, R, k, c0', c1', contrast
 P = np.array([0.9, -1.1, 4.0, 0.7, 0.6, 0.2, 0.15])

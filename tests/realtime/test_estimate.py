@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from inference.estimate import all_roots, estimate
 from inference.estimates import Status, TechniqueResult
 from inference.plan import plan
-from inference.realtime.conventional import conventional_range
 from inference.realtime.registry import TECHNIQUES
+from inference.realtime.techniques.conventional import conventional_range
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.errors import InvalidInputError
 from simulator.frames import Frames

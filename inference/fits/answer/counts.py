@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from inference.fits.likelihood.problem import unknowns_of
-from inference.realtime.known import Known
+from inference.known import Known
 from inference.realtime.net import SATURATED, rule_out
 from simulator.errors import listed
 from simulator.frames import Frames

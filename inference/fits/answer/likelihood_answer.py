@@ -15,7 +15,7 @@ from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.multistart import Optimum, optimum_from
 from inference.fits.likelihood.problem import FitProblem, fit_problem
 from inference.realtime.net import SATURATED, rule_out
-from inference.realtime.technique import Task
+from inference.technique import Task
 from simulator.errors import RefusedError
 
 __all__ = ["likelihood_answer", "likelihood_answer_from"]

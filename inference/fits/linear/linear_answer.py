@@ -15,7 +15,7 @@ from inference.fits.answer.report import FALSE_ALARM, entry
 from inference.fits.likelihood.problem import fit_problem
 from inference.fits.linear.weighted import LinearFit
 from inference.realtime.net import SATURATED, rule_out
-from inference.realtime.technique import Task
+from inference.technique import Task
 from simulator.errors import RefusedError
 
 __all__ = ["linear_answer", "not_identified", "without_warnings"]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from inference.estimates import TechniqueResult
-from inference.realtime.technique import Task, Technique
+from inference.technique import Task, Technique
 from simulator.errors import RefusedError, listed
 from simulator.frames import Frames
 from simulator.sensor import PulsedSensor, Sensor

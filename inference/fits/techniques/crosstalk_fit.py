@@ -19,10 +19,10 @@ from inference.fits.likelihood.problem import unknowns_of
 from inference.fits.linear.linear_answer import linear_answer, without_warnings
 from inference.fits.linear.weighted import LinearFit, covariances, solve_weighted, whitener_of
 from inference.fits.techniques.object_fit import carrier, gains
-from inference.realtime.differential import DIFFERENTIAL
-from inference.realtime.known import Known
+from inference.known import Known
 from inference.realtime.net import SATURATED, rule_out
-from inference.realtime.technique import Task, Technique
+from inference.realtime.techniques.differential import DIFFERENTIAL
+from inference.technique import Task, Technique
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene

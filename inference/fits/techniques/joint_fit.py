@@ -5,9 +5,9 @@ from inference.fits.answer.counts import joint_obstacle
 from inference.fits.answer.likelihood_answer import likelihood_answer
 from inference.fits.likelihood.multistart import find_optima
 from inference.fits.likelihood.problem import fit_problem, unknowns_of
-from inference.realtime.known import Known
+from inference.known import Known
 from inference.realtime.net import SATURATED, rule_out
-from inference.realtime.technique import Task, Technique
+from inference.technique import Task, Technique
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor

@@ -23,10 +23,10 @@ from inference.fits.linear.weighted import (
     fit_equations,
     refuse_at_rest,
 )
-from inference.realtime.background_intensity import BACKGROUND_INTENSITY
-from inference.realtime.conventional import CONVENTIONAL
-from inference.realtime.known import Known
-from inference.realtime.technique import Task, Technique
+from inference.known import Known
+from inference.realtime.techniques.background_intensity import BACKGROUND_INTENSITY
+from inference.realtime.techniques.conventional import CONVENTIONAL
+from inference.technique import Task, Technique
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene

@@ -11,7 +11,7 @@ from inference.fits.techniques.joint_fit import (
 )
 from inference.fits.techniques.object_fit import OBJECT_FIT
 from inference.fits.techniques.shadow_fit import SHADOW_FIT
-from inference.realtime.technique import Technique
+from inference.technique import Technique
 
 __all__ = ["FITS"]
 

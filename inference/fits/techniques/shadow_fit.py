@@ -16,10 +16,10 @@ from inference.fits.likelihood.problem import unknowns_of
 from inference.fits.linear.linear_answer import linear_answer, without_warnings
 from inference.fits.linear.weighted import Equations, Observed, fit_equations, refuse_at_rest
 from inference.fits.techniques.object_fit import carrier, gains
-from inference.realtime.background_cancelling import BACKGROUND_CANCELLING
-from inference.realtime.known import Known
+from inference.known import Known
 from inference.realtime.net import SATURATED, rule_out
-from inference.realtime.technique import Task, Technique
+from inference.realtime.techniques.background_cancelling import BACKGROUND_CANCELLING
+from inference.technique import Task, Technique
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene

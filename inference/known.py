@@ -6,7 +6,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.realtime import curves
+from inference.realtime.solving import curves
 from simulator.scene import Quantity, Reference, Scene, Stroke
 from simulator.sensor import Sensor, SineWaveSensor
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.realtime.known import Known
+from inference.known import Known
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor

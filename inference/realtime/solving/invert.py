@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.realtime.curves import BOTH_PHASE, slope, solve_between
+from inference.realtime.solving.curves import BOTH_PHASE, slope, solve_between
 from simulator.compiled import compiled
 
 __all__ = ["invert"]

@@ -16,7 +16,7 @@ from inference.realtime.assemble import (
     reasons_of,
 )
 from inference.realtime.net import ABSENT, SATURATED, UNREPRESENTABLE, net_readings
-from inference.realtime.technique import Task, Technique
+from inference.technique import Task, Technique
 from simulator.compiled import compiled
 from simulator.frames import Frames
 from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor

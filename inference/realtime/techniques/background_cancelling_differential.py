@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.realtime import curves
 from inference.realtime.assemble import NOISE_BAND, Outcome, assemble, reasons_of
 from inference.realtime.derivatives import DERIVATIVE_REASONS, derivatives_of
-from inference.realtime.differential import target_of
 from inference.realtime.from_curve import candidates_of
 from inference.realtime.motion import law_of_model
-from inference.realtime.technique import Task, Technique
+from inference.realtime.solving import curves
+from inference.realtime.techniques.differential import target_of
+from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor
 
 __all__ = ["BACKGROUND_CANCELLING_DIFFERENTIAL"]

@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.realtime.bracketing import EPSILON, STEPS, best, narrowed, next_point, start
-from inference.realtime.pieces import LEAST
-from inference.realtime.polynomials import real_roots
+from inference.realtime.solving.bracketing import EPSILON, STEPS, best, narrowed, next_point, start
+from inference.realtime.solving.monotone_intervals import LEAST
+from inference.realtime.solving.polynomials import real_roots
 from simulator.background import shadow, shadow_slope
 from simulator.compiled import compiled
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.realtime.bracketing import STEPS, best, narrowed, next_point, start
-from inference.realtime.exact import difference_of_products
+from inference.realtime.solving.bracketing import STEPS, best, narrowed, next_point, start
+from inference.realtime.solving.exact import difference_of_products
 from simulator.compiled import compiled
 
 __all__ = ["horner", "real_roots"]

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.realtime import curves
 from inference.realtime.assemble import NOISE_BAND, Outcome, assemble, reasons_of
-from inference.realtime.bracketing import EPSILON
-from inference.realtime.exact import cycles_phase, weighted_differences
 from inference.realtime.from_curve import candidates_of
 from inference.realtime.net import UNREPRESENTABLE, net_readings
-from inference.realtime.technique import Task, Technique
+from inference.realtime.solving import curves
+from inference.realtime.solving.bracketing import EPSILON
+from inference.realtime.solving.exact import cycles_phase, weighted_differences
+from inference.technique import Task, Technique
 from simulator.compiled import compiled
 from simulator.object_model import quadratic
 from simulator.sensor import PulsedSensor

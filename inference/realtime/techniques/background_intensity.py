@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
 from inference.realtime.assemble import NOISE_BAND, Candidates, Outcome, assemble, reasons_of
-from inference.realtime.background_balance import solve_balance
-from inference.realtime.background_phase import solve_phase
-from inference.realtime.exact import cycles_phase
 from inference.realtime.from_curve import widened
 from inference.realtime.net import Net, net_readings
-from inference.realtime.technique import Task, Technique
+from inference.realtime.solving.background_balance import solve_balance
+from inference.realtime.solving.background_phase import solve_phase
+from inference.realtime.solving.exact import cycles_phase
+from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor, SineWaveSensor
 
 __all__ = ["BACKGROUND_INTENSITY"]

@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.realtime import curves
 from inference.realtime.assemble import Outcome, assemble, reasons_of
 from inference.realtime.from_curve import candidates_of
 from inference.realtime.net import UNREPRESENTABLE, Net, net_readings
-from inference.realtime.technique import Task, Technique
+from inference.realtime.solving import curves
+from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor
 
 __all__ = ["INTENSITY", "INTENSITY_W1"]

@@ -13,7 +13,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.realtime.curves import (
+from inference.realtime.solving.curves import (
     BOTH_PHASE,
     BOTH_RATIO,
     C0,
@@ -32,8 +32,8 @@ from inference.realtime.curves import (
     turning,
     value,
 )
-from inference.realtime.invert import invert
-from inference.realtime.polynomials import real_roots
+from inference.realtime.solving.invert import invert
+from inference.realtime.solving.polynomials import real_roots
 from simulator.compiled import compiled
 
 __all__ = ["LEAST", "Pieces", "pieces_of"]

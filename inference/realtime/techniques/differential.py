@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import Status, TechniqueResult
-from inference.realtime import curves
 from inference.realtime.assemble import (
     NOISE_BAND,
     Candidates,
@@ -19,7 +18,8 @@ from inference.realtime.derivatives import DERIVATIVE_REASONS, derivatives_of
 from inference.realtime.from_curve import candidates_of
 from inference.realtime.motion import law_of_model, law_of_motion
 from inference.realtime.net import Net, net_readings
-from inference.realtime.technique import Task, Technique
+from inference.realtime.solving import curves
+from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor
 
 __all__ = ["DIFFERENTIAL", "Targets", "target_of"]

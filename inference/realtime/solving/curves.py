@@ -23,7 +23,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.realtime.bracketing import STEPS, best, narrowed, next_point, start
+from inference.realtime.solving.bracketing import STEPS, best, narrowed, next_point, start
 from simulator.compiled import compiled
 from simulator.object_model import quadratic
 

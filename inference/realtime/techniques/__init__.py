@@ -1,0 +1,1 @@
+"""One file a technique of single frames, all of the same template (`inference.technique`)."""
