@@ -1,7 +1,6 @@
 """A status and a reason for every unknown, from how far it spreads."""
 
 import dataclasses
-import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +8,7 @@ from numpy.typing import NDArray
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.prediction import Prediction, log_range_spread, predict
 from inference.identifiability.reasons import Diagnosis
-from inference.identifiability.status import Identifiability, status_of
+from inference.identifiability.status import Identifiability, contraction_of, status_of
 from simulator.scene import Reference
 
 __all__ = ["Spread", "judge"]
@@ -116,7 +115,7 @@ def judge(
         elif status != "identified" and prediction is not None:
             text += ": " + _cause(diagnosis, name, value, expected)
         # a law so narrow that it has no width leaves nothing to contract
-        contraction = 1 - (value / unit) ** 2 if math.isfinite(value) and unit > 0 else 0.0
+        contraction = contraction_of(value / unit) if unit > 0 else 0.0
         rows.append(Identifiability(name, status, contraction, text))
     return tuple(rows)
 
