@@ -21,6 +21,7 @@ RUN python3 -m venv /opt/backend \
     && sed -n '/^setuptools==/,/[^\\]$/p' requirements/dev.txt > backend.txt \
     && /opt/backend/bin/pip install --require-hashes -r backend.txt
 COPY pyproject.toml README.md LICENSE ./
+COPY hybridtof/ hybridtof/
 COPY simulator/ simulator/
 COPY inference/ inference/
 COPY service/ service/
