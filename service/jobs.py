@@ -273,8 +273,8 @@ class Jobs:
         if job_id in self._tasks:
             self._tasks[job_id].cancel()
 
-    async def wait(self, job_id: str, timeout_s: float) -> bool:
-        """Wait for the end of a job of this process; whether it has ended."""
+    async def wait(self, job_id: str, timeout_s: float | None = None) -> bool:
+        """Wait for the end of a job of this process, or for a time; whether it has ended."""
         task = self._tasks.get(job_id)
         if task is not None:
             await asyncio.wait([task], timeout=timeout_s)

@@ -52,6 +52,7 @@ class _Worker:
     pipe: "Connection[object, object]"
 
     def __init__(self) -> None:
+        # in the thread that serves it until its end: a worker ends with the thread that started it
         context = multiprocessing.get_context("spawn")
         self.pipe, far = context.Pipe()
         self.process = context.Process(target=work, args=(far,), daemon=True)

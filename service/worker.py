@@ -11,6 +11,8 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
+from service.parent_death import end_with_parent
+
 __all__ = ["THREAD_VARIABLES", "timed", "work"]
 
 T = TypeVar("T")
@@ -32,8 +34,13 @@ def work(pipe: "Connection[object, object]") -> None:
     Parameters
     ----------
     pipe : Connection
-        Delivers ``(function, arguments)``; its end ends the process, also when the parent died.
+        Delivers ``(function, arguments)``; its end ends the process.
+
+    Notes
+    -----
+    When the parent dies the process ends at once, in the middle of a task.
     """
+    end_with_parent()
     # the parent decides when a worker ends: a Ctrl-C or a SIGTERM to the group is not for us
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)

@@ -41,7 +41,7 @@ def test_runs(name: str) -> None:
 
     notebook = read(name)
     resources = {"metadata": {"path": str(NOTEBOOKS)}}
-    NotebookClient(notebook, timeout=300, kernel_name="python3", resources=resources).execute()
+    NotebookClient(notebook, timeout=None, kernel_name="python3", resources=resources).execute()
     text = "".join(
         output.text
         for cell in notebook.cells

@@ -25,7 +25,9 @@ STEPS = 10
 @dataclasses.dataclass(frozen=True)
 class Job:
     settings: SamplerSettings
-    # directives of a test: {"sleep": seconds a piece, "die": path of a mark, "fail": message}
+    # directives of a test: {"sleep": seconds a piece, "hold": path of a mark without which no chunk
+    # but the first is computed, "die": path of a mark, "fail": message, "outlive": path of a mark
+    # that a piece leaves if it is still computed when its parent has been gone for long}
     orders: dict[str, Any]
 
     def to_bytes(self) -> bytes:
@@ -114,6 +116,11 @@ def tasks(job: Job, checkpoint: Checkpoint) -> tuple[Task, ...]:
 
 def run(task: Task) -> float:
     time.sleep(task.orders.get("sleep", 0.0))
+    if "hold" in task.orders and task.chunk > 0:
+        while not Path(task.orders["hold"]).exists():
+            time.sleep(0.005)
+    if "outlive" in task.orders:
+        outlive(Path(task.orders["outlive"]))
     if "fail" in task.orders:
         raise ValueError(task.orders["fail"])
     if "die" in task.orders and task.chunk == 2 and task.ensemble == 1:
@@ -124,6 +131,16 @@ def run(task: Task) -> float:
             os.kill(os.getpid(), signal.SIGKILL)
     rng = np.random.default_rng([task.seed, task.chunk, task.ensemble])
     return task.sum + float(rng.standard_normal())
+
+
+def outlive(mark: Path) -> None:
+    """Wait until the parent has gone, go on for seconds of processor time, and leave a mark."""
+    parent = os.getppid()
+    while os.getppid() == parent:
+        time.sleep(0.005)
+    for _ in range(10**8):
+        pass
+    mark.write_text("outlived")
 
 
 def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[float]) -> Checkpoint:

@@ -1,5 +1,6 @@
-"""A server whose posteriors are `fake_fold`; arguments: seconds a piece, largest body."""
+"""A server whose posteriors are `fake_fold`; arguments: its orders as JSON, largest body."""
 
+import json
 import sys
 
 import uvicorn
@@ -10,6 +11,6 @@ from tests.service import fake_fold
 
 # guarded: the workers import their parent's main module
 if __name__ == "__main__":
-    fake_fold.order(sleep=float(sys.argv[1]))
+    fake_fold.order(**json.loads(sys.argv[1]))
     app = create_app(Settings(workers=2, max_body_bytes=int(sys.argv[2])), fake_fold)
     uvicorn.run(app, port=0, timeout_graceful_shutdown=2)

@@ -44,7 +44,7 @@ async def running(
 
 
 async def ended(jobs: Jobs, job_id: str) -> JobRecord:
-    assert await jobs.wait(job_id, timeout_s=60)
+    assert await jobs.wait(job_id)
     return await jobs.get(job_id)
 
 
@@ -91,14 +91,15 @@ async def test_death_changes_nothing(tmp_path: Path) -> None:
     assert mean_of(record) == expected
 
 
-async def test_killed_from_outside_changes_nothing() -> None:
+async def test_killed_from_outside_changes_nothing(tmp_path: Path) -> None:
     expected = await undisturbed()
-    fake_fold.order(sleep=0.05)
+    fake_fold.order(hold=str(tmp_path / "mark"))
     async with running() as (jobs, pool):
         job_id = (await jobs.submit(*system(), SETTINGS)).id
-        await until(jobs, job_id, 20)
+        await until(jobs, job_id, 10)
         for pid in pool.pids:
             os.kill(pid, signal.SIGKILL)
+        (tmp_path / "mark").touch()
         assert mean_of(await ended(jobs, job_id)) == expected
 
 
@@ -125,12 +126,13 @@ async def test_failure_is_told(caplog: pytest.LogCaptureFixture) -> None:
     assert "no luck" in caplog.text
 
 
-async def test_cancel_keeps_what_there_is() -> None:
-    fake_fold.order(sleep=0.05)
+async def test_cancel_keeps_what_there_is(tmp_path: Path) -> None:
+    fake_fold.order(hold=str(tmp_path / "mark"))
     async with running() as (jobs, _):
         job_id = (await jobs.submit(*system(), SETTINGS)).id
-        await until(jobs, job_id, 20)
+        await until(jobs, job_id, 10)
         await jobs.cancel(job_id)
+        (tmp_path / "mark").touch()
         record = await ended(jobs, job_id)
         assert record.status == "cancelled"
         assert record.result is not None
@@ -140,12 +142,13 @@ async def test_cancel_keeps_what_there_is() -> None:
         assert await jobs.cancel(job_id) == record
 
 
-async def test_cancel_while_waiting_is_at_once() -> None:
-    fake_fold.order(sleep=0.05)
+async def test_cancel_while_waiting_is_at_once(tmp_path: Path) -> None:
+    fake_fold.order(hold=str(tmp_path / "mark"))
     async with running(running=1) as (jobs, _):
         first = await jobs.submit(*system(), SETTINGS)
         second = await jobs.submit(*system(), SETTINGS)
         assert (await jobs.cancel(second.id)).status == "cancelled"
+        (tmp_path / "mark").touch()
         assert (await ended(jobs, first.id)).status == "done"
         record = await jobs.get(second.id)
     assert (record.status, record.result, record.progress) == ("cancelled", None, None)
@@ -163,8 +166,8 @@ async def test_time_limit() -> None:
     assert verdict["reasons"][0] == "stopped at the time limit of 0.15 s"
 
 
-async def test_deleted_while_running() -> None:
-    fake_fold.order(sleep=0.05)
+async def test_deleted_while_running(tmp_path: Path) -> None:
+    fake_fold.order(hold=str(tmp_path / "mark"))
     async with running() as (jobs, _):
         job_id = (await jobs.submit(*system(), SETTINGS)).id
         await until(jobs, job_id, 10)
@@ -177,16 +180,17 @@ async def test_deleted_while_running() -> None:
             await jobs.cancel(job_id)
 
 
-async def test_end_is_quick_and_another_process_takes_up() -> None:
+async def test_end_is_quick_and_another_process_takes_up(tmp_path: Path) -> None:
     """What one instance leaves behind, another finishes to the same last bit."""
     expected = await undisturbed()
     store = MemoryJobStore(100)
-    fake_fold.order(sleep=0.1)
+    fake_fold.order(hold=str(tmp_path / "mark"))
     async with running(store, running=1) as (jobs, pool):
         first = await jobs.submit(*system(), SETTINGS)
         second = await jobs.submit(*system(), SETTINGS)
-        await until(jobs, first.id, 20)
+        await until(jobs, first.id, 10)
     assert not pool.pids
+    (tmp_path / "mark").touch()
     left = store.get(first.id)
     assert left is not None
     assert left.status == "running"
@@ -211,13 +215,14 @@ async def test_idempotency() -> None:
         assert three.id != one.id
 
 
-async def test_no_room() -> None:
-    fake_fold.order(sleep=0.02)
+async def test_no_room(tmp_path: Path) -> None:
+    fake_fold.order(hold=str(tmp_path / "mark"))
     async with running(MemoryJobStore(2)) as (jobs, _):
         first = await jobs.submit(*system(), SETTINGS)
         await jobs.submit(*system(), SETTINGS)
         with pytest.raises(BusyError):
             await jobs.submit(*system(), SETTINGS)
+        (tmp_path / "mark").touch()
         await ended(jobs, first.id)
         await jobs.submit(*system(), SETTINGS)
         with pytest.raises(NotFoundError):

@@ -38,7 +38,7 @@ def request_body() -> dict[str, Any]:
     simulated = simulation_of(
         parse(SimulationRequest, system | {"scene": known, "trajectory": trajectory, "seed": 1})
     )
-    sampler = {"seed": 2, "max_seconds": 600.0, "target_ess": 100}
+    sampler = {"seed": 2, "max_seconds": 86_400.0, "target_ess": 100}
     return system | {"frames": simulated["frames"], "sampler": sampler}
 
 
@@ -88,7 +88,7 @@ async def test_refusal_over_http() -> None:
 async def posterior(kill_workers: bool) -> dict[str, Any]:
     request = parse(PosteriorRequest, request_body())
     frames = frames_from_columns(request.sensor, request.frames)
-    settings = SamplerSettings(seed=2, target_ess=10_000, max_seconds=600)
+    settings = SamplerSettings(seed=2, target_ess=10_000, max_seconds=86_400)
     pool = ProcessPool(2)
     jobs = Jobs(fold, MemoryJobStore(1), pool, running=1)
     await jobs.start()
@@ -98,9 +98,11 @@ async def posterior(kill_workers: bool) -> dict[str, Any]:
         while not await jobs.wait(record.id, timeout_s=0.05):
             progress = (await jobs.get(record.id)).progress
             if kill_workers and killed < 2 and progress is not None and progress["steps"] > 0:
-                os.kill(pool.pids[killed], signal.SIGKILL)
+                dead = pool.pids[killed]
+                os.kill(dead, signal.SIGKILL)
                 killed += 1
-                await asyncio.sleep(0.5)
+                while dead in pool.pids and not await jobs.wait(record.id, timeout_s=0.01):
+                    pass
         assert killed == (2 if kill_workers else 0)
         result = (await jobs.get(record.id)).result
     finally:

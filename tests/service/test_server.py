@@ -21,9 +21,9 @@ from tests.service.conftest import FRAMES, SCENE, SENSOR
 pytestmark = pytest.mark.slow
 
 
-def fake_server(sleep: float, max_body_bytes: int = 10**6) -> tuple[str, ...]:
-    """Command of a server whose posteriors take six times ``sleep`` seconds."""
-    arguments = (str(sleep), str(max_body_bytes))
+def fake_server(max_body_bytes: int = 10**6, **orders: Any) -> tuple[str, ...]:
+    """Command of a server whose posteriors are `fake_fold` with these orders."""
+    arguments = (json.dumps(orders), str(max_body_bytes))
     return (sys.executable, "-m", "tests.service.fake_server", *arguments)
 
 
@@ -55,15 +55,6 @@ def hybridtof(*arguments: str) -> tuple[str, ...]:
     return (sys.executable, "-m", "service.cli", *arguments)
 
 
-def ended_within(process: subprocess.Popen[str], seconds: float) -> bool:
-    # the contract's own limit; a machine that is merely slow does not reach it
-    try:
-        process.wait(timeout=seconds)
-    except subprocess.TimeoutExpired:
-        return False
-    return True
-
-
 def status(pid: int) -> tuple[str, int] | None:
     """State and parent of a process, from /proc; None where there is none."""
     try:
@@ -83,52 +74,66 @@ def alive(pid: int) -> bool:
     return found is not None and found[0] != "Z"
 
 
-def gone(pids: list[int], seconds: float = 10.0) -> bool:
-    deadline = time.monotonic() + seconds
-    while any(alive(pid) for pid in pids):
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.05)
-    return True
+def end(*pids: int) -> bool:
+    """Whether processes end before one that counts for a minute or so and starts only now.
+
+    On a loaded machine it counts for longer: what moves at all has its share of the processors.
+    """
+    count = (sys.executable, "-c", "for _ in range(2 * 10**9): pass")
+    with subprocess.Popen(count) as yardstick:
+        try:
+            while yardstick.poll() is None and any(map(alive, pids)):
+                time.sleep(0.02)
+        finally:
+            yardstick.kill()
+    return not any(map(alive, pids))
+
+
+def client(address: str) -> httpx.Client:
+    """A client that waits for as long as the server lives."""
+    return httpx.Client(base_url=address, timeout=None)  # noqa: S113  (a clock knows no load)
 
 
 def test_serves_without_configuration_and_ends_on_sigterm() -> None:
     with server(*hybridtof("serve", "--port", "0")) as (process, address):
-        assert httpx.get(address + "/health/live").status_code == 200
-        assert httpx.get(address + "/health/ready").status_code == 200
-        body = {"sensor": SENSOR, "scene": SCENE, "frames": FRAMES}
-        assert httpx.post(address + "/v1/estimates", json=body, timeout=120).status_code == 200
+        with client(address) as http:
+            assert http.get("/health/live").status_code == 200
+            assert http.get("/health/ready").status_code == 200
+            body = {"sensor": SENSOR, "scene": SCENE, "frames": FRAMES}
+            assert http.post("/v1/estimates", json=body).status_code == 200
         process.send_signal(signal.SIGTERM)
-        assert ended_within(process, 15)
+        assert end(process.pid)
 
 
 @pytest.mark.parametrize("sleep", [0.2, 3600])
 def test_sigterm_with_jobs_running(sleep: float) -> None:
-    with server(*fake_server(sleep)) as (process, address):
+    with server(*fake_server(sleep=sleep)) as (process, address), client(address) as http:
         body = {"sensor": SENSOR, "scene": {}, "frames": FRAMES}
         for _ in range(4):
-            assert httpx.post(address + "/v1/posteriors", json=body).status_code == 202
+            assert http.post("/v1/posteriors", json=body).status_code == 202
         while len(workers := children(process.pid)) < 2:
             time.sleep(0.05)
         process.send_signal(signal.SIGTERM)
-        assert ended_within(process, 15)
-        assert gone(workers)
+        assert end(process.pid, *workers)
 
 
-def test_workers_end_with_a_killed_server() -> None:
-    with server(*fake_server(0.5)) as (process, address):
+def test_workers_end_with_a_killed_server(tmp_path: Path) -> None:
+    """At once, in the middle of what they compute."""
+    mark = tmp_path / "mark"
+    with server(*fake_server(outlive=str(mark))) as (process, address), client(address) as http:
         body = {"sensor": SENSOR, "scene": {}, "frames": FRAMES}
-        assert httpx.post(address + "/v1/posteriors", json=body).status_code == 202
+        assert http.post("/v1/posteriors", json=body).status_code == 202
         while len(workers := children(process.pid)) < 2:
             time.sleep(0.05)
         process.kill()
         process.wait()
-        assert gone(workers)
+        assert end(*workers)
+    assert not mark.exists()
 
 
 def test_large_body_is_refused_over_a_socket() -> None:
-    with server(*fake_server(0, 1000)) as (_, address):
-        response = httpx.post(address + "/v1/estimates", content=b" " * 1001)
+    with server(*fake_server(1000)) as (_, address), client(address) as http:
+        response = http.post("/v1/estimates", content=b" " * 1001)
         assert response.status_code == 413
         assert response.headers["content-type"] == "application/problem+json"
 
@@ -136,14 +141,12 @@ def test_large_body_is_refused_over_a_socket() -> None:
 def test_health_answers_while_a_large_batch_is_worked_on() -> None:
     columns: dict[str, Any] = {"w1": [0.02] * 200_000, "w2": [1.7] * 200_000}
     content = json.dumps({"sensor": SENSOR, "scene": SCENE, "frames": columns}).encode()
-    with server(*hybridtof("serve", "--port", "0")) as (_, address):
+    with server(*hybridtof("serve", "--port", "0")) as (_, address), client(address) as http:
         with ThreadPoolExecutor(1) as threads:
-            batch = threads.submit(
-                httpx.post, address + "/v1/estimates", content=content, timeout=300
-            )
+            batch = threads.submit(http.post, "/v1/estimates", content=content)
             answered = 0
             while not batch.done():
-                assert httpx.get(address + "/health/live", timeout=30).status_code == 200
+                assert http.get("/health/live").status_code == 200
                 answered += 1
             assert batch.result().status_code == 200
         assert answered > 1
@@ -166,12 +169,12 @@ def test_ctrl_c_ends_an_inference(tmp_path: Path) -> None:
         while not (workers := children(process.pid)) and process.poll() is None:
             time.sleep(0.05)
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=30)
+        assert end(process.pid, *workers)
+        out, err = process.communicate()
     assert process.returncode == 128 + signal.SIGINT, err
     assert out == ""
     assert err.endswith("hybridtof: interrupted\n")
     assert "Traceback" not in err
-    assert gone(workers)
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
@@ -191,6 +194,7 @@ def test_reader_that_goes_away(tmp_path: Path, unbuffered: str) -> None:
     assert process.stderr is not None
     assert process.stdout.read(10) == '{"frames":'
     process.stdout.close()
-    assert process.wait(timeout=60) == 128 + signal.SIGPIPE
+    assert end(process.pid)
+    assert process.wait() == 128 + signal.SIGPIPE
     assert process.stderr.read() == ""
     process.stderr.close()
