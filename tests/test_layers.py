@@ -12,7 +12,8 @@ ALLOWED = {
     "simulator": ["simulator"],
     "inference": ["inference", "simulator"],
     "service": ["service", "inference", "simulator"],
-    "inference/identifiability": ["inference.identifiability", "simulator"],
+    "inference/frame": ["inference.frame", "simulator"],
+    "inference/identifiability": ["inference.identifiability", "inference.frame", "simulator"],
     "inference/realtime": [
         "inference.realtime",
         "inference.technique",
@@ -20,10 +21,11 @@ ALLOWED = {
         "inference.estimates",
         "simulator",
     ],
-    "inference/density": ["inference.density", "inference.identifiability", "simulator"],
+    "inference/density": ["inference.density", "inference.frame", "simulator"],
     "inference/fits": [
         "inference.fits",
         "inference.density",
+        "inference.frame",
         "inference.identifiability",
         "inference.realtime",
         "inference.technique",
@@ -31,11 +33,16 @@ ALLOWED = {
         "inference.estimates",
         "simulator",
     ],
-    "inference/posterior/sampling": ["inference.posterior.sampling", "inference.density"],
+    "inference/posterior/sampling": [
+        "inference.posterior.sampling",
+        "inference.density",
+        "inference.frame",
+    ],
     "inference/posterior/selection": [
         "inference.posterior.selection",
         "inference.posterior.sampling",
         "inference.density",
+        "inference.frame",
     ],
 }
 OURS = ("simulator", "inference", "service", "tests", "benchmarks")

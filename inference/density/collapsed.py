@@ -13,12 +13,13 @@ from inference.density.gaussian import Pair, gaussian, log_top
 from inference.density.integrand import Quad, Triple
 from inference.density.range_modes import find_modes
 from inference.density.rows import background_of, crosstalk_of, law_of, row_of
+from inference.frame.arguments import Instrument, instrument_of
 from simulator.compiled import compiled
 from simulator.frames import Frames
 from simulator.parameters import Parameters, Terms, parameters_of
 from simulator.readings import background_readings
 from simulator.scene import Reference, Scene
-from simulator.sensor import Sensor, instrument
+from simulator.sensor import Sensor
 
 __all__ = ["CollapsedDensity", "collapsed_density"]
 
@@ -100,21 +101,44 @@ class CollapsedDensity:
         Usable frames: two readings and the gain factor.
     present : ndarray of bool, optional
         False where a frame is known to hold no object; None where all may.
-    gain : float
-        The sensor's gain.
-    r0, wave, read, shot, relative
-        The sensor as the kernels take it.
+    sensor : Sensor
+        The sensor.
     """
 
     parameters: Parameters
     frames: Array
     present: NDArray[np.bool_] | None
-    gain: float
-    r0: float
-    wave: Pair | None
-    read: Pair
-    shot: float | None
-    relative: float | None
+    sensor: Sensor
+
+    @property
+    def instrument(self) -> Instrument:
+        """The sensor as the kernels take it."""
+        return instrument_of(self.sensor)
+
+    @property
+    def gain(self) -> float:
+        """The sensor's gain."""
+        return self.sensor.gain
+
+    @property
+    def r0(self) -> float:
+        """As `Instrument.r0`."""
+        return self.instrument.r0
+
+    @property
+    def wave(self) -> Pair | None:
+        """As `Instrument.wave`."""
+        return self.instrument.wave
+
+    @property
+    def read(self) -> Pair:
+        """As `Instrument.read`."""
+        return self.instrument.read
+
+    @property
+    def shot(self) -> float | None:
+        """As `Instrument.shot`."""
+        return self.instrument.shot
 
     def arguments(self, terms: Terms) -> tuple[Any, ...]:
         """Return the kernels' arguments for given terms: scene first, then frames and sensor."""
@@ -128,11 +152,7 @@ class CollapsedDensity:
             terms.ranges,
             self.frames,
             self.present,
-            self.r0,
-            self.wave,
-            self.read,
-            self.shot,
-            self.relative,
+            *self.instrument,
         )
 
     def integrals(self, terms: Terms) -> tuple[Any, ...]:
@@ -237,17 +257,10 @@ def collapsed_density(sensor: Sensor, scene: Scene, frames: Frames) -> Collapsed
         Where the scene breaks a rule.
     """
     gain = np.ones(len(frames)) if frames.gain is None else frames.gain
-    r0, wave = instrument(sensor)
-    noise = sensor.noise
     all_present = frames.object_present is None or bool(frames.object_present.all())
     return CollapsedDensity(
         parameters_of(sensor, scene),
         np.ascontiguousarray(np.column_stack([frames.readings, gain])),
         None if all_present else frames.object_present,
-        sensor.gain,
-        r0,
-        wave,
-        noise.read,
-        noise.shot or None,
-        noise.relative or None,
+        sensor,
     )

@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,22 +13,12 @@ from inference.density.gaussian import Pair, log_top
 from inference.density.range_modes import find_modes
 from inference.density.rows import background_of, crosstalk_of, law_of
 from inference.density.static import StaticDensity
-from inference.identifiability.sensitivity import whitener_of
+from inference.density.whitened import whitened
 from simulator.compiled import compiled
-from simulator.readings import (
-    background_readings,
-    background_slopes,
-    noise_parts,
-    object_readings,
-    object_slopes,
-)
 
 __all__ = ["Linearisation", "best_ranges", "fill_best_ranges", "linearise"]
 
 Array = NDArray[np.float64]
-
-# in z, whose prior has unit scale: the truncation error of a central difference is then 1e-10
-_DIFFERENCE = 1e-5
 
 
 @compiled
@@ -78,57 +67,6 @@ def fill_best_ranges(
                         modes[k, 2],
                     )
             out[i, j, 1] += log_top(read)
-
-
-@compiled
-def _moments(
-    means: Array,
-    slopes: Array,
-    parts: Array,
-    shapes: Array,
-    crosstalks: Array | None,
-    backgrounds: Array | None,
-    positions: Array,
-    frames: Array,
-    r0: float,
-    wave: Pair | None,
-    read: Pair,
-    shot: float | None,
-    relative: float | None,
-    warps: Array | None,
-) -> None:
-    """Fill means (n, frames, 2), and for the first vector slopes (frames, 2) and noise parts."""
-    for i in range(shapes.shape[0]):
-        crosstalk = crosstalk_of(crosstalks, i)
-        background = background_of(backgrounds, i)
-        for j in range(frames.shape[0]):
-            gain = frames[j, 2]
-            o1, o2, t1, t2 = 0.0, 0.0, 0.0, 0.0
-            r = math.inf
-            if math.isfinite(positions[j]):
-                r = math.exp(positions[j])
-                strength = gain * shapes[i, 0]
-                if warps is not None:
-                    strength *= math.exp(warps[j, 0])
-                o1, o2 = object_readings(r, r0, wave, strength, shapes[i, 1], shapes[i, 2])
-                t1, t2 = object_slopes(r, r0, wave, strength, shapes[i, 1], shapes[i, 2])
-                if warps is not None:
-                    t1, t2 = t1 + warps[j, 1] * o1, t2 + warps[j, 1] * o2
-            m1, m2 = o1, o2
-            if backgrounds is not None and background is not None:
-                b1, b2 = background_readings(r, r0, wave, background)
-                m1, m2 = m1 + gain * b1, m2 + gain * b2
-                if math.isfinite(r):
-                    a1, a2 = background_slopes(r, r0, wave, background)
-                    t1, t2 = t1 + gain * a1, t2 + gain * a2
-            if crosstalks is not None and crosstalk is not None:
-                m1, m2 = m1 + crosstalk[0], m2 + crosstalk[1]
-            means[i, j, 0], means[i, j, 1] = m1, m2
-            if i == 0:
-                slopes[j, 0], slopes[j, 1] = t1, t2
-                part = noise_parts(read, shot, relative, wave is None, (m1, m2), (o1, o2))
-                for k in range(5):
-                    parts[j, k] = part[k]
 
 
 def best_ranges(density: CollapsedDensity, z: Array) -> Array:
@@ -190,28 +128,17 @@ def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearis
     -------
     Linearisation
     """
-    d = z.size
-    steps = np.concatenate([np.zeros((1, d)), _DIFFERENCE * np.eye(d), -_DIFFERENCE * np.eye(d)])
-    arguments = density.arguments(density.parameters.terms(z + steps))
-    n = density.frames.shape[0]
-    means = np.empty((2 * d + 1, n, 2))
-    slopes, parts = np.empty((n, 2)), np.empty((n, 5))
-    warps = basis = None
+    flux_error = basis = None
     coefficients = np.empty(0)
     if isinstance(density, DiscrepantDensity):
         coefficients = density.best(z[None])[1][0]
         basis, slope = density.functions(positions)
-        warps = np.column_stack([basis @ coefficients, slope @ coefficients])
-    everything: list[Any] = [*arguments[:3], positions, density.frames, *arguments[6:], warps]
-    _moments(means, slopes, parts, *everything)
-    whitener = whitener_of(*parts.T)
-    residual = np.einsum("nij,nj->ni", whitener, density.frames[:, :2] - means[0])
-    change = (means[1 : d + 1] - means[d + 1 :]) / (2 * _DIFFERENCE)
-    jacobian = -np.einsum("nij,dnj->nid", whitener, change)
-    direction = np.einsum("nij,nj->ni", whitener, slopes)
+        flux_error = (basis @ coefficients, slope @ coefficients)
+    at = whitened(density.sensor, density.parameters, density.frames, z, positions, flux_error)
+    residual, jacobian, direction = at.residual, -at.jacobian, at.along
     length = np.linalg.norm(direction, axis=1)
     # a frame at the edge of its prior, or without object, has no range to give way
-    bounds = arguments[3][0, 6:8]
+    bounds = density.parameters.terms(z[None]).ranges[0, 6:8]
     with np.errstate(divide="ignore", invalid="ignore"):
         inside = (np.exp(positions) > bounds[0] * (1 + 1e-9)) & (
             np.exp(positions) < bounds[1] * (1 - 1e-9)
@@ -229,11 +156,7 @@ def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearis
     jacobian = jacobian - unit[:, :, None] * np.einsum("ni,nid->nd", unit, jacobian)[:, None, :]
     if basis is None:
         return Linearisation(residual, jacobian)
-    dark: list[Any] = [np.zeros_like(arguments[0][:1]), *everything[1:]]
-    dark[0][:, 1:] = arguments[0][:1, 1:]
-    rest = np.empty((1, n, 2))
-    _moments(rest, np.empty((n, 2)), np.empty((n, 5)), *dark)
-    flux = -np.einsum("nij,nj->ni", whitener, means[0] - rest[0])
+    flux = -at.signal
     flux = flux - unit * np.einsum("ni,ni->n", unit, flux)[:, None]
     return _eliminate(residual, jacobian, flux[:, :, None] * basis[:, None, :], coefficients)
 

@@ -5,16 +5,14 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.identifiability.sensitivity import sensitivity, term_changes, whiteners
-from simulator.parameters import Parameters, Terms
+from inference.frame.coordinates import coordinate_slopes
+from inference.frame.sensitivity import sensitivity, whiteners
+from simulator.parameters import Parameters
 from simulator.sensor import Sensor
 
-__all__ = ["Whitened", "some_of", "whitened"]
+__all__ = ["Whitened", "whitened"]
 
 Array = NDArray[np.float64]
-
-# in z, whose prior has unit scale: the truncation error of a central difference is then 1e-10
-_DIFFERENCE = 1e-5
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -49,15 +47,13 @@ class Whitened:
         return np.stack([-unit[:, 1], unit[:, 0]], axis=1)
 
 
-def some_of(terms: Terms, k: slice) -> Terms:
-    """Return some of the parameter vectors of terms."""
-    crosstalk = None if terms.crosstalk is None else terms.crosstalk[k]
-    background = None if terms.background is None else terms.background[k]
-    return Terms(terms.object[k], crosstalk, background, terms.ranges[k])
-
-
 def whitened(
-    sensor: Sensor, parameters: Parameters, frames: Array, z: Array, log_r: Array
+    sensor: Sensor,
+    parameters: Parameters,
+    frames: Array,
+    z: Array,
+    log_r: Array,
+    flux_error: tuple[Array, Array] | None = None,
 ) -> Whitened:
     """Linearise the readings at one parameter vector and given ranges.
 
@@ -73,23 +69,20 @@ def whitened(
         The parameters.
     log_r : ndarray, shape (n,)
         log r; nan for a frame without object.
+    flux_error : (ndarray, ndarray), each of shape (n,), optional
+        As for `inference.frame.sensitivity.sensitivity`.
 
     Returns
     -------
     Whitened
     """
-    d = z.size
-    steps = _DIFFERENCE * np.concatenate([np.zeros((1, d)), np.eye(d), -np.eye(d)])
-    terms = parameters.terms(z + steps)
-    centre = some_of(terms, slice(0, 1))
-    plus, minus = some_of(terms, slice(1, d + 1)), some_of(terms, slice(d + 1, None))
-    at = sensitivity(sensor, centre, log_r, np.ascontiguousarray(frames[:, 2]))
-    change = term_changes(centre, plus, minus) / (2 * _DIFFERENCE)
+    terms, slopes = coordinate_slopes(parameters, z)
+    at = sensitivity(sensor, terms, log_r, frames[:, 2], flux_error)
     whitener = whiteners(sensor, at)
     return Whitened(
         whitener,
         np.einsum("nij,nj->ni", whitener, frames[:, :2] - at.mean),
         np.einsum("nij,nj->ni", whitener, at.by_range),
         np.einsum("nij,nj->ni", whitener, at.signal),
-        np.einsum("nij,njt,td->nid", whitener, at.by_term, change),
+        np.einsum("nij,njt,td->nid", whitener, at.by_term, slopes),
     )

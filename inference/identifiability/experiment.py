@@ -7,14 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.frame.coordinates import COORDINATES, term_changes
+from inference.frame.sensitivity import Sensitivity, sensitivity, whiteners
 from inference.identifiability.information import Information, eliminate
-from inference.identifiability.sensitivity import (
-    COORDINATES,
-    Sensitivity,
-    sensitivity,
-    term_changes,
-    whiteners,
-)
 from simulator.discrepancy import discrepancy_basis
 from simulator.parameters import Parameters, Terms
 from simulator.sensor import Sensor
@@ -82,7 +77,7 @@ class Experiment:
 
     @functools.cached_property
     def units(self) -> Array:
-        """Unit of each coordinate of `sensitivity.COORDINATES` in which it is dimensionless.
+        """Unit of each coordinate of `COORDINATES` in which it is dimensionless.
 
         Crosstalk is measured by the light of the scene: the median over the frames of the
         modulus of the readings without it, for both readings of a sine wave the same.
@@ -98,7 +93,7 @@ class Experiment:
 
     @functools.cached_property
     def directions(self) -> Array:
-        """How the coordinates of `sensitivity.COORDINATES` move with each of ``names``, (9, d).
+        """How the coordinates of `COORDINATES` move with each of ``names``, (9, d).
 
         Along log c0, c1 / sqrt(c0), log c2, the crosstalk in `units`, log B, log R, log c0' and
         c1' / sqrt(c0'), as in the tables of Cramer-Rao bounds: c0 moves with c1 / sqrt(c0) held
@@ -174,7 +169,7 @@ class Experiment:
 
     @functools.cached_property
     def change(self) -> Array:
-        """Derivatives of the coordinates of `sensitivity.COORDINATES` along z, shape (9, d)."""
+        """Derivatives of the coordinates of `COORDINATES` along z, shape (9, d)."""
         with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
             return term_changes(self.terms, *self.neighbours) / (2 * STEP)
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from inference.frame.sensitivity import whiteners
 from inference.identifiability.experiment import STEP, Experiment
-from inference.identifiability.sensitivity import whiteners
 from simulator.parameters import Parameters
 from simulator.scene import Reference, Stroke
 

@@ -146,8 +146,7 @@ def test_the_linearisation_gives_way_to_one_range_alone() -> None:
         (line.jacobian.reshape(along.size, -1), -at.jacobian.reshape(along.size, -1)),
     ):
         wanted = whole - along @ np.linalg.lstsq(along, whole)[0]
-        # derivatives by differences of 1e-4 or so
-        np.testing.assert_allclose(left, wanted, rtol=1e-4, atol=1e-5 * np.abs(whole).max())
+        np.testing.assert_allclose(left, wanted, rtol=1e-9, atol=1e-12 * np.abs(whole).max())
 
 
 def test_the_range_of_an_object_at_rest_is_known_better_the_more_frames_there_are() -> None:

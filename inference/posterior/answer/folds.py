@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from inference.density.collapsed import CollapsedDensity
-from inference.density.whitened import Whitened, some_of, whitened
-from inference.identifiability.sensitivity import sensitivity
+from inference.density.whitened import Whitened, whitened
+from inference.frame.coordinates import some_of
+from inference.frame.sensitivity import sensitivity
 from inference.posterior.job import Job
 from simulator.parameters import Terms
 

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from inference.frame.sensitivity import sensitivity, whiteners
 from inference.identifiability.experiment import Experiment
-from inference.identifiability.sensitivity import sensitivity, whiteners
 from simulator.parameters import parameters_of
 from simulator.readings import covariance
 from simulator.scene import parse_scene

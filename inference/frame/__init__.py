@@ -1,0 +1,1 @@
+"""What one frame says: mean readings, noise, derivatives, density along the range."""

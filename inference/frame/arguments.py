@@ -1,0 +1,287 @@
+"""What the kernels of a frame take: named tuples, and the one function that opens them.
+
+A member that is None is absent from the machine code where it is handed to a kernel as an argument
+of its own: numba prunes ``if background is not None`` for arguments, not for members. Kernels that
+look into an optional member are therefore small and take it alone. numba types a function that
+returns a tuple or None as optional even where the argument decides; `overload` chooses the body by
+the argument's type instead, so that an absent term stays absent.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numba import extending
+from numpy.typing import NDArray
+
+from simulator.compiled import compiled
+from simulator.sensor import Sensor, instrument
+
+__all__ = [
+    "Background",
+    "Data",
+    "FluxError",
+    "FrameScene",
+    "Instrument",
+    "Pair",
+    "RangePrior",
+    "ReferencePrior",
+    "Rows",
+    "Shape",
+    "instrument_of",
+    "row_of",
+    "scene_of",
+]
+
+Array = NDArray[np.float64]
+Pair = tuple[float, float]
+
+
+class Instrument(NamedTuple):
+    """A sensor as the kernels take it (`simulator.readings`).
+
+    Attributes
+    ----------
+    r0 : float
+        c T_p / 2 of a pulse [m]; 0 for a sine wave, which does not read it.
+    wave : (float, float) or None
+        Wave number [rad/m] and phase offset [rad] of a sine wave; None for a pulse.
+    read : (float, float)
+        Standard deviations of the read noise [reading units].
+    shot : float or None
+        Variance per mean reading [reading units].
+    relative : float or None
+        Standard deviation of a common relative error of the object's signal.
+    """
+
+    r0: float
+    wave: Pair | None
+    read: Pair
+    shot: float | None
+    relative: float | None
+
+
+class Shape(NamedTuple):
+    """The object: gain c0 c2 [reading units m^4], c0 [m^2] and c1 [m]."""
+
+    strength: float
+    c0: float
+    c1: float
+
+
+class Background(NamedTuple):
+    """Strength [reading units] and distance [m] of a background, c0' [m^2], c1' [m] of its shadow.
+
+    The order is that of `simulator.readings.background_readings`.
+    """
+
+    strength: float
+    distance: float
+    c0: float
+    c1: float
+
+
+class ReferencePrior(NamedTuple):
+    """Marks ranges whose density is that of the reference prior: that of what a frame resolves."""
+
+    resolves: bool
+
+
+class RangePrior(NamedTuple):
+    """The prior density of a range, as a row of `simulator.parameters.Terms.ranges`.
+
+    log p(r) = constant + power log r - ((r - mean) inverse_sd)^2 / 2
+    - ((log r - log_mean) log_inverse_sd)^2 / 2 on [low, high].
+
+    Attributes
+    ----------
+    constant, power, log_mean, log_inverse_sd : float
+        Dimensionless; log r is that of metres.
+    mean, low, high : float
+        [m].
+    inverse_sd : float
+        [1/m].
+    reference : ReferencePrior or None
+        Not None where the density is to be multiplied by what a frame resolves of its range.
+    """
+
+    constant: float
+    power: float
+    mean: float
+    inverse_sd: float
+    log_mean: float
+    log_inverse_sd: float
+    low: float
+    high: float
+    reference: ReferencePrior | None
+
+
+class FluxError(NamedTuple):
+    """A smooth relative error of the object's flux, a cubic in log r between knots.
+
+    Attributes
+    ----------
+    knots : ndarray, shape (knots, 2)
+        Logarithm of the factor on the flux, and its slope times the knots' spacing.
+    first : float
+        log r of the first knot.
+    rate : float
+        One over the spacing.
+    """
+
+    knots: Array
+    first: float
+    rate: float
+
+
+class FrameScene(NamedTuple):
+    """One parameter vector before one instrument.
+
+    Attributes
+    ----------
+    shape : Shape
+        The object.
+    crosstalk : (float, float) or None
+        [reading units].
+    background : Background or None
+        What lies behind the object.
+    range_prior : RangePrior
+        Of every frame's range.
+    instrument : Instrument
+        The sensor.
+    flux_error : FluxError or None
+        By what the object's flux differs from the model's.
+    """
+
+    shape: Shape
+    crosstalk: Pair | None
+    background: Background | None
+    range_prior: RangePrior
+    instrument: Instrument
+    flux_error: FluxError | None
+
+
+class Rows(NamedTuple):
+    """Many parameter vectors, one a row: what `scene_of` opens.
+
+    Attributes
+    ----------
+    shapes : ndarray, shape (n, 3)
+        As `Shape`.
+    crosstalks : ndarray, shape (n, 2), or None
+        [reading units].
+    backgrounds : ndarray, shape (n, 4), or None
+        As `Background`.
+    range_priors : ndarray, shape (n, 8)
+        As the numbers of `RangePrior`.
+    reference : ReferencePrior or None
+        As `RangePrior.reference`, the same for all.
+    flux_errors : ndarray, shape (n, knots, 2), or None
+        Knots of a `FluxError` each.
+    flux_grid : (float, float) or None
+        First knot and rate of all of them.
+    """
+
+    shapes: Array
+    crosstalks: Array | None
+    backgrounds: Array | None
+    range_priors: Array
+    reference: ReferencePrior | None = None
+    flux_errors: Array | None = None
+    flux_grid: Pair | None = None
+
+
+class Data(NamedTuple):
+    """The frames that a kernel runs over.
+
+    Attributes
+    ----------
+    frames : ndarray, shape (n, 3)
+        Two readings [reading units] and the factor on the sensor's gain.
+    present : ndarray of bool, shape (n,), or None
+        False where it is known that no object is there; None where one may be in all frames.
+    """
+
+    frames: Array
+    present: NDArray[np.bool_] | None
+
+
+def instrument_of(sensor: Sensor) -> Instrument:
+    """Return a sensor as the kernels take it; noise of size zero is none."""
+    r0, wave = instrument(sensor)
+    noise = sensor.noise
+    return Instrument(r0, wave, noise.read, noise.shot or None, noise.relative or None)
+
+
+def row_of(rows: Rows, i: int) -> Rows:
+    """Return row i as rows of one vector."""
+    one = slice(i, i + 1)
+    return Rows(
+        rows.shapes[one],
+        None if rows.crosstalks is None else rows.crosstalks[one],
+        None if rows.backgrounds is None else rows.backgrounds[one],
+        rows.range_priors[one],
+        rows.reference,
+        None if rows.flux_errors is None else rows.flux_errors[one],
+        rows.flux_grid,
+    )
+
+
+@compiled
+def scene_of(rows: Rows, instrument: Instrument, i: int) -> FrameScene:
+    """Open parameter vector i."""
+    shapes, priors = rows.shapes, rows.range_priors
+    return FrameScene(
+        Shape(shapes[i, 0], shapes[i, 1], shapes[i, 2]),
+        _crosstalk_of(rows.crosstalks, i),
+        _background_of(rows.backgrounds, i),
+        RangePrior(
+            priors[i, 0],
+            priors[i, 1],
+            priors[i, 2],
+            priors[i, 3],
+            priors[i, 4],
+            priors[i, 5],
+            priors[i, 6],
+            priors[i, 7],
+            rows.reference,
+        ),
+        instrument,
+        _flux_error_of(rows.flux_errors, rows.flux_grid, i),
+    )
+
+
+def _crosstalk_of(rows: Array | None, i: int) -> Pair | None:
+    return None if rows is None else (float(rows[i, 0]), float(rows[i, 1]))
+
+
+def _background_of(rows: Array | None, i: int) -> Background | None:
+    if rows is None:
+        return None
+    return Background(float(rows[i, 0]), float(rows[i, 1]), float(rows[i, 2]), float(rows[i, 3]))
+
+
+def _flux_error_of(knots: Array | None, grid: Pair | None, i: int) -> FluxError | None:
+    return None if knots is None or grid is None else FluxError(knots[i], grid[0], grid[1])
+
+
+@extending.overload(_crosstalk_of, strict=False)
+def _compile_crosstalk_of(rows: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
+    if rows is numba.types.none:
+        return lambda rows, i: None  # noqa: ARG005
+    return lambda rows, i: (rows[i, 0], rows[i, 1])
+
+
+@extending.overload(_background_of, strict=False)
+def _compile_background_of(rows: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
+    if rows is numba.types.none:
+        return lambda rows, i: None  # noqa: ARG005
+    return lambda rows, i: Background(rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3])
+
+
+@extending.overload(_flux_error_of, strict=False)
+def _compile_flux_error_of(knots: Any, grid: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
+    if knots is numba.types.none:
+        return lambda knots, grid, i: None  # noqa: ARG005
+    return lambda knots, grid, i: FluxError(knots[i], grid[0], grid[1])
