@@ -3,16 +3,9 @@
 import dataclasses
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from inference.realtime.solving import curves
 from simulator.scene import Quantity, Reference, Scene, Stroke
-from simulator.sensor import Sensor, SineWaveSensor
 
 __all__ = ["Known", "known_of"]
-
-Array = NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,28 +40,6 @@ class Known:
         """Power of two near sqrt(c0) [m]: a unit of length that rounds nothing."""
         c0 = self.numbers.get("object.c0", 1.0)
         return 2.0 ** round(0.5 * math.log2(c0))
-
-    def curve_parameters(self, sensor: Sensor) -> Array:
-        """Return the parameters of `curves` in lengths of `unit`; 0 for what is not known.
-
-        Parameters
-        ----------
-        sensor : Sensor
-            Gives the wave number, and the gain in the contrast of background and object.
-        """
-        unit = self.unit
-        p = np.zeros(curves.PARAMETERS)
-        p[curves.C0] = self.numbers.get("object.c0", 0.0) / unit / unit
-        p[curves.C1] = self.numbers.get("object.c1", 0.0) / unit
-        p[curves.DISTANCE] = self.numbers.get("background.distance_m", 0.0) / unit
-        if isinstance(sensor, SineWaveSensor):
-            p[curves.WAVE] = sensor.wave_number * unit
-        p[curves.C0_SHADOW] = self.numbers.get("background.shadow.c0", 0.0) / unit / unit
-        p[curves.C1_SHADOW] = self.numbers.get("background.shadow.c1", 0.0) / unit
-        if self.has("background.strength", "object.c2"):
-            strength = self.get("background.strength") / sensor.gain
-            p[curves.CONTRAST] = strength / self.get("object.c2") * unit * unit
-        return p
 
 
 def known_of(scene: Scene) -> Known:

@@ -15,6 +15,7 @@ window at most half as wide; where even its direction drowns, nothing is told.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,28 +57,78 @@ def _weights(ta: float, tb: float, tc: float, at: int) -> tuple[float, float, fl
     return wa, wb, wc
 
 
+class _Windows(NamedTuple):
+    """Differences over the window of every frame, each of shape (n,); nan where none is allowed.
+
+    Attributes
+    ----------
+    first, second : ndarray
+        Derivatives of both readings [reading units / s].
+    var1, var2, cov : ndarray
+        Their noise.
+    direction_sd : ndarray
+        Uncertainty of their direction [rad].
+    """
+
+    first: Array
+    second: Array
+    var1: Array
+    var2: Array
+    cov: Array
+    direction_sd: Array
+
+
+class _Tried(NamedTuple):
+    """The windows tried for a frame: direction, its uncertainty, noise and half width."""
+
+    angle: Array
+    sd: Array
+    v1: Array
+    v2: Array
+    v12: Array
+    half_width: Array
+
+
+@compiled
+def _direction(d1: float, d2: float, v1: float, v2: float, v12: float) -> tuple[float, float]:
+    """Return the direction of a derivative in units of its noise, modulo pi, and its sd [rad]."""
+    s1, s2 = math.sqrt(v1), math.sqrt(v2)
+    x, y = d2 / s2, d1 / s1
+    size = x * x + y * y
+    spread = x * x + y * y - 2.0 * x * y * v12 / (s1 * s2)
+    sd = math.sqrt(max(spread, 0.0)) / size if size > 0.0 else math.inf
+    return math.atan2(y, x), sd
+
+
+@compiled
+def _agrees(angle: float, tried: _Tried, count: int) -> bool:
+    """Whether a direction agrees with those of all narrower windows."""
+    for earlier in range(count):
+        off = abs(angle - tried.angle[earlier]) % math.pi
+        off = min(off, math.pi - off)
+        if off > _AGREEMENT * tried.sd[earlier]:
+            return False
+    return True
+
+
 @compiled
 def _differences(
-    t: Array,
-    first: Array,
-    second: Array,
-    var1: Array,
-    var2: Array,
-    cov: Array,
-    gain: Array | None,
-    half_widths: tuple[int, ...],
-    out: Array,
+    t: Array, net: Net, gain: Array | None, half_widths: tuple[int, ...], out: _Windows
 ) -> None:
-    """Fill out (n, 6) with d1, d2, var1, var2, cov and the uncertainty of the direction [rad].
-
-    nan where no window is allowed.
-    """
+    """Fill in the differences of n frames with times t."""
+    first, second, var1, var2, cov = net.first, net.second, net.var1, net.var2, net.cov
     n = t.size
-    kept, noises = np.empty((len(half_widths), 2)), np.empty((len(half_widths), 4))
+    most = len(half_widths)
+    tried = _Tried(
+        np.empty(most),
+        np.empty(most),
+        np.empty(most),
+        np.empty(most),
+        np.empty(most),
+        np.empty(most),
+    )
     for i in range(n):
-        for j in range(6):
-            out[i, j] = math.nan
-        tried = 0
+        count = 0
         near_end = min(i, n - 1 - i) < _END
         for m in half_widths:
             if i >= m and i + m < n:
@@ -93,7 +144,7 @@ def _differences(
             if gain is not None and (gain[a] != gain[b] or gain[b] != gain[c]):
                 break
             if at < 0:
-                wc = 1.0 / (t[1] - t[0])
+                wc = 1.0 / (t[c] - t[a])
                 wa, wb = -wc, 0.0
             else:
                 wa, wb, wc = _weights(t[a], t[b], t[c], at)
@@ -104,34 +155,21 @@ def _differences(
             v1 = wa * (wa * var1[a]) + wb * (wb * var1[b]) + wc * (wc * var1[c])
             v2 = wa * (wa * var2[a]) + wb * (wb * var2[b]) + wc * (wc * var2[c])
             v12 = wa * (wa * cov[a]) + wb * (wb * cov[b]) + wc * (wc * cov[c])
-            # the direction in units of the noise, modulo pi
-            s1, s2 = math.sqrt(v1), math.sqrt(v2)
-            x, y = d2 / s2, d1 / s1
-            size = x * x + y * y
-            angle = math.atan2(y, x)
-            spread = x * x + y * y - 2.0 * x * y * v12 / (s1 * s2)
-            sd = math.sqrt(max(spread, 0.0)) / size if size > 0.0 else math.inf
-            agrees = True
-            for earlier in range(tried):
-                off = abs(angle - kept[earlier, 0]) % math.pi
-                off = min(off, math.pi - off)
-                if off > _AGREEMENT * kept[earlier, 1]:
-                    agrees = False
-            if not agrees:
+            angle, sd = _direction(d1, d2, v1, v2, v12)
+            if not _agrees(angle, tried, count):
                 break
-            kept[tried, 0], kept[tried, 1] = angle, sd
-            tried += 1  # noqa: SIM113  # not every width is tried
-            out[i, 0], out[i, 1] = d1, d2
-            noises[tried - 1, 0], noises[tried - 1, 1] = v1, v2
-            noises[tried - 1, 2], noises[tried - 1, 3] = v12, m
+            tried.angle[count], tried.sd[count], tried.half_width[count] = angle, sd, m
+            tried.v1[count], tried.v2[count], tried.v12[count] = v1, v2, v12
+            count += 1  # noqa: SIM113  # not every width is tried
+            out.first[i], out.second[i] = d1, d2
             # a bias is seen only where it exceeds the noise of a narrower window: of one half as
             # wide, whose own bias is a quarter
-            judge = 0
-            for earlier in range(tried):
-                if 2.0 * noises[earlier, 3] <= m:
-                    judge = earlier
-            out[i, 2], out[i, 3], out[i, 4] = noises[judge, 0], noises[judge, 1], noises[judge, 2]
-            out[i, 5] = kept[judge, 1]
+            narrower = 0
+            for earlier in range(count):
+                if 2.0 * tried.half_width[earlier] <= m:
+                    narrower = earlier
+            out.var1[i], out.var2[i] = tried.v1[narrower], tried.v2[narrower]
+            out.cov[i], out.direction_sd[i] = tried.v12[narrower], tried.sd[narrower]
             if at < 0:
                 break
 
@@ -182,41 +220,39 @@ def derivatives_of(
             var2 = var2 + (net.relative * net.second) ** 2
             cov = cov + net.relative**2 * net.first * net.second
     gain = frames.gain if crosstalk is None else None
-    out = np.full((len(frames), 6), np.nan)
+    n = len(frames)
+    windows = _Windows(*(np.full(n, np.nan) for _ in range(6)))
     state = net.state.copy()
     if usable.size >= 2:
-        part = np.empty((usable.size, 6))
+        part = _Windows(*(np.full(usable.size, np.nan) for _ in range(6)))
         _differences(
             frames.time_s[usable],
-            net.first[usable],
-            net.second[usable],
-            var1[usable],
-            var2[usable],
-            cov[usable],
+            net._replace(var1=var1, var2=var2, cov=cov).select(usable),
             None if gain is None else gain[usable],
             _HALF_WIDTHS,
             part,
         )
-        out[usable] = part
-        missing = np.isnan(out[:, 0]) & np.isnan(out[:, 2]) & (state == 0)
+        for whole, some in zip(windows, part, strict=True):
+            whole[usable] = some
+        missing = np.isnan(windows.first) & np.isnan(windows.var1) & (state == 0)
         state[missing] = first_reason + UNEVEN_GAIN
-        state[(out[:, 5] > _TOLD) & (state == 0)] = first_reason + DROWNED_CHANGE
+        state[(windows.direction_sd > _TOLD) & (state == 0)] = first_reason + DROWNED_CHANGE
     else:
         state[usable] = first_reason + LONELY
-    bad = (state == 0) & ~(np.isfinite(out[:, 0]) & np.isfinite(out[:, 1]))
+    bad = (state == 0) & ~(np.isfinite(windows.first) & np.isfinite(windows.second))
     state[bad] = UNREPRESENTABLE
-    return Net(out[:, 0], out[:, 1], out[:, 2], out[:, 3], out[:, 4], 0.0, state)
+    return Net(windows.first, windows.second, windows.var1, windows.var2, windows.cov, 0.0, state)
 
 
 def _measured(sensor: Sensor, frames: Frames) -> Net:
     """Use the sensor's own derivatives."""
     assert frames.derivatives is not None  # noqa: S101  # decided by the caller
-    noise = sensor.noise.derivative or (math.nan, math.nan)
+    sd1, sd2 = sensor.noise.derivative or (math.nan, math.nan)
     n = len(frames)
     with np.errstate(all="ignore"):
         gain = np.ones(n) if frames.gain is None else frames.gain
         first, second = frames.derivatives[:, 0] / gain, frames.derivatives[:, 1] / gain
-        var1, var2 = (noise[0] / gain) ** 2, (noise[1] / gain) ** 2
+        var1, var2 = (sd1 / gain) ** 2, (sd2 / gain) ** 2
     state = rule_out(sensor, frames)
     bad = ~(np.isfinite(first) & np.isfinite(second))
     state[bad & (state == 0)] = UNREPRESENTABLE

@@ -6,12 +6,15 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.known import Known
 from inference.realtime.assemble import NOISE_BAND, Candidates
+from inference.realtime.solving.curves.curve import Curve, CurveParameters
 from inference.realtime.solving.invert import invert
-from inference.realtime.solving.monotone_intervals import pieces_of
+from inference.realtime.solving.monotone_intervals import monotone_intervals
 from inference.technique import Task
+from simulator.sensor import Sensor, SineWaveSensor
 
-__all__ = ["candidates_of", "widened"]
+__all__ = ["candidates_of", "curve_parameters", "stacked"]
 
 T = TypeVar("T", bound=np.generic)
 Array = NDArray[np.float64]
@@ -19,14 +22,34 @@ Array = NDArray[np.float64]
 _CHUNK = 200_000  # candidate roots held at a time, so that they stay in the cache
 
 
+def curve_parameters(known: Known, sensor: Sensor) -> CurveParameters:
+    """Return what a scene gives the curves, in lengths of ``known.unit``; 0 for what is not known.
+
+    Parameters
+    ----------
+    known : Known
+        The scene's known numbers.
+    sensor : Sensor
+        Gives the wave number, and the gain in the contrast of background and object.
+    """
+    unit, numbers = known.unit, known.numbers
+    contrast = 0.0
+    if known.has("background.strength", "object.c2"):
+        strength = known.get("background.strength") / sensor.gain
+        contrast = strength / known.get("object.c2") * unit * unit
+    return CurveParameters(
+        c0=numbers.get("object.c0", 0.0) / unit / unit,
+        c1=numbers.get("object.c1", 0.0) / unit,
+        distance=numbers.get("background.distance_m", 0.0) / unit,
+        wave=sensor.wave_number * unit if isinstance(sensor, SineWaveSensor) else 0.0,
+        c0_shadow=numbers.get("background.shadow.c0", 0.0) / unit / unit,
+        c1_shadow=numbers.get("background.shadow.c1", 0.0) / unit,
+        contrast=contrast,
+    )
+
+
 def candidates_of(
-    task: Task,
-    kind: int,
-    high_m: float,
-    top: Array,
-    sd: Array,
-    bottom: Array | None = None,
-    period: float = 0.0,
+    task: Task, curve: Curve, high_m: float, top: Array, sd: Array, bottom: Array | None = None
 ) -> tuple[Candidates, Array]:
     """Find all roots of a curve for every frame.
 
@@ -34,7 +57,7 @@ def candidates_of(
     ----------
     task : Task
         Gives the curve's parameters.
-    kind : int
+    curve : Curve
         The curve.
     high_m : float
         Upper end of the technique's interval [m]; the task may set another.
@@ -42,8 +65,6 @@ def candidates_of(
         Targets top / bottom, in lengths of ``task.known.unit``; nan where there is none.
     sd : ndarray, shape (n,)
         Standard deviation of the target.
-    period : float
-        The target is known modulo this number; 0 if it is not an angle.
 
     Returns
     -------
@@ -53,24 +74,14 @@ def candidates_of(
         The curve's slope at the roots [target / m].
     """
     unit = task.known.unit
-    p = task.known.curve_parameters(task.sensor)
+    p = curve_parameters(task.known, task.sensor)
     high = (high_m if task.high_m is None else task.high_m) / unit
-    pieces = pieces_of(kind, p, 0.0, high)
-    ones = np.ones_like(top)
-    bottom = ones if bottom is None else bottom
-    step = max(_CHUNK // max(pieces.ends.shape[0], 1), 1)
+    intervals = monotone_intervals(curve, p, 0.0, high)
+    bottom = np.ones_like(top) if bottom is None else bottom
+    step = max(_CHUNK // max(intervals.low.size, 1), 1)
     parts = [
         _trimmed(
-            invert(
-                kind,
-                top[i : i + step],
-                bottom[i : i + step],
-                p,
-                pieces.ends,
-                pieces.values,
-                pieces.folds,
-                period,
-            )
+            invert(curve.kind, p, intervals, curve.period, top[i : i + step], bottom[i : i + step])
         )
         for i in range(0, top.size, step)
     ]
@@ -86,22 +97,38 @@ def candidates_of(
     return candidates, slopes
 
 
-def _joined(parts: Sequence[tuple[Array, ...]]) -> tuple[Array, Array, Array, Array]:
-    width = max(part[0].shape[1] for part in parts)
-    roots, slopes, gaps = (
-        np.concatenate([widened(part[j], width) for part in parts]) for j in range(3)
-    )
-    return roots, slopes, gaps, np.concatenate([part[3] for part in parts])
+Part = tuple[Array, Array, Array, Array]
 
 
-def _trimmed(part: tuple[Array, Array, Array, Array]) -> tuple[Array, Array, Array, Array]:
+def _joined(parts: Sequence[Part]) -> Part:
+    roots, slopes, gaps, nearest = zip(*parts, strict=True)
+    return stacked(roots), stacked(slopes), stacked(gaps), np.concatenate(nearest)
+
+
+def _trimmed(part: Part) -> Part:
     """Drop the columns that no frame uses: roots fill them from the left."""
     roots, slopes, gaps, nearest = part
     used = max(int(np.count_nonzero(np.isfinite(roots).any(axis=0))), 1)
     return roots[:, :used], slopes[:, :used], gaps[:, :used], nearest
 
 
-def widened(array: NDArray[T], width: int) -> NDArray[T]:
+def stacked(parts: Sequence[NDArray[T]]) -> NDArray[T]:
+    """Stack parts of frames, columns padded with nan or False to the widest part's.
+
+    Parameters
+    ----------
+    parts : sequence of ndarray, shape (n_i, m_i)
+        Filled from the left.
+
+    Returns
+    -------
+    ndarray, shape (sum of n_i, max of m_i)
+    """
+    width = max(part.shape[1] for part in parts)
+    return np.concatenate([_widened(part, width) for part in parts])
+
+
+def _widened(array: NDArray[T], width: int) -> NDArray[T]:
     """Pad columns with nan, or False."""
     if array.shape[1] == width:
         return array

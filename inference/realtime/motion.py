@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.realtime.net import Net
+from simulator.compiled import compiled
+from simulator.object_model import log_slope
 from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = ["law_of_model", "law_of_motion"]
@@ -54,6 +56,14 @@ def law_of_motion(sensor: Sensor, net: Net, rate: Net) -> tuple[Array, Array]:
     return power, zeta
 
 
+@compiled
+def _log_slopes(range_m: Array, c0: float, c1: float) -> Array:
+    out = np.empty(range_m.size)
+    for i in range(range_m.size):
+        out[i] = log_slope(range_m[i], c0, c1)
+    return out
+
+
 def law_of_model(range_m: Array, c0: float, c1: float) -> tuple[Array, Array]:
     """Return power law b = 1 / (zeta - 1) and zeta of the object parameter model.
 
@@ -65,8 +75,7 @@ def law_of_model(range_m: Array, c0: float, c1: float) -> tuple[Array, Array]:
         Object parameters [m^2], [m].
     """
     with np.errstate(all="ignore"):
-        q = range_m * (range_m + c1) + c0
-        power = -2.0 - range_m * (2.0 * range_m + c1) / q
+        power = _log_slopes(range_m, c0, c1)
         zeta = 1.0 + 1.0 / power
     power = np.where(np.isfinite(power), power, np.nan)
     return power, np.where(np.isfinite(zeta), zeta, np.nan)

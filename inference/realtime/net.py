@@ -1,10 +1,11 @@
 """Readings net of known crosstalk, at the sensor's own gain, with their covariance."""
 
-import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.technique import Task
 from simulator.frames import Frames
 from simulator.sensor import PulsedSensor, Sensor
 
@@ -13,7 +14,9 @@ __all__ = [
     "COMMON_REASONS",
     "SATURATED",
     "UNREPRESENTABLE",
+    "Form",
     "Net",
+    "known_net_readings",
     "net_readings",
     "rule_out",
 ]
@@ -30,8 +33,14 @@ COMMON_REASONS = (
 SATURATED, ABSENT, UNREPRESENTABLE = 1, 2, 3
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Net:
+class Form(NamedTuple):
+    """A linear form of two readings: ``first`` times the first, ``second`` times the second."""
+
+    first: float
+    second: float
+
+
+class Net(NamedTuple):
     """Signals of object and background.
 
     Attributes
@@ -58,6 +67,23 @@ class Net:
         """Return the variance of g1 first + g2 second from noise that is not relative."""
         # in this order nothing overflows that does not have to
         return g1 * (g1 * self.var1) + g2 * (g2 * self.var2) + 2.0 * g1 * (g2 * self.cov)
+
+    def covariance(self, a: Form, b: Form) -> Array:
+        """Return the covariance of two linear forms, from noise that is not relative."""
+        both = a.first * b.second + a.second * b.first
+        return a.first * b.first * self.var1 + a.second * b.second * self.var2 + both * self.cov
+
+    def select(self, rows: slice | NDArray[np.intp]) -> "Net":
+        """Return some of the frames."""
+        return Net(
+            self.first[rows],
+            self.second[rows],
+            self.var1[rows],
+            self.var2[rows],
+            self.cov[rows],
+            self.relative,
+            self.state[rows],
+        )
 
 
 def rule_out(sensor: Sensor, frames: Frames) -> NDArray[np.uint8]:
@@ -115,3 +141,15 @@ def net_readings(sensor: Sensor, crosstalk: tuple[float, float], frames: Frames)
     bad = ~(np.isfinite(first) & np.isfinite(second))
     state[bad & (state == 0)] = UNREPRESENTABLE
     return Net(first, second, var1, var2, cov, noise.relative, state)
+
+
+def known_net_readings(task: Task) -> Net:
+    """Return the readings net of a task's crosstalk, which the plan has found to be known.
+
+    Parameters
+    ----------
+    task : Task
+        The request.
+    """
+    assert task.known.crosstalk is not None  # noqa: S101  # the plan leaves the technique out
+    return net_readings(task.sensor, task.known.crosstalk, task.frames)

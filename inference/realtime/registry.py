@@ -10,7 +10,8 @@ from inference.realtime.techniques.background_cancelling_differential import (
 from inference.realtime.techniques.background_intensity import BACKGROUND_INTENSITY
 from inference.realtime.techniques.conventional import CONVENTIONAL
 from inference.realtime.techniques.differential import DIFFERENTIAL
-from inference.realtime.techniques.intensity import INTENSITY, INTENSITY_W1
+from inference.realtime.techniques.intensity import INTENSITY
+from inference.realtime.techniques.intensity_w1 import INTENSITY_W1
 from inference.technique import Technique
 
 __all__ = ["TECHNIQUES"]

@@ -1,7 +1,9 @@
 """The curves against mpmath: values, slopes, turning points, and the roots of polynomials."""
 
+import importlib
 import itertools
 import math
+from pathlib import Path
 
 import mpmath as mp
 import numpy as np
@@ -10,87 +12,165 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inference.realtime.solving import curves
+from inference.realtime.solving.curves import (
+    both_phase,
+    both_ratio,
+    cancelling_quadrature,
+    cancelling_ratio,
+    differential_phase,
+    differential_ratio,
+    dispatch,
+    intensity,
+    intensity_w1,
+)
+from inference.realtime.solving.curves.curve import Curve, CurveParameters, Search
+from inference.realtime.solving.curves.registry import CURVES
 from inference.realtime.solving.exact import cycles_phase, difference_of_products
-from inference.realtime.solving.monotone_intervals import pieces_of
+from inference.realtime.solving.monotone_intervals import monotone_intervals
 from inference.realtime.solving.polynomials import real_roots
 
-# c0, c1, R, k, c0', c1', contrast
-P = np.array([0.9, -1.1, 4.0, 0.7, 0.6, 0.2, 0.15])
-NAMES = {
-    curves.INTENSITY: "intensity",
-    curves.INTENSITY_W1: "intensity_w1",
-    curves.DIFFERENTIAL_RATIO: "differential_ratio",
-    curves.DIFFERENTIAL_PHASE: "differential_phase",
-    curves.CANCELLING_RATIO: "cancelling_ratio",
-    curves.CANCELLING_QUADRATURE: "cancelling_quadrature",
-    curves.BOTH_RATIO: "both_ratio",
-    curves.BOTH_PHASE: "both_phase",
-}
+P = CurveParameters(
+    c0=0.9, c1=-1.1, distance=4.0, wave=0.7, c0_shadow=0.6, c1_shadow=0.2, contrast=0.15
+)
+EVERY = pytest.mark.parametrize("curve", CURVES, ids=[curve.name for curve in CURVES])
 
 
 def plain(kind: int, u: mp.mpf) -> mp.mpf:
     """Write the curve as its definition, derivatives by mpmath."""
-    c0, c1, far, k, c0s, c1s, contrast = (mp.mpf(x) for x in P.tolist())
+    c0, c1, far, k, c0s, c1s, contrast = (mp.mpf(x) for x in P)
 
     def phi(r: mp.mpf) -> mp.mpf:
         return c0 / (r**2 * (r**2 + c1 * r + c0))
 
     def back(r: mp.mpf) -> mp.mpf:
-        if kind in (curves.DIFFERENTIAL_RATIO, curves.DIFFERENTIAL_PHASE):
+        if kind in (differential_ratio.KIND, differential_phase.KIND):
             return mp.mpf(0)
         return contrast * (r**2 + c1s * r) / (r**2 + c1s * r + c0s)
 
     match kind:
-        case curves.INTENSITY:
+        case intensity.KIND:
             return phi(u)
-        case curves.INTENSITY_W1:
+        case intensity_w1.KIND:
             return u * phi(u)
-        case curves.CANCELLING_RATIO:
+        case cancelling_ratio.KIND:
             return (1 - u / far) * phi(u)
-        case curves.CANCELLING_QUADRATURE:
+        case cancelling_quadrature.KIND:
             return mp.sin(k * (far - u)) * phi(u)
-        case curves.DIFFERENTIAL_RATIO | curves.BOTH_RATIO:
+        case differential_ratio.KIND | both_ratio.KIND:
             top = mp.diff(lambda r: r * phi(r) + far * back(r), u)
             return top / mp.diff(lambda r: phi(r) + back(r), u)
-        case _:
+        case differential_phase.KIND | both_phase.KIND:
             real = mp.diff(lambda r: phi(r) * mp.cos(k * r) + back(r) * mp.cos(k * far), u)
             imag = mp.diff(lambda r: phi(r) * mp.sin(k * r) + back(r) * mp.sin(k * far), u)
             return mp.atan2(imag, real)
+        case _:
+            raise AssertionError(f"write the definition of curve {kind} here")
 
 
-@pytest.mark.parametrize("kind", list(NAMES), ids=list(NAMES.values()))
+@EVERY
 @pytest.mark.parametrize("u", [1e-3, 0.31, 0.77, 1.3, 3.1])
-def test_values_and_slopes(kind: int, u: float) -> None:
+def test_values_and_slopes(curve: Curve, u: float) -> None:
     with mp.workdps(50):
-        value = plain(kind, mp.mpf(u))
-        slope = mp.diff(lambda x: plain(kind, x), mp.mpf(u), h=mp.mpf(10) ** -15)
-        ours = curves.value(kind, u, P)
-        if kind in (curves.DIFFERENTIAL_PHASE, curves.BOTH_PHASE):  # known modulo pi
-            assert abs(math.remainder(ours - float(value), math.pi)) < 1e-14
+        value = plain(curve.kind, mp.mpf(u))
+        slope = mp.diff(lambda x: plain(curve.kind, x), mp.mpf(u), h=mp.mpf(10) ** -15)
+        ours = dispatch.value(curve.kind, u, P)
+        if curve.period:
+            assert abs(math.remainder(ours - float(value), curve.period)) < 1e-14
         else:
             assert ours == pytest.approx(float(value), rel=1e-13)
-        assert curves.slope(kind, u, P) == pytest.approx(float(slope), rel=1e-10)
+        assert dispatch.slope(curve.kind, u, P) == pytest.approx(float(slope), rel=1e-10)
 
 
-@pytest.mark.parametrize("kind", list(NAMES), ids=list(NAMES.values()))
+@EVERY
+@pytest.mark.parametrize("u", [1e-3, 0.31, 0.77, 1.3, 3.1])
+def test_a_curve_is_dispatched_to_its_own_file(curve: Curve, u: float) -> None:
+    """No case forgotten, which would give nan, and none that gives another curve's formula."""
+    own = importlib.import_module(f"{curves.__name__}.{curve.name}")
+    assert own.CURVE is curve
+    assert curve.kind == own.KIND
+    kind, target = curve.kind, own.value(u, P)
+    calls: dict[str, tuple[float, ...]] = {
+        "value": (u,),
+        "slope": (u,),
+        "guess": (target, 1.0),
+        "residual": (u, 1.1 * target, 1.0),
+        "power_law": (u,),
+    }
+    if curve.poles is not None or isinstance(curve.turns, Search):
+        calls["direction"] = (u,)
+    if isinstance(curve.turns, Search):
+        calls["turning"] = (u,)
+    for name, arguments in calls.items():
+        found = getattr(dispatch, name)(kind, *arguments, P)
+        np.testing.assert_array_equal(found, getattr(own, name)(*arguments, P), err_msg=name)
+        if name != "power_law":  # nan of curves that are none
+            assert np.isfinite(found).all(), name
+
+
+@EVERY
+@pytest.mark.parametrize("u", [0.31, 0.77, 1.3, 3.1])
+def test_what_the_solver_uses_of_a_curve_agrees_with_its_value(curve: Curve, u: float) -> None:
+    kind = curve.kind
+    value, slope = dispatch.value(kind, u, P), dispatch.slope(kind, u, P)
+    height, power = dispatch.power_law(kind, u, P)
+    if not math.isnan(power):
+        assert height == pytest.approx(value, rel=1e-14)
+        assert power == pytest.approx(u * slope / value, rel=1e-12)
+    # a residual changes its sign where the value crosses the target, and nowhere near
+    sides = []
+    for shift in (-0.01, 0.01):
+        target = value + shift * abs(slope)
+        assert dispatch.residual(kind, u, target, 1.0, P) != 0.0
+        sides.append(dispatch.residual(kind, u, target, 1.0, P) > 0.0)
+    assert sides[0] != sides[1]
+    assert abs(dispatch.residual(kind, u, value, 1.0, P)) < 1e-12
+    # far and near, where a curve is a power law, the guess is the root
+    for near in (1e-6, 1e6):
+        at = dispatch.value(kind, near, P)
+        _, power = dispatch.power_law(kind, near, P)
+        if not curve.period and at > 0.0 and not math.isnan(power) and near < P.distance:
+            assert 0.5 < dispatch.guess(kind, at, 1.0, P) / near < 2.0
+    if isinstance(curve.turns, Search):
+        assert (dispatch.turning(kind, u, P) > 0.0) == (slope > 0.0)
+
+
+def test_every_file_of_a_curve_is_registered_once() -> None:
+    helpers = {"curve", "dispatch", "registry", "terms", "__init__"}
+    files = {path.stem for path in Path(next(iter(curves.__path__))).glob("*.py")} - helpers
+    assert {curve.name for curve in CURVES} == files
+    assert len({curve.kind for curve in CURVES}) == len(CURVES)
+
+
+def test_a_number_without_a_case_gives_nan() -> None:
+    kind = max(curve.kind for curve in CURVES) + 1
+    assert math.isnan(dispatch.value(kind, 1.0, P))
+    assert math.isnan(dispatch.slope(kind, 1.0, P))
+    assert math.isnan(dispatch.guess(kind, 1.0, 1.0, P))
+    assert math.isnan(dispatch.residual(kind, 1.0, 1.0, 1.0, P))
+    assert math.isnan(dispatch.turning(kind, 1.0, P))
+    assert np.isnan(dispatch.power_law(kind, 1.0, P)).all()
+    assert np.isnan(dispatch.direction(kind, 1.0, P)).all()
+
+
+@EVERY
 @pytest.mark.parametrize("shape", [-1.95, -1.2, 0.0, 3.0])
-def test_pieces_are_monotone(kind: int, shape: float) -> None:
-    p = P.copy()
-    p[curves.C1] = shape * math.sqrt(p[curves.C0])
-    p[curves.WAVE] = 2.9
-    pieces = pieces_of(kind, p, 0.0, math.pi / 2.9 if kind == curves.BOTH_PHASE else 4.0)
-    for (left, right), values in zip(pieces.ends.tolist(), pieces.values.tolist(), strict=True):
-        low = max(left, 1e-4)
+def test_intervals_are_monotone(curve: Curve, shape: float) -> None:
+    p = P._replace(c1=shape * math.sqrt(P.c0), wave=2.9)
+    intervals = monotone_intervals(curve, p, 0.0, math.pi / 2.9 if curve.winds else 4.0)
+    for left, right, at_low, at_high in zip(
+        intervals.low, intervals.high, intervals.at_low, intervals.at_high, strict=True
+    ):
+        low = max(float(left), 1e-4)
         if low >= right:
             continue
         inner = low + (right - low) * np.linspace(0.0, 1.0, 2000)[1:-1]
-        along = np.array([curves.value(kind, float(u), p) for u in inner])
-        if kind == curves.BOTH_PHASE:
+        along = np.array([dispatch.value(curve.kind, float(u), p) for u in inner])
+        if curve.winds:
             along = np.unwrap(along)
-        steps = np.diff(along) * (1.0 if values[1] > values[0] else -1.0)
+        steps = np.diff(along) * (1.0 if at_high > at_low else -1.0)
         assert (steps >= -1e-12 * np.abs(along).max()).all()
-    # the pieces join
-    np.testing.assert_array_equal(pieces.ends[1:, 0], pieces.ends[:-1, 1])
+    # they join
+    np.testing.assert_array_equal(intervals.low[1:], intervals.high[:-1])
 
 
 @given(

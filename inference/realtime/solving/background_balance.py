@@ -1,12 +1,22 @@
 """Background intensity of a pulse: r w2 + B S(r) (R - r) = r0 w1, a cubic (4.76)."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.realtime.solving.bracketing import EPSILON, STEPS, best, narrowed, next_point, start
-from inference.realtime.solving.monotone_intervals import LEAST
+from inference.realtime.net import Net
+from inference.realtime.solving.bracketing import (
+    EPSILON,
+    LEAST,
+    STEPS,
+    best,
+    narrowed,
+    next_point,
+    start,
+)
+from inference.realtime.solving.known_background import Found, KnownBackground
 from inference.realtime.solving.polynomials import real_roots
 from simulator.background import shadow, shadow_slope
 from simulator.compiled import compiled
@@ -14,124 +24,141 @@ from simulator.compiled import compiled
 __all__ = ["solve_balance"]
 
 Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+
+
+class _Frame(NamedTuple):
+    """A frame in units of its largest reading; w1 is already times r0, and so is its noise."""
+
+    w1: float
+    w2: float
+    b: float
+    v1: float
+    v2: float
+    v12: float
 
 
 @compiled
-def _balance(r: float, w1: float, w2: float, b: float, p: Array) -> float:
-    """Return (r w2 - w1) + b S(r) (R - r); w1 is already times r0. p = (R, c0', c1', k)."""
-    return (r * w2 - w1) + b * shadow(r, p[1], p[2]) * (float(p[0]) - r)
+def _frame(net: Net, i: int, strength: float, r0: float) -> _Frame:
+    first, second = net.first[i], net.second[i]
+    # so that nothing overflows
+    size = max(abs(second), abs(first), strength)
+    return _Frame(
+        r0 * (first / size),
+        second / size,
+        strength / size,
+        r0 * (r0 * (net.var1[i] / size / size)),
+        net.var2[i] / size / size,
+        r0 * (net.cov[i] / size / size),
+    )
 
 
 @compiled
-def _between(low: float, high: float, w1: float, w2: float, b: float, p: Array) -> float:
+def _balance(r: float, frame: _Frame, far: KnownBackground) -> float:
+    """Return (r w2 - w1) + b S(r) (R - r)."""
+    return (r * frame.w2 - frame.w1) + frame.b * shadow(r, far.c0, far.c1) * (far.distance - r)
+
+
+@compiled
+def _spread(r: float, frame: _Frame) -> float:
+    """Return the standard deviation of r w2 - w1."""
+    return math.sqrt(max(frame.v1 + r * r * frame.v2 - 2.0 * r * frame.v12, 0.0))
+
+
+@compiled
+def _between(low: float, high: float, frame: _Frame, far: KnownBackground) -> float:
+    """Return the root between two points of opposite sign."""
     # Newton from the conventional range, which is the root where there is no background
+    w1, w2, b = frame.w1, frame.w2, frame.b
     r = w1 / w2
     for _ in range(10):
         if not low < r < high:
             break
-        q = r * (r + p[2]) + p[1]
-        seen, left = b * (r * (r + p[2]) / q), p[0] - r
-        steep = w2 - seen + b * (p[1] / q) * ((2.0 * r + p[2]) / q) * left
+        q = r * (r + far.c1) + far.c0
+        seen, left = b * (r * (r + far.c1) / q), far.distance - r
+        steep = w2 - seen + b * (far.c0 / q) * ((2.0 * r + far.c1) / q) * left
         step = ((w1 - r * w2) - seen * left) / steep
         r += step
         if abs(step) < 1e-8 * r:  # what remains is its square; once more in the exact form
-            r -= _balance(r, w1, w2, b, p) / steep
+            r -= _balance(r, frame, far) / steep
             return float(min(max(r, low), high))
-    bracket = start(low, high, _balance(low, w1, w2, b, p), _balance(high, w1, w2, b, p))
+    bracket = start(low, high, _balance(low, frame, far), _balance(high, frame, far))
     for _ in range(STEPS):
         x = next_point(bracket)
         if x != x:
             break
-        bracket = narrowed(bracket, x, _balance(x, w1, w2, b, p))
+        bracket = narrowed(bracket, x, _balance(x, frame, far))
     return best(bracket)
 
 
 @compiled
-def solve_balance(
-    first: Array,
-    second: Array,
-    var1: Array,
-    var2: Array,
-    cov: Array,
-    state: NDArray[np.uint8],
-    strength: float,
-    r0: float,
-    p: Array,
-    band: float,
-    roots: Array,
-    sds: Array,
-    near: Flags,
-    near_frame: Flags,
-    physical: Flags,
-) -> None:
+def _turns(frame: _Frame, far: KnownBackground, slope: Array, turns: Array) -> int:
+    """Fill in the cubic's slope and where it turns before the background; return how often."""
+    w1, w2, b = frame.w1, frame.w2, frame.b
+    a2 = (w2 - b) * far.c1 - (w1 - b * far.distance)
+    a1 = w2 * far.c0 - far.c1 * (w1 - b * far.distance)
+    slope[:] = (3.0 * (w2 - b), 2.0 * a2, a1)
+    return real_roots(slope, 0.0, far.distance, turns)
+
+
+@compiled
+def _error_bar(r: float, frame: _Frame, far: KnownBackground, band: float) -> tuple[float, bool]:
+    """Return a root's standard deviation and whether it is physical, to within the noise."""
+    slope = frame.b * shadow_slope(r, far.c0, far.c1)
+    flux = frame.w2 - frame.b * shadow(r, far.c0, far.c1)
+    steep = flux + slope * (far.distance - r)
+    sd = _spread(r, frame) / abs(steep)
+    # flux = w2 - b S(r), d r = (d w1 - r d w2) / steep
+    lever = slope / steep
+    g1, g2 = -lever, 1.0 + lever * r
+    variance = g1 * (g1 * frame.v1) + g2 * (g2 * frame.v2) + 2.0 * g1 * g2 * frame.v12
+    spread = math.sqrt(max(variance, 0.0))
+    spread = band * spread + 64.0 * EPSILON * (abs(frame.w2) + frame.b) * (1.0 + abs(lever) * r)
+    seen = r + far.c1 >= -(band * sd + 1e-12 * r)
+    return sd, seen and not flux < -spread
+
+
+@compiled
+def solve_balance(net: Net, far: KnownBackground, r0: float, band: float, found: Found) -> None:
     """Find all roots of every frame, their standard deviations and whether they are physical.
 
     Parameters
     ----------
-    first, second, var1, var2, cov : ndarray, shape (n,)
-        Net readings and their covariance.
-    state : ndarray of uint8, shape (n,)
-        Frames other than 0 are passed over.
-    strength : float
-        Reading of the bare background.
+    net : Net
+        Net readings of n frames; those of a state other than 0 are passed over.
+    far : KnownBackground
+        The background.
     r0 : float
-        Range at which the whole pulse is late, in the unit of ``p``.
-    p : ndarray, shape (4,)
-        R, c0', c1' and wave number, in one unit of length.
+        Range at which the whole pulse is late, in the background's unit.
     band : float
         Standard deviations that count as within the noise.
-    roots, sds, near, near_frame, physical
-        Results, see `Candidates`; filled from the left.
+    found : Found
+        Receives the results.
     """
-    distance, c0, c1 = p[0], p[1], p[2]
-    cubic, turns, ends = np.empty(3), np.empty(3), np.empty(4)
-    for i in range(first.size):
-        if state[i] != 0:
+    slope, turns, ends = np.empty(3), np.empty(3), np.empty(4)
+    for i in range(net.first.size):
+        if net.state[i] != 0:
             continue
-        # in units of the largest, so that nothing overflows
-        size = max(abs(second[i]), abs(first[i]), strength)
-        w1, w2, b = r0 * (first[i] / size), second[i] / size, strength / size
-        v1 = r0 * (r0 * (var1[i] / size / size))
-        v2 = var2[i] / size / size
-        v12 = r0 * (cov[i] / size / size)
-        a2 = (w2 - b) * c1 - (w1 - b * distance)
-        a1 = w2 * c0 - c1 * (w1 - b * distance)
-        cubic[0], cubic[1], cubic[2] = 3.0 * (w2 - b), 2.0 * a2, a1
-        count = real_roots(cubic, 0.0, distance, turns)
+        frame = _frame(net, i, far.strength, r0)
+        count = _turns(frame, far, slope, turns)
         ends[0] = LEAST
         for j in range(count):
             ends[j + 1] = turns[j]
-        ends[count + 1] = distance
-        found = 0
+        ends[count + 1] = far.distance
+        roots = 0
         for j in range(count + 1):
             low, high = ends[j], ends[j + 1]
-            left, right = _balance(low, w1, w2, b, p), _balance(high, w1, w2, b, p)
-            for side in range(2):
-                at, off = (low, left) if side == 0 else (high, right)
-                if (side == 0 and j > 0) or (side == 1 and j < count):
-                    spread = math.sqrt(max(v1 + at * at * v2 - 2.0 * at * v12, 0.0))
-                    if abs(off) < band * spread:
-                        near_frame[i] = True
-                        near[i, j] = True
+            left, right = _balance(low, frame, far), _balance(high, frame, far)
+            # whether noise reaches the turning points at the ends
+            near = j > 0 and abs(left) < band * _spread(low, frame)
+            near |= j < count and abs(right) < band * _spread(high, frame)
+            if near:
+                found.near_frame[i] = True
             if not ((left < 0.0 <= right) or (left > 0.0 >= right)):
                 continue
-            r = _between(low, high, w1, w2, b, p)
-            if not r < distance or (found > 0 and r <= roots[i, found - 1]):
+            r = _between(low, high, frame, far)
+            if not r < far.distance or (roots > 0 and r <= found.roots[i, roots - 1]):
                 continue
-            roots[i, found] = r
-            near[i, found] = near[i, j]
-            slope = b * shadow_slope(r, c0, c1)
-            flux = w2 - b * shadow(r, c0, c1)
-            steep = flux + slope * (distance - r)
-            sds[i, found] = math.sqrt(max(v1 + r * r * v2 - 2.0 * r * v12, 0.0)) / abs(steep)
-            # flux = w2 - b S(r), d r = (d w1 - r d w2) / steep
-            lever = slope / steep
-            g1, g2 = -lever, 1.0 + lever * r
-            spread = math.sqrt(max(g1 * (g1 * v1) + g2 * (g2 * v2) + 2.0 * g1 * g2 * v12, 0.0))
-            spread = band * spread + 64.0 * EPSILON * (abs(w2) + b) * (1.0 + abs(lever) * r)
-            seen = r + c1 >= -(band * sds[i, found] + 1e-12 * r)
-            physical[i, found] = seen and not flux < -spread
-            found += 1
-        for j in range(found, near.shape[1]):
-            near[i, j] = False
+            found.roots[i, roots] = r
+            found.near[i, roots] = near
+            found.sds[i, roots], found.physical[i, roots] = _error_bar(r, frame, far, band)
+            roots += 1

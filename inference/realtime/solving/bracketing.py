@@ -1,9 +1,7 @@
 """Narrow a bracket of a root, by Chandrupatla's rule.
 
-A bracket is (a, b, c, fa, fb, fc): the latest point a, the other end b, where the function has the
-opposite sign, the point before c, and the values there. A loop around `next_point` and `narrowed`
-stands wherever a function is solved, because compiled functions cannot be passed as arguments
-without giving up the cache of machine code::
+A loop around `next_point` and `narrowed` stands wherever a function is solved, because compiled
+functions cannot be passed as arguments without giving up the cache of machine code::
 
     bracket = start(low, high, f(low), f(high))
     for _ in range(STEPS):
@@ -15,21 +13,40 @@ without giving up the cache of machine code::
 """
 
 import math
+from typing import NamedTuple
 
 from simulator.compiled import compiled
 
-__all__ = ["EPSILON", "STEPS", "Bracket", "best", "narrowed", "next_point", "start"]
-
-Bracket = tuple[float, float, float, float, float, float]
+__all__ = ["EPSILON", "LEAST", "STEPS", "Bracket", "best", "narrowed", "next_point", "start"]
 
 EPSILON = 2.220446049250313e-16
+LEAST = 2.0**-330  # stands for zero range: its square is still a normal number
 STEPS = 400  # geometric bisection of all doubles takes 11, plain bisection of one octave 53
+
+
+class Bracket(NamedTuple):
+    """Two points at which a function has opposite signs, and the point before.
+
+    Attributes
+    ----------
+    latest, other, before : float
+        The latest point, the other end, and the point before the latest.
+    f_latest, f_other, f_before : float
+        The function's values there.
+    """
+
+    latest: float
+    other: float
+    before: float
+    f_latest: float
+    f_other: float
+    f_before: float
 
 
 @compiled
 def start(low: float, high: float, f_low: float, f_high: float) -> Bracket:
     """Return the bracket of an interval whose ends have values of opposite sign."""
-    return low, high, high, f_low, f_high, f_high
+    return Bracket(low, high, high, f_low, f_high, f_high)
 
 
 @compiled
@@ -68,13 +85,13 @@ def next_point(bracket: Bracket) -> float:
 @compiled
 def narrowed(bracket: Bracket, x: float, fx: float) -> Bracket:
     """Return the part of a bracket that holds the root, x being its latest point."""
-    a, b, _, fa, fb, _ = bracket
+    a, b, fa, fb = bracket.latest, bracket.other, bracket.f_latest, bracket.f_other
     if (fx > 0.0) == (fa > 0.0):
-        return x, b, a, fx, fb, fa
-    return x, a, b, fx, fa, fb
+        return Bracket(x, b, a, fx, fb, fa)
+    return Bracket(x, a, b, fx, fa, fb)
 
 
 @compiled
 def best(bracket: Bracket) -> float:
     """Return the end with the smaller value."""
-    return bracket[0] if abs(bracket[3]) < abs(bracket[4]) else bracket[1]
+    return bracket.latest if abs(bracket.f_latest) < abs(bracket.f_other) else bracket.other

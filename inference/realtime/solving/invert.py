@@ -1,40 +1,49 @@
-"""Invert a curve for many frames: every root in every monotone piece."""
+"""Invert a curve for many frames: every root in every monotone interval."""
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.realtime.solving.curves import BOTH_PHASE, slope, solve_between
+from inference.realtime.solving.curves import dispatch
+from inference.realtime.solving.curves.curve import CurveParameters
+from inference.realtime.solving.intervals import MonotoneIntervals
+from inference.realtime.solving.newton import solve_between
 from simulator.compiled import compiled
 
 __all__ = ["invert"]
 
 Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @compiled
-def _capacity(values: Array, period: float) -> int:
+def _capacity(intervals: MonotoneIntervals, period: float) -> int:
     """Return the largest possible number of roots of one frame."""
     total = 0
-    for j in range(values.shape[0]):
+    for j in range(intervals.low.size):
         total += 1
         if period > 0.0:
-            total += int(abs(values[j, 1] - values[j, 0]) / period)
+            total += int(abs(intervals.at_high[j] - intervals.at_low[j]) / period)
     return max(total, 1)
+
+
+@compiled
+def _off(value: float, target: float, period: float) -> float:
+    """Return the distance of a value from a target, which may be known modulo a period."""
+    if period > 0.0:
+        turns = (value - target) / period
+        return period * abs(turns - math.floor(turns + 0.5))
+    return abs(value - target)
 
 
 @compiled
 def invert(
     kind: int,
+    p: CurveParameters,
+    intervals: MonotoneIntervals,
+    period: float,
     top: Array,
     bottom: Array,
-    p: Array,
-    ends: Array,
-    values: Array,
-    folds: Flags,
-    period: float,
 ) -> tuple[Array, Array, Array, Array]:
     """Find all roots of value(u) = top / bottom.
 
@@ -42,14 +51,14 @@ def invert(
     ----------
     kind : int
         The curve.
-    top, bottom : ndarray, shape (n,)
-        Targets; nan in ``top`` stands for a frame without a target.
-    p : ndarray
-        Parameters of the curve.
-    ends, values, folds : ndarray, shape (k, 2)
-        Its monotone pieces.
+    p : CurveParameters
+        Its parameters.
+    intervals : MonotoneIntervals
+        Its monotone intervals.
     period : float
         The target is known modulo this number; 0 if it is not an angle.
+    top, bottom : ndarray, shape (n,)
+        Targets; nan in ``top`` stands for a frame without a target.
 
     Returns
     -------
@@ -58,12 +67,12 @@ def invert(
     slopes : ndarray, shape (n, m)
         d value / du at the roots.
     gaps : ndarray, shape (n, m)
-        Distance of the target from the nearer turning value of the root's piece, inf without.
+        Distance of the target from the nearer turning value of the root's interval, inf without.
     nearest : ndarray, shape (n,)
         Distance of the target from the nearest turning value of all.
     """
-    n, k = top.size, ends.shape[0]
-    m = _capacity(values, period)
+    n, k = top.size, intervals.low.size
+    m = _capacity(intervals, period)
     roots = np.full((n, m), np.nan)
     slopes = np.full((n, m), np.nan)
     gaps = np.full((n, m), np.inf)
@@ -75,33 +84,32 @@ def invert(
         last = -1.0
         target = top[i] / bottom[i] if bottom[i] != 0.0 else math.inf
         for j in range(k):
-            below, above = min(values[j, 0], values[j, 1]), max(values[j, 0], values[j, 1])
+            low, high = intervals.low[j], intervals.high[j]
+            at_low, at_high = intervals.at_low[j], intervals.at_high[j]
+            below, above = min(at_low, at_high), max(at_low, at_high)
+            if intervals.turns_low[j]:
+                nearest[i] = min(nearest[i], _off(at_low, target, period))
+            if intervals.turns_high[j]:
+                nearest[i] = min(nearest[i], _off(at_high, target, period))
             goal = target
             if period > 0.0:
                 goal = target + period * math.ceil((below - target) / period)
-                for side in range(2):
-                    if folds[j, side]:
-                        off = (values[j, side] - target) / period
-                        nearest[i] = min(nearest[i], period * abs(off - math.floor(off + 0.5)))
-            else:
-                for side in range(2):
-                    if folds[j, side]:
-                        nearest[i] = min(nearest[i], abs(values[j, side] - target))
             while below <= goal <= above and found < m:
                 if bottom[i] == 0.0:  # the pole itself
-                    u = ends[j, 0] if values[j, 0] == math.inf else ends[j, 1]
-                elif period > 0.0 or kind == BOTH_PHASE:
-                    u = solve_between(kind, ends[j, 0], ends[j, 1], goal, 1.0, p)
+                    u = low if at_low == math.inf else high
+                elif period > 0.0:
+                    u = solve_between(kind, low, high, goal, 1.0, p)
                 else:
-                    u = solve_between(kind, ends[j, 0], ends[j, 1], top[i], bottom[i], p)
-                # neighbouring pieces share their end, where a double root is one root; but two
+                    u = solve_between(kind, low, high, top[i], bottom[i], p)
+                # neighbouring intervals share their end, where a double root is one root; but two
                 # roots that rounding cannot tell apart stay two
-                if goal != values[j, 0] or abs(u - last) > 4e-16 * u:
+                if goal != at_low or abs(u - last) > 4e-16 * u:
                     roots[i, found] = u
-                    slopes[i, found] = slope(kind, u, p)
-                    for side in range(2):
-                        if folds[j, side]:
-                            gaps[i, found] = min(gaps[i, found], abs(values[j, side] - goal))
+                    slopes[i, found] = dispatch.slope(kind, u, p)
+                    if intervals.turns_low[j]:
+                        gaps[i, found] = min(gaps[i, found], abs(at_low - goal))
+                    if intervals.turns_high[j]:
+                        gaps[i, found] = min(gaps[i, found], abs(at_high - goal))
                     found += 1
                     last = u
                 if period <= 0.0:

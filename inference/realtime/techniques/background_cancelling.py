@@ -1,6 +1,7 @@
 """Background cancelling: a background of known distance drops out, whatever its strength."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,18 +9,20 @@ from numpy.typing import NDArray
 from inference.estimates import TechniqueResult
 from inference.realtime.assemble import NOISE_BAND, Outcome, assemble, reasons_of
 from inference.realtime.from_curve import candidates_of
-from inference.realtime.net import UNREPRESENTABLE, net_readings
-from inference.realtime.solving import curves
+from inference.realtime.net import UNREPRESENTABLE, Form, Net, known_net_readings
 from inference.realtime.solving.bracketing import EPSILON
+from inference.realtime.solving.curves import cancelling_quadrature, cancelling_ratio
+from inference.realtime.solving.curves.curve import Curve
 from inference.realtime.solving.exact import cycles_phase, weighted_differences
 from inference.technique import Task, Technique
 from simulator.compiled import compiled
 from simulator.object_model import quadratic
-from simulator.sensor import PulsedSensor
+from simulator.sensor import PulsedSensor, SineWaveSensor
 
 __all__ = ["BACKGROUND_CANCELLING"]
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 _REASONS = reasons_of(
     "the readings lie at or beyond the background",
@@ -28,96 +31,118 @@ _REASONS = reasons_of(
 _BEYOND, _NO_RANGE = len(_REASONS) - 2, len(_REASONS) - 1
 
 
+class _Parts(NamedTuple):
+    """A frame's part that is free of background and the one that holds all of it, with noise.
+
+    Attributes
+    ----------
+    free, whole : ndarray, shape (n,)
+        Both parts [reading units].
+    var_free, cov, var_whole : ndarray, shape (n,)
+        Their covariance, but for the relative error.
+    size : ndarray, shape (n,)
+        What was subtracted from one another: its rounding is theirs.
+    """
+
+    free: Array
+    whole: Array
+    var_free: Array
+    cov: Array
+    var_whole: Array
+    size: Array
+
+
+class _Wave(NamedTuple):
+    """Wave number [1/m] and the background's distance [m]."""
+
+    number: float
+    distance: float
+
+
+class _Scene(NamedTuple):
+    """What the background is computed from: gain c2, c0, c1, its strength, the relative error."""
+
+    gain: float
+    c0: float
+    c1: float
+    strength: float
+    relative: float
+
+
+def _parts(task: Task, net: Net) -> tuple[Curve, _Parts]:
+    sensor, distance = task.sensor, task.known.get("background.distance_m")
+    if isinstance(sensor, PulsedSensor):
+        curve = cancelling_ratio.CURVE
+        free = weighted_differences(net.second, distance, net.first, sensor.r0) / distance
+        whole = net.second
+        to_free, to_whole = Form(-(sensor.r0 / distance), 1.0), Form(0.0, 1.0)
+    else:
+        curve = cancelling_quadrature.CURVE
+        angle = cycles_phase(sensor.frequency_hz, distance) + sensor.phase_offset_rad
+        cosine, sine = math.cos(angle), math.sin(angle)
+        # free = - Im(x e^-j(kR + offset)), whole = its real part
+        free = weighted_differences(net.first, sine, net.second, cosine)
+        whole = weighted_differences(net.first, cosine, net.second, -sine)
+        to_free, to_whole = Form(sine, -cosine), Form(cosine, sine)
+    parts = _Parts(
+        free=free,
+        whole=whole,
+        var_free=net.covariance(to_free, to_free),
+        cov=net.covariance(to_free, to_whole),
+        var_whole=net.covariance(to_whole, to_whole),
+        size=np.abs(net.first) * abs(to_free.first) + np.abs(net.second),
+    )
+    return curve, parts
+
+
 def _solve(task: Task) -> TechniqueResult:
     sensor, known = task.sensor, task.known
-    assert known.crosstalk is not None  # noqa: S101  # the plan leaves the technique out
-    net = net_readings(sensor, known.crosstalk, task.frames)
-    distance = known.get("background.distance_m")
+    net = known_net_readings(task)
     with np.errstate(all="ignore"):
-        # the part free of background, and the part that holds all of the background
-        if isinstance(sensor, PulsedSensor):
-            kind = curves.CANCELLING_RATIO
-            weight = sensor.r0 / distance
-            free = weighted_differences(net.second, distance, net.first, sensor.r0) / distance
-            whole = net.second
-            towards_free, towards_whole = (-weight, 1.0), (0.0, 1.0)
-        else:
-            kind = curves.CANCELLING_QUADRATURE
-            angle = cycles_phase(sensor.frequency_hz, distance) + sensor.phase_offset_rad
-            cosine, sine = math.cos(angle), math.sin(angle)
-            # free = - Im(x e^-j(kR + offset)), whole = its real part
-            free = weighted_differences(net.first, sine, net.second, cosine)
-            whole = weighted_differences(net.first, cosine, net.second, -sine)
-            towards_free, towards_whole = (sine, -cosine), (cosine, sine)
-        v11 = _product(net.var1, net.var2, net.cov, towards_free, towards_free)
-        v12 = _product(net.var1, net.var2, net.cov, towards_free, towards_whole)
-        v22 = _product(net.var1, net.var2, net.cov, towards_whole, towards_whole)
+        curve, parts = _parts(task, net)
+        free = parts.free
         scale = known.unit**2 / (sensor.gain * known.get("object.c2"))
         target = free * scale
         state = net.state.copy()
         lost = (free != 0) & ((target == 0) | ~np.isfinite(target))
         state[lost & (state == 0)] = UNREPRESENTABLE
         usable = state == 0
-        if kind == curves.CANCELLING_RATIO:
+        if isinstance(sensor, PulsedSensor):
             usable &= free > 0
         target = np.where(usable, target, np.nan)
-        sd = np.hypot(np.sqrt(v11) * scale, sensor.noise.relative * target)
-        candidates, slopes = candidates_of(task, kind, distance, target, sd)
+        sd = np.hypot(np.sqrt(parts.var_free) * scale, net.relative * target)
+        distance = known.get("background.distance_m")
+        candidates, slopes = candidates_of(task, curve, distance, target, sd)
         physical = None
         if task.physical and known.has("background.strength"):
-            magnitude = np.abs(net.first) * abs(towards_free[0]) + np.abs(net.second)
-            c0, c1 = known.get("object.c0"), known.get("object.c1")
-            gain = sensor.gain * known.get("object.c2")
-            physical = _physical(
-                candidates.roots,
-                slopes / scale,
-                free,
-                whole,
-                v11,
-                v12,
-                v22,
-                magnitude,
-                (gain, c0, c1, known.get("background.strength")),
-                None if isinstance(sensor, PulsedSensor) else (sensor.wave_number, distance),
-                sensor.noise.relative,
-                NOISE_BAND,
+            scene = _Scene(
+                gain=sensor.gain * known.get("object.c2"),
+                c0=known.get("object.c0"),
+                c1=known.get("object.c1"),
+                strength=known.get("background.strength"),
+                relative=net.relative,
             )
-    reason = np.where(free > 0, _NO_RANGE, _BEYOND).astype(np.uint8)
-    if kind == curves.CANCELLING_QUADRATURE:
-        reason[:] = _NO_RANGE
+            wave = None
+            if isinstance(sensor, SineWaveSensor):
+                wave = _Wave(sensor.wave_number, distance)
+            physical = _physical(candidates.roots, slopes / scale, parts, scene, wave, NOISE_BAND)
+    reason = np.full(free.size, _NO_RANGE, dtype=np.uint8)
+    if isinstance(sensor, PulsedSensor):
+        reason[~(free > 0)] = _BEYOND
     support = known.support if task.physical else (0.0, np.inf)
     outcome = Outcome(physical, support, reason, _REASONS)
     return assemble("background_cancelling", state, candidates, outcome)
 
 
-def _product(
-    var1: Array, var2: Array, cov: Array, a: tuple[float, float], b: tuple[float, float]
-) -> Array:
-    """Return the covariance of two linear forms of the readings."""
-    return a[0] * b[0] * var1 + a[1] * b[1] * var2 + (a[0] * b[1] + a[1] * b[0]) * cov
-
-
 @compiled
 def _physical(
-    roots: Array,
-    slopes: Array,
-    free: Array,
-    whole: Array,
-    v11: Array,
-    v12: Array,
-    v22: Array,
-    magnitude: Array,
-    scene: tuple[float, float, float, float],
-    wave: tuple[float, float] | None,
-    relative: float,
-    band: float,
-) -> NDArray[np.bool_]:
+    roots: Array, slopes: Array, parts: _Parts, scene: _Scene, wave: _Wave | None, band: float
+) -> Flags:
     """Say at which roots the background is between nothing and its strength, within noise.
 
     The background is whole - C Phi(r), with C = 1 or cos k (R - r), and its first-order error
-    d whole - (C Phi)' d free / free'(r). ``scene`` is (gain c2, c0, c1, strength), ``wave`` (k, R).
+    d whole - (C Phi)' d free / free'(r).
     """
-    gain, c0, c1, strength = scene
     n, m = roots.shape
     accepted = np.zeros((n, m), dtype=np.bool_)
     for i in range(n):
@@ -125,23 +150,24 @@ def _physical(
             r = roots[i, j]
             if not r > 0.0:
                 continue
-            q = quadratic(r, c0, c1)
-            flux = gain * (c0 / q) / r / r
-            change = -flux * (2.0 + r * (2.0 * r + c1) / q) / r
+            q = quadratic(r, scene.c0, scene.c1)
+            flux = scene.gain * (scene.c0 / q) / r / r
+            change = -flux * (2.0 + r * (2.0 * r + scene.c1) / q) / r
             part = flux
             if wave is not None:
-                angle = wave[0] * (wave[1] - r)
+                angle = wave.number * (wave.distance - r)
                 cosine, sine = math.cos(angle), math.sin(angle)
                 part = flux * cosine
-                change = change * cosine + wave[0] * flux * sine
-            background = whole[i] - part
+                change = change * cosine + wave.number * flux * sine
+            background = parts.whole[i] - part
             lever = change / slopes[i, j]
-            variance = v22[i] - 2.0 * (lever * v12[i]) + lever * (lever * v11[i])
-            common = relative * (part - lever * free[i])
+            variance = parts.var_whole[i] - 2.0 * (lever * parts.cov[i])
+            variance += lever * (lever * parts.var_free[i])
+            common = scene.relative * (part - lever * parts.free[i])
             variance = max(variance, 0.0) + common * common
-            rounding = 64.0 * EPSILON * (magnitude[i] * (1.0 + abs(lever)) + flux)
+            rounding = 64.0 * EPSILON * (parts.size[i] * (1.0 + abs(lever)) + flux)
             slack = band * math.sqrt(variance) + rounding
-            accepted[i, j] = not (background < -slack or background > strength + slack)
+            accepted[i, j] = not (background < -slack or background > scene.strength + slack)
     return accepted
 
 

@@ -1,7 +1,6 @@
 """Derivatives with a known background in them: immune to both terms, two roots as a rule."""
 
 import dataclasses
-import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,7 @@ from inference.realtime.assemble import NOISE_BAND, Outcome, assemble, reasons_o
 from inference.realtime.derivatives import DERIVATIVE_REASONS, derivatives_of
 from inference.realtime.from_curve import candidates_of
 from inference.realtime.motion import law_of_model
-from inference.realtime.solving import curves
+from inference.realtime.solving.curves import both_phase, both_ratio
 from inference.realtime.techniques.differential import target_of
 from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor
@@ -39,7 +38,7 @@ def _solve(task: Task) -> TechniqueResult:
         unit = known.unit
         candidates, _ = candidates_of(
             task,
-            curves.BOTH_RATIO,
+            both_ratio.CURVE,
             min(high, sensor.r0),
             targets.top / unit,
             targets.sd / unit,
@@ -47,9 +46,7 @@ def _solve(task: Task) -> TechniqueResult:
         )
     else:
         high = min(high, sensor.max_range_m / 2)
-        candidates, _ = candidates_of(
-            task, curves.BOTH_PHASE, high, targets.top, targets.sd, period=math.pi
-        )
+        candidates, _ = candidates_of(task, both_phase.CURVE, high, targets.top, targets.sd)
         if task.physical:
             candidates.roots[targets.contact] = np.nan
     physical = None

@@ -3,22 +3,19 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
 from inference.realtime.assemble import NOISE_BAND, Candidates, Outcome, assemble, reasons_of
-from inference.realtime.from_curve import widened
-from inference.realtime.net import Net, net_readings
+from inference.realtime.from_curve import stacked
+from inference.realtime.net import Net, known_net_readings
 from inference.realtime.solving.background_balance import solve_balance
-from inference.realtime.solving.background_phase import solve_phase
+from inference.realtime.solving.background_phase import Phase, solve_phase
 from inference.realtime.solving.exact import cycles_phase
+from inference.realtime.solving.known_background import Found, KnownBackground
 from inference.technique import Task, Technique
-from simulator.sensor import PulsedSensor, SineWaveSensor
+from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor
 
 __all__ = ["BACKGROUND_INTENSITY"]
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 _REASONS = reasons_of(
     "no light: w2 is not positive",
@@ -33,28 +30,30 @@ _CHUNK = 200_000  # candidate roots held at a time, so that they stay in the cac
 
 def _solve(task: Task) -> TechniqueResult:
     sensor, known = task.sensor, task.known
-    assert known.crosstalk is not None  # noqa: S101  # the plan leaves the technique out
-    net = net_readings(sensor, known.crosstalk, task.frames)
+    net = known_net_readings(task)
     # lengths in a power of two near sqrt(c0'), so that nothing overflows
     c0 = known.get("background.shadow.c0")
     unit = 2.0 ** round(0.5 * math.log2(c0))
-    distance = known.get("background.distance_m")
-    k = sensor.wave_number * unit if isinstance(sensor, SineWaveSensor) else 0.0
-    p = np.array([distance / unit, c0 / unit / unit, known.get("background.shadow.c1") / unit, k])
-    strength = known.get("background.strength")
+    background = KnownBackground(
+        strength=known.get("background.strength"),
+        distance=known.get("background.distance_m") / unit,
+        c0=c0 / unit / unit,
+        c1=known.get("background.shadow.c1") / unit,
+    )
     n = net.first.size
-    width = 3 if isinstance(sensor, PulsedSensor) else int(k * p[0] / math.pi) + 12
+    width = 3
+    if isinstance(sensor, SineWaveSensor):
+        width = int(sensor.wave_number * unit * background.distance / math.pi) + 12
     step = max(_CHUNK // width, 1)
     parts = [
-        _part(sensor, net, slice(i, i + step), strength, unit, p, width) for i in range(0, n, step)
+        _part(sensor, net.select(slice(i, i + step)), background, unit, width)
+        for i in range(0, n, step)
     ]
-    used = max(max(part[0].shape[1] for part in parts), 1)
-    roots, sds, near, physical = (
-        np.concatenate([widened(part[j], used) for part in parts]) for j in (0, 1, 2, 4)
-    )
-    near_frame = np.concatenate([part[3] for part in parts])
+    roots, sds, near, near_frame, physical = zip(*parts, strict=True)
     with np.errstate(all="ignore"):
-        candidates = Candidates(roots * unit, sds * unit, near, near_frame)
+        candidates = Candidates(
+            stacked(roots) * unit, stacked(sds) * unit, stacked(near), np.concatenate(near_frame)
+        )
     if isinstance(sensor, PulsedSensor):
         reason = np.full(n, _BEYOND)
         reason[net.first <= 0] = _CONTACT
@@ -63,34 +62,38 @@ def _solve(task: Task) -> TechniqueResult:
         reason = np.where((net.first == 0) & (net.second == 0), _SILENT, _NO_RANGE)
     support = known.support if task.physical else (0.0, np.inf)
     outcome = Outcome(
-        physical if task.physical else None, support, reason.astype(np.uint8), _REASONS
+        stacked(physical) if task.physical else None, support, reason.astype(np.uint8), _REASONS
     )
     return assemble("background_intensity", net.state, candidates, outcome)
 
 
-def _part(
-    sensor: PulsedSensor | SineWaveSensor,
-    net: Net,
-    rows: slice,
-    strength: float,
-    unit: float,
-    p: Array,
-    width: int,
-) -> tuple[Array, Array, Flags, Flags, Flags]:
-    n = net.first[rows].size
-    roots, sds = np.full((n, width), np.nan), np.full((n, width), np.nan)
-    near, physical = np.zeros((n, width), np.bool_), np.zeros((n, width), np.bool_)
-    near_frame = np.zeros(n, np.bool_)
-    readings = (net.first[rows], net.second[rows], net.var1[rows], net.var2[rows], net.cov[rows])
-    out = (roots, sds, near, near_frame, physical)
+def _part(sensor: Sensor, net: Net, background: KnownBackground, unit: float, width: int) -> Found:
+    """Solve some of the frames, and drop the columns that none of them uses."""
+    n = net.first.size
+    found = Found(
+        roots=np.full((n, width), np.nan),
+        sds=np.full((n, width), np.nan),
+        near=np.zeros((n, width), np.bool_),
+        near_frame=np.zeros(n, np.bool_),
+        physical=np.zeros((n, width), np.bool_),
+    )
     if isinstance(sensor, PulsedSensor):
-        solve_balance(*readings, net.state[rows], strength, sensor.r0 / unit, p, NOISE_BAND, *out)
+        solve_balance(net, background, sensor.r0 / unit, NOISE_BAND, found)
     else:
-        phase = cycles_phase(sensor.frequency_hz, p[0] * unit)
-        offset = sensor.phase_offset_rad
-        solve_phase(*readings, net.state[rows], strength, offset, phase, p, NOISE_BAND, *out)
-    used = max(int(np.count_nonzero(np.isfinite(roots).any(axis=0))), 1)
-    return roots[:, :used], sds[:, :used], near[:, :used], near_frame, physical[:, :used]
+        phase = Phase(
+            wave=sensor.wave_number * unit,
+            offset=sensor.phase_offset_rad,
+            far=cycles_phase(sensor.frequency_hz, background.distance * unit),
+        )
+        solve_phase(net, background, phase, NOISE_BAND, found)
+    used = max(int(np.count_nonzero(np.isfinite(found.roots).any(axis=0))), 1)
+    return Found(
+        found.roots[:, :used],
+        found.sds[:, :used],
+        found.near[:, :used],
+        found.near_frame,
+        found.physical[:, :used],
+    )
 
 
 BACKGROUND_INTENSITY = Technique(

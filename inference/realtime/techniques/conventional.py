@@ -15,9 +15,16 @@ from inference.realtime.assemble import (
     assemble,
     reasons_of,
 )
-from inference.realtime.net import ABSENT, SATURATED, UNREPRESENTABLE, net_readings
+from inference.realtime.net import ABSENT, SATURATED, UNREPRESENTABLE, known_net_readings
+from inference.realtime.solving.pulse_ratio import (
+    Codes,
+    Columns,
+    Pulse,
+    explain,
+    pulsed_ranges,
+    ranges_alone,
+)
 from inference.technique import Task, Technique
-from simulator.compiled import compiled
 from simulator.frames import Frames
 from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor
 
@@ -33,8 +40,16 @@ _REASONS = reasons_of(
     "no signal: i and q are zero",
     "the phase is below zero within its noise: at or near contact",
 )
-_ROUNDING = float(np.finfo(float).eps)
 _DARK, _CONTACT, _BEYOND, _SILENT, _WRAPPED = range(len(_REASONS) - 5, len(_REASONS))
+_CODES = Codes(
+    dark=_DARK,
+    contact=_CONTACT,
+    beyond=_BEYOND,
+    outside=OUTSIDE,
+    lost=UNREPRESENTABLE,
+    saturated=SATURATED,
+    drowned=DROWNED,
+)
 
 
 def conventional_range(sensor: Sensor, frames: Frames, crosstalk: Pair = (0.0, 0.0)) -> Array:
@@ -55,123 +70,28 @@ def conventional_range(sensor: Sensor, frames: Frames, crosstalk: Pair = (0.0, 0
         Range [m]; nan where the readings give none: a pulse needs 0 < w1 <= w2, a sine wave any
         signal. Nothing is said of noise, saturation or empty scenes: that is `estimate`.
     """
+    late, whole = crosstalk
     if isinstance(sensor, PulsedSensor):
         flat = np.ascontiguousarray(frames.readings).reshape(-1)
-        return _pulsed_range(flat, sensor.r0, *crosstalk)
-    return _phase_range(frames.readings, sensor.wave_number, sensor.phase_offset_rad, crosstalk)
-
-
-@compiled
-def _pulsed_range(flat: Array, r0: float, ct1: float, ct2: float) -> Array:
-    # one flat index: so the compiler sees how the pairs lie and divides several at once
-    out = np.empty(flat.size // 2)
-    for i in range(out.size):
-        late, whole = flat[2 * i] - ct1, flat[2 * i + 1] - ct2
-        r = r0 * (late / whole)
-        good = (r > 0.0) & (late > 0.0) & (late <= whole) & (whole < math.inf)
-        out[i] = r if good else math.nan
-    return out
-
-
-def _phase_range(readings: Array, k: float, offset: float, crosstalk: Pair) -> Array:
+        return ranges_alone(flat, sensor.r0, late, whole)
     with np.errstate(all="ignore"):
-        x, y = readings[:, 0] - crosstalk[0], readings[:, 1] - crosstalk[1]
-        phase = np.arctan2(y, x)
-        phase -= math.remainder(offset, 2 * math.pi)
-        phase[phase < 0] += 2 * math.pi
-        phase[phase >= 2 * math.pi] -= 2 * math.pi
+        x, y = frames.readings[:, 0] - late, frames.readings[:, 1] - whole
+        phase = _phase(x, y, sensor.phase_offset_rad)
         phase[((x == 0) & (y == 0)) | ~np.isfinite(x + y)] = np.nan
-        phase /= k
+        phase /= sensor.wave_number
     return phase
 
 
-@compiled
-def _pulsed(
-    flat: Array,
-    r0: float,
-    crosstalk: Pair,
-    read: Pair,
-    shot: float,
-    support: Pair,
-    full: Pair,
-    roots: Array,
-    sds: Array,
-    reason: NDArray[np.uint8],
-) -> int:
-    """Fill ranges, standard deviations and a mark of the frames that have none; count the marks.
-
-    Without branches, so that several frames are computed at once. A frame's gain and the relative
-    error of the object's signal cancel in the ratio.
-    """
-    low, high = support
-    var1, var2 = read[0] * read[0], read[1] * read[1]
-    bad = 0
-    for i in range(roots.size):
-        raw1, raw2 = flat[2 * i], flat[2 * i + 1]
-        late, whole = raw1 - crosstalk[0], raw2 - crosstalk[1]
-        inverse = 1.0 / whole
-        share = late * inverse
-        r = r0 * share
-        # gradient of the ratio: (1, -share) / whole; shared photons enter with 1 - share
-        first, second = shot * abs(raw1), shot * abs(raw2)
-        shared = first if first < second else second
-        variance = var1 + first - shared + share * share * (var2 + second - shared)
-        variance += (1.0 - share) * (1.0 - share) * shared
-        sd = r0 * inverse * math.sqrt(variance)
-        # readings are rounded, however little noise they have
-        sd = max(sd, _ROUNDING * r)
-        good = (
-            (low <= r)
-            & (r <= high)
-            & (r > 0.0)
-            & (late > 0.0)
-            & (late <= whole)
-            & (whole < math.inf)
-        )
-        good &= (sd < math.inf) & (abs(raw1) < full[0]) & (abs(raw2) < full[1])
-        roots[i] = r if good else math.nan
-        sds[i] = sd if good else math.nan
-        reason[i] = 0 if good else 1
-        bad += 0 if good else 1
-    return bad
-
-
-@compiled
-def _explain(
-    flat: Array,
-    r0: float,
-    crosstalk: Pair,
-    support: Pair,
-    full: Pair,
-    codes: tuple[int, int, int, int, int, int, int],
-    roots: Array,
-    reason: NDArray[np.uint8],
-) -> None:
-    """Say of the frames marked why they have no range, or give it where only its sd overflows."""
-    dark, contact, beyond, outside, lost, saturated, drowned = codes
-    for i in range(roots.size):
-        if reason[i] == 0:
-            continue
-        raw1, raw2 = flat[2 * i], flat[2 * i + 1]
-        late, whole = raw1 - crosstalk[0], raw2 - crosstalk[1]
-        r = r0 * (late / whole)
-        if abs(raw1) >= full[0] or abs(raw2) >= full[1]:
-            reason[i] = saturated
-        elif not (abs(late) < math.inf and abs(whole) < math.inf):
-            reason[i] = lost
-        elif whole <= 0.0:
-            reason[i] = dark
-        elif late <= 0.0:
-            reason[i] = contact
-        elif late > whole:
-            reason[i] = beyond
-        elif not r > 0.0:
-            reason[i] = lost
-        elif not support[0] <= r <= support[1]:
-            reason[i] = outside
-        else:
-            reason[i] = drowned
-            roots[i] = r
+def _phase(x: Array, y: Array, offset: float) -> Array:
+    """Return the phase less an offset, in [0, 2 pi]: 2 pi where rounding hides a sign."""
+    phase = np.arctan2(y, x)
+    phase -= offset
+    if abs(offset) > math.pi:
+        return np.asarray(np.mod(phase, 2 * np.pi))
+    # one turn is enough, and np.mod costs as much as the arctangent
+    phase[phase >= 2 * math.pi] -= 2 * math.pi
+    phase[phase < 0] += 2 * math.pi
+    return phase
 
 
 def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
@@ -180,25 +100,34 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
     n = len(frames)
     slack = 8 * np.finfo(float).eps
     low, high = task.known.support if task.physical else (0.0, math.inf)
-    support = (low * (1 - slack), high * (1 + slack))
-    full = sensor.full_scale or (math.inf, math.inf)
-    crosstalk = task.known.crosstalk
+    full_late, full_whole = sensor.full_scale or (math.inf, math.inf)
+    read_late, read_whole = sensor.noise.read
+    crosstalk_late, crosstalk_whole = task.known.crosstalk
+    pulse = Pulse(
+        r0=sensor.r0,
+        crosstalk_late=crosstalk_late,
+        crosstalk_whole=crosstalk_whole,
+        var_late=read_late * read_late,
+        var_whole=read_whole * read_whole,
+        shot=sensor.noise.shot,
+        low=low * (1 - slack),
+        high=high * (1 + slack),
+        full_late=full_late,
+        full_whole=full_whole,
+    )
     # one block for all columns: freshly mapped pages would cost more than the arithmetic
     block = np.empty(27 * n, dtype=np.uint8)
     roots, sds = block[: 8 * n].view(np.float64), block[8 * n : 16 * n].view(np.float64)
     count = block[16 * n : 24 * n].view(np.intp)
     status, reason, near = (block[(24 + i) * n : (25 + i) * n] for i in range(3))
+    columns = Columns(roots, sds, reason)
     flat = np.ascontiguousarray(frames.readings).reshape(-1)
-    noise = sensor.noise
-    bad = _pulsed(
-        flat, sensor.r0, crosstalk, noise.read, noise.shot, support, full, roots, sds, reason
-    )
+    bad = pulsed_ranges(flat, pulse, columns)
     count.fill(1)
     status.fill(Status.UNIQUE)
     near.fill(0)
     if bad:
-        codes = (_DARK, _CONTACT, _BEYOND, OUTSIDE, UNREPRESENTABLE, SATURATED, DROWNED)
-        _explain(flat, sensor.r0, crosstalk, support, full, codes, roots, reason)
+        explain(flat, pulse, _CODES, columns)
     if frames.object_present is not None:
         absent = ~frames.object_present & (reason != SATURATED)
         reason[absent], roots[absent], sds[absent] = ABSENT, np.nan, np.nan
@@ -221,13 +150,11 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
 
 
 def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
-    assert task.known.crosstalk is not None  # noqa: S101  # the plan leaves the technique out
-    net = net_readings(sensor, task.known.crosstalk, task.frames)
+    net = known_net_readings(task)
     k = sensor.wave_number
     with np.errstate(all="ignore"):
         modulus = np.hypot(net.first, net.second)
-        angle = np.arctan2(net.second, net.first) - sensor.phase_offset_rad
-        phase = np.mod(angle, 2 * np.pi)
+        phase = _phase(net.first, net.second, sensor.phase_offset_rad)
         safe = np.where(modulus > 0, modulus, 1.0)
         # gradient of the phase: (-q, i) / modulus^2
         sd = np.sqrt(net.variance(-net.second / safe / safe, net.first / safe / safe))

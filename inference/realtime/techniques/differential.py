@@ -18,7 +18,7 @@ from inference.realtime.derivatives import DERIVATIVE_REASONS, derivatives_of
 from inference.realtime.from_curve import candidates_of
 from inference.realtime.motion import law_of_model, law_of_motion
 from inference.realtime.net import Net, net_readings
-from inference.realtime.solving import curves
+from inference.realtime.solving.curves import differential_phase, differential_ratio
 from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor
 
@@ -119,7 +119,7 @@ def _solve(task: Task) -> TechniqueResult:
         if pulsed:
             candidates, _ = candidates_of(
                 task,
-                curves.DIFFERENTIAL_RATIO,
+                differential_ratio.CURVE,
                 high,
                 targets.top / unit,
                 targets.sd / unit,
@@ -127,7 +127,7 @@ def _solve(task: Task) -> TechniqueResult:
             )
         else:
             candidates, _ = candidates_of(
-                task, curves.DIFFERENTIAL_PHASE, high, targets.top, targets.sd, period=math.pi
+                task, differential_phase.CURVE, high, targets.top, targets.sd
             )
     else:
         candidates = _no_candidates(targets.top.size)

@@ -1,4 +1,4 @@
-"""Range from the amount of light of a known object: from w2 or the modulus, and from w1."""
+"""Range from the amount of light of a known object: w2, or the modulus."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,22 +6,60 @@ from numpy.typing import NDArray
 from inference.estimates import TechniqueResult
 from inference.realtime.assemble import Outcome, assemble, reasons_of
 from inference.realtime.from_curve import candidates_of
-from inference.realtime.net import UNREPRESENTABLE, Net, net_readings
-from inference.realtime.solving import curves
+from inference.realtime.net import UNREPRESENTABLE, Net, known_net_readings
+from inference.realtime.solving.curves import intensity
+from inference.realtime.solving.curves.curve import Curve
 from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor
 
-__all__ = ["INTENSITY", "INTENSITY_W1"]
+__all__ = ["INTENSITY", "range_from_light"]
 
 Array = NDArray[np.float64]
 
-_DARK = "no light from the object: the reading is not positive"
-_BEYOND = "the late window reads less than from an object at r0"
-_REASONS = reasons_of(_DARK, _BEYOND)
+_REASONS = reasons_of(
+    "no light from the object: the reading is not positive",
+    "the late window reads less than from an object at r0",
+)
+_DARK, _BEYOND = len(_REASONS) - 2, len(_REASONS) - 1
+
+
+def range_from_light(
+    name: str, task: Task, curve: Curve, high_m: float, net: Net, light: tuple[Array, Array, float]
+) -> TechniqueResult:
+    """Answer from one positive reading that the range alone decides.
+
+    Parameters
+    ----------
+    name : str
+        The technique.
+    task : Task
+        The request.
+    curve : Curve
+        What the reading is of the range.
+    high_m : float
+        Upper end of the technique's interval [m].
+    net : Net
+        Readings net of crosstalk.
+    light : (ndarray, ndarray, float)
+        The reading and its variance, both of shape (n,), and what turns it into the curve's value.
+    """
+    reading, variance, scale = light
+    with np.errstate(all="ignore"):
+        state = net.state.copy()
+        target = reading * scale
+        lost = (reading > 0) & ~((target > 0) & np.isfinite(target))
+        state[lost & (state == 0)] = UNREPRESENTABLE
+        usable = (state == 0) & (reading > 0)
+        target = np.where(usable, target, np.nan)
+        sd = np.hypot(np.sqrt(variance) * scale, net.relative * target)
+        candidates, _ = candidates_of(task, curve, high_m, target, sd)
+    reason = np.where(reading > 0, _BEYOND, _DARK).astype(np.uint8)
+    support = task.known.support if task.physical else (0.0, np.inf)
+    return assemble(name, state, candidates, Outcome(None, support, reason, _REASONS))
 
 
 def _solve(task: Task) -> TechniqueResult:
-    net = _net(task)
+    net = known_net_readings(task)
     if isinstance(task.sensor, PulsedSensor):
         reading, variance = net.second, net.var2
     else:
@@ -30,44 +68,8 @@ def _solve(task: Task) -> TechniqueResult:
             safe = np.where(reading > 0, reading, 1.0)
             variance = net.variance(net.first / safe, net.second / safe)
     scale = task.known.unit**2 / (task.sensor.gain * task.known.get("object.c2"))
-    return _finish("intensity", task, curves.INTENSITY, np.inf, reading, variance, scale)
-
-
-def _solve_w1(task: Task) -> TechniqueResult:
-    assert isinstance(task.sensor, PulsedSensor)  # noqa: S101  # the registry's `kinds`
-    net = _net(task)
-    r0 = task.sensor.r0
-    scale = task.known.unit * r0 / (task.sensor.gain * task.known.get("object.c2"))
-    return _finish("intensity_w1", task, curves.INTENSITY_W1, r0, net.first, net.var1, scale)
-
-
-def _net(task: Task) -> Net:
-    assert task.known.crosstalk is not None  # noqa: S101  # the plan leaves the technique out
-    return net_readings(task.sensor, task.known.crosstalk, task.frames)
-
-
-def _finish(
-    name: str,
-    task: Task,
-    kind: int,
-    high_m: float,
-    reading: Array,
-    variance: Array,
-    scale: float,
-) -> TechniqueResult:
-    with np.errstate(all="ignore"):
-        state = _net(task).state.copy()
-        target = reading * scale
-        lost = (reading > 0) & ~((target > 0) & np.isfinite(target))
-        state[lost & (state == 0)] = UNREPRESENTABLE
-        usable = (state == 0) & (reading > 0)
-        target = np.where(usable, target, np.nan)
-        sd = np.hypot(np.sqrt(variance) * scale, task.sensor.noise.relative * target)
-        candidates, _ = candidates_of(task, kind, high_m, target, sd)
-    dark = len(_REASONS) - 2
-    reason = np.where(reading > 0, dark + 1, dark).astype(np.uint8)
-    support = task.known.support if task.physical else (0.0, np.inf)
-    return assemble(name, state, candidates, Outcome(None, support, reason, _REASONS))
+    light = (reading, variance, scale)
+    return range_from_light("intensity", task, intensity.CURVE, np.inf, net, light)
 
 
 INTENSITY = Technique(
@@ -82,18 +84,4 @@ INTENSITY = Technique(
     equations="4.1-4.3",
     roots="1 if c1 >= -1.886 sqrt(c0), else up to 3",
     solve=_solve,
-)
-
-INTENSITY_W1 = Technique(
-    name="intensity_w1",
-    kinds=("pulsed",),
-    observables="w1",
-    needs=("object.c0", "object.c1", "object.c2"),
-    immune_to=(),
-    uses_background=False,
-    differential=False,
-    cost=150.0,
-    equations="4.4",
-    roots="1 if c1 >= -1.732 sqrt(c0), else up to 3",
-    solve=_solve_w1,
 )

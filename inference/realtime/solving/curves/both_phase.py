@@ -1,0 +1,92 @@
+"""The angle of a derivative before a background, of a sine wave (errata, section 5).
+
+arg d(Phi e^jku + Phi_bg e^jkR), modulo pi.
+"""
+
+import math
+
+from inference.realtime.solving.curves.curve import Curve, CurveParameters, Search
+from inference.realtime.solving.curves.terms import (
+    background_rate,
+    background_rates,
+    object_bend,
+)
+from simulator.compiled import compiled
+from simulator.object_model import log_slope
+
+__all__ = [
+    "CURVE",
+    "KIND",
+    "direction",
+    "guess",
+    "power_law",
+    "residual",
+    "slope",
+    "turning",
+    "value",
+]
+
+KIND = 7
+
+
+@compiled
+def direction(u: float, p: CurveParameters) -> tuple[float, float]:
+    """Return the derivative's phasor over Phi / u, as seen from the object's own phase k u."""
+    rate = background_rate(u, p)
+    far = p.wave * (p.distance - u)
+    return log_slope(u, p.c0, p.c1) + rate * math.cos(far), p.wave * u + rate * math.sin(far)
+
+
+@compiled
+def turning(u: float, p: CurveParameters) -> float:
+    """Return u (x y' - y x') of the phasor (x, y)."""
+    b = log_slope(u, p.c0, p.c1)
+    bend = object_bend(u, b, p)
+    rate, rate_bend = background_rates(u, p)
+    k = p.wave
+    cosine, sine = math.cos(k * (p.distance - u)), math.sin(k * (p.distance - u))
+    x = b + rate * cosine
+    y = k * u + rate * sine
+    dx = bend - (k * u) * (k * u) + rate_bend * cosine
+    dy = 2.0 * k * u * b + rate_bend * sine
+    return x * dy - y * dx
+
+
+@compiled
+def value(u: float, p: CurveParameters) -> float:
+    """Return the angle, within its branch."""
+    x, y = direction(u, p)
+    return p.wave * u + math.atan2(y, x)
+
+
+@compiled
+def slope(u: float, p: CurveParameters) -> float:
+    """Return d value / du."""
+    x, y = direction(u, p)
+    return turning(u, p) / u / (x * x + y * y)
+
+
+@compiled
+def guess(top: float, bottom: float, p: CurveParameters) -> float:
+    """Return that of the object alone: where a square and a fourth law err alike."""
+    return 1.6 * (top / bottom) / p.wave
+
+
+@compiled
+def residual(u: float, top: float, bottom: float, p: CurveParameters) -> float:
+    """Return the sine of value - top / bottom, times a positive factor.
+
+    The solver's intervals turn by less than a right angle, so that it has the sign of the angle.
+    """
+    x, y = direction(u, p)
+    turn = p.wave * u - top / bottom
+    return x * math.sin(turn) + y * math.cos(turn)
+
+
+@compiled
+def power_law(u: float, p: CurveParameters) -> tuple[float, float]:  # noqa: ARG001
+    """Return nan: the background makes it anything but a power law."""
+    return math.nan, math.nan
+
+
+CURVE = Curve(name="both_phase", kind=KIND, turns=Search(), period=math.pi, winds=True)
