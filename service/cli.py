@@ -1,8 +1,18 @@
 """The command line: ``hybridtof <command>``.
 
-Results go to standard output as JSON, everything else to standard error. The exit code is 0 for an
-answer, 2 for input that breaks a rule, 3 for input without an honest answer, 4 for a failure of
-the program (1 for one that nobody foresaw, with its traceback), 130 after Ctrl-C.
+Results go to standard output as JSON, everything else to standard error.
+
+==== ======================================================================
+exit meaning
+==== ======================================================================
+0    there is an answer
+1    a failure of the program that nobody foresaw, with its traceback
+2    the input, or the command line, breaks a rule
+3    valid input without an honest answer
+4    a failure of the program
+130  interrupted by Ctrl-C
+141  the reader of standard output went away
+==== ======================================================================
 """
 
 import argparse
@@ -10,23 +20,24 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 
 from service.commands import COMMANDS
+from service.commands.command import EXIT_CODES
 from service.errors import ServiceError
 from simulator.errors import HybridTofError, InvalidInputError, RefusedError
 
 __all__ = ["main"]
-
-_EPILOG = "exit codes: 0 answered, 2 bad input, 3 no honest answer, 4 failure, 130 interrupted"
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="hybridtof",
         description="Distance from hybrid intensity/time-of-flight sensors (SI units).",
-        epilog=_EPILOG,
+        epilog=f"Each command has examples: hybridtof estimate --help. {EXIT_CODES}",
         allow_abbrev=False,
     )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {version('hybridtof')}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="command")
     for add_parser in COMMANDS:
         add_parser(subparsers)

@@ -3,23 +3,28 @@
 import csv
 import io
 import json
-import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
+from service.column_names import check_names, ignored_names
 from service.errors import MalformedError
+from service.frame_table import FrameTable, Row, table_of, value_of_json, value_of_text
 from service.strict_json import check_bulk, decode
-from simulator.errors import InvalidInputError, escape
+from simulator.errors import InvalidInputError
 from simulator.frames import FrameColumns
 from simulator.validated import parse
 
-__all__ = ["SUFFIXES", "read_frames", "write_frames"]
+__all__ = [
+    "SUFFIXES",
+    "check_separator",
+    "check_suffix",
+    "form_of",
+    "read_frames",
+    "read_table",
+    "write_frames",
+]
 
-Columns = dict[str, list[Any]]
-
-_BOOLEANS = {"true": True, "false": False}
-_NAMES = tuple(FrameColumns.model_fields)
+_SEPARATORS = ";\t|"
 
 
 def read_frames(path: Path) -> FrameColumns:
@@ -45,97 +50,145 @@ def read_frames(path: Path) -> FrameColumns:
     OSError
         Where it cannot be opened.
     """
-    read = _READERS.get(path.suffix.lower())
-    if read is None:
-        raise MalformedError(f"frames are read from {', '.join(SUFFIXES)}, not '{path.suffix}'")
-    columns = read(path.read_bytes())
+    check_suffix(path.suffix)
+    return read_table(path.read_bytes(), path.suffix).all_good()
+
+
+def read_table(raw: bytes, suffix: str) -> FrameTable:
+    """Read what is good of a file, and say what is not.
+
+    Parameters
+    ----------
+    raw : bytes
+        What stands in it.
+    suffix : str
+        One of `SUFFIXES`, in any case.
+
+    Returns
+    -------
+    FrameTable
+        Of rows alone some may be bad: an object of columns is good as a whole, or refused.
+
+    Raises
+    ------
+    InvalidInputError, MalformedError
+        As `read_frames`, where no row is good or a column's name must be a mistake.
+    """
+    check_suffix(suffix)
+    return _READERS[suffix.lower()](raw)
+
+
+def form_of(raw: bytes) -> str:
+    """Return the suffix that belongs to what stands in a file without a name.
+
+    Parameters
+    ----------
+    raw : bytes
+        Its text.
+
+    Returns
+    -------
+    str
+        ``.csv`` unless it begins with a brace; ``.ndjson`` where the first line is an object whose
+        members are no lists.
+    """
+    if not raw.lstrip().startswith(b"{"):
+        return ".csv"
+    try:
+        first = json.loads(raw.lstrip().split(b"\n", 1)[0])
+    except ValueError:
+        return ".json"
+    return ".json" if any(isinstance(value, list) for value in first.values()) else ".ndjson"
+
+
+def check_suffix(suffix: str, done: str = "read from") -> None:
+    """Refuse the suffix of a file that holds no frames.
+
+    Raises
+    ------
+    MalformedError
+        Naming those that do.
+    """
+    if suffix.lower() not in _READERS:
+        raise MalformedError(f"frames are {done} {', '.join(SUFFIXES)}, not '{suffix}'")
+
+
+def _from_json(raw: bytes) -> FrameTable:
+    columns = decode(raw)
+    ignored: list[str] = []
+    if isinstance(columns, dict):
+        check_names(list(columns))
+        ignored = ignored_names(list(columns))
+        columns = {name: column for name, column in columns.items() if name not in ignored}
     check_bulk(columns)
-    return parse(FrameColumns, columns)
+    return FrameTable(parse(FrameColumns, columns), (), tuple(ignored))
 
 
-def _from_json(raw: bytes) -> Any:
-    return decode(raw)
-
-
-def _from_ndjson(raw: bytes) -> Columns:
-    columns: Columns = {}
-    for number, line in enumerate(raw.splitlines(), start=1):
-        if not line.strip():
-            continue
+def _from_ndjson(raw: bytes) -> FrameTable:
+    lines = [(n, line) for n, line in enumerate(raw.splitlines(), start=1) if line.strip()]
+    if not lines:
+        raise MalformedError("the file holds no frame")
+    names: list[str] = []
+    rows = []
+    for number, line in lines:
         try:
             frame = decode(line)
         except (MalformedError, InvalidInputError) as error:
-            raise MalformedError(f"line {number}: {error}") from None
+            rows.append(Row(number, reason=f"cannot be read: {error}"))
+            continue
         if not isinstance(frame, dict):
-            raise MalformedError(f"line {number} is not a JSON object")
-        if not columns:
-            columns = {name: [] for name in frame}
-        if frame.keys() != columns.keys():
-            name = min(frame.keys() ^ columns.keys())
-            message = f"line {number}: every line must have the members of the first one"
-            raise InvalidInputError.at(f"/{escape(name)}", message)
-        for name, value in frame.items():
-            if isinstance(value, list | dict):
-                message = f"line {number}: must be one value"
-                raise InvalidInputError.at(f"/{escape(name)}", message)
-            columns[name].append(value)
-    if not columns:
-        raise MalformedError("the file holds no frame")
-    return columns
+            rows.append(Row(number, reason="is not a JSON object"))
+            continue
+        names = names or list(frame)
+        if odd := sorted(frame.keys() ^ set(names)):
+            where = "is missing" if odd[0] in names else "is not in the first line"
+            rows.append(Row(number, reason=where, column=odd[0]))
+        else:
+            rows.append(Row(number, [frame[name] for name in names]))
+    return table_of(names, rows, value_of_json)
 
 
-def _from_csv(raw: bytes) -> Columns:
+def _from_csv(raw: bytes) -> FrameTable:
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise MalformedError(f"the file is not UTF-8 at byte {error.start}") from None
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
-        rows = [(reader.line_num, row) for row in reader if row]
+        read = [(reader.line_num, row) for row in reader if row]
     except csv.Error as error:
         raise MalformedError(f"line {reader.line_num}: {error}") from None
-    if not rows:
+    if not read:
         raise MalformedError("the file is empty; its first line must name the columns")
-    header = [name.strip() for name in rows[0][1]]
-    for name in header:
-        if name not in _NAMES:
-            wanted = ", ".join(_NAMES)
-            raise InvalidInputError.at(f"/{escape(name)}", f"is not a column; they are {wanted}")
-        if header.count(name) > 1:
-            raise InvalidInputError.at(f"/{name}", "the column is repeated")
-    for line, row in rows[1:]:
-        if len(row) != len(header):
-            message = f"line {line} has {len(row)} fields where the header has {len(header)}"
-            raise MalformedError(message)
-    lines = [line for line, _ in rows[1:]]
-    cells = zip(*(row for _, row in rows[1:]), strict=True) if lines else [()] * len(header)
-    return {name: _column(name, texts, lines) for name, texts in zip(header, cells, strict=True)}
+    header = [name.strip() for name in read[0][1]]
+    check_separator(header)
+    rows = [
+        Row(line, cells)
+        if len(cells) == len(header)
+        else Row(line, reason=f"has {len(cells)} fields where the header has {len(header)}")
+        for line, cells in read[1:]
+    ]
+    return table_of(header, rows, value_of_text)
 
 
-def _column(name: str, texts: Sequence[str], lines: Sequence[int]) -> list[Any]:
-    convert = _boolean if name == "object_present" else _number
-    values: list[Any] = []
-    for index, text in enumerate(texts):
-        value = convert(text)
-        if value is None:
-            wanted = "true or false" if name == "object_present" else "a finite number"
-            message = f"line {lines[index]}: must be {wanted}, is {text.strip()[:40]!r}"
-            raise InvalidInputError.at(f"/{name}/{index}", message)
-        values.append(value)
-    return values
+def check_separator(header: Sequence[str]) -> None:
+    """Refuse a header whose names are separated by something else than commas.
 
+    Parameters
+    ----------
+    header : sequence of str
+        The names, as commas separate them.
 
-def _boolean(text: str) -> bool | None:
-    return _BOOLEANS.get(text.strip().lower())
-
-
-def _number(text: str) -> float | None:
-    """Return a finite number; None for what Python alone takes for one (1_000, other digits)."""
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) and text.isascii() and "_" not in text else None
+    Raises
+    ------
+    MalformedError
+        With a hint.
+    """
+    for separator in _SEPARATORS:
+        if any(separator in name for name in header):
+            raise MalformedError(
+                f"columns must be separated by commas: is the file separated by {separator!r}?"
+            )
 
 
 def write_frames(path: Path, columns: Mapping[str, Sequence[float | bool]]) -> None:
@@ -156,8 +209,7 @@ def write_frames(path: Path, columns: Mapping[str, Sequence[float | bool]]) -> N
         Where the file cannot be written.
     """
     suffix = path.suffix.lower()
-    if suffix not in _READERS:
-        raise MalformedError(f"frames are written to {', '.join(SUFFIXES)}, not '{path.suffix}'")
+    check_suffix(suffix, "written to")
     if suffix == ".json":
         text = json.dumps(columns, allow_nan=False) + "\n"
     else:
@@ -171,7 +223,7 @@ def write_frames(path: Path, columns: Mapping[str, Sequence[float | bool]]) -> N
     path.write_text(text, encoding="utf-8")
 
 
-_READERS: Mapping[str, Callable[[bytes], Any]] = {
+_READERS: Mapping[str, Callable[[bytes], FrameTable]] = {
     ".csv": _from_csv,
     ".ndjson": _from_ndjson,
     ".json": _from_json,

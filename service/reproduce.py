@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from service.commands.command import Subparsers, add_command, note
 from simulator.optics.appendix_b import Row, rows_as_csv, simulate
 
 if TYPE_CHECKING:
@@ -65,11 +66,11 @@ def reproduce_figures(args: argparse.Namespace) -> int:
         return 2
     for name in args.only or FIGURES:
         path = draw(name, args.out, args.format)
-        sys.stderr.write(f"{path}\n")
+        note(args, str(path))
     return 0
 
 
-def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     """Add the command ``reproduce`` to a parser.
 
     Parameters
@@ -77,9 +78,20 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     subparsers : argparse subparsers
         Of the main parser. Parsed arguments carry ``run(args) -> int``.
     """
+    # the parser is complete with the subcommands below, each of which sets its own function
     parser = subparsers.add_parser("reproduce", help="make the thesis's tables and figures anew")
     what = parser.add_subparsers(dest="what", required=True)
-    table = what.add_parser("appendix-b", help="object parameters of 108 scenes")
+    table = add_command(
+        what,
+        "appendix-b",
+        reproduce_appendix_b,
+        brief="object parameters of 108 scenes",
+        description="Print the object parameters of Appendix B's scenes, made anew.",
+        examples="""
+            hybridtof reproduce appendix-b
+            hybridtof reproduce appendix-b --system sine_wave --converged --format csv
+        """,
+    )
     table.add_argument("--system", choices=("pulsed", "sine_wave"), default="pulsed")
     table.add_argument("--format", choices=("table", "csv"), default="table")
     table.add_argument(
@@ -87,11 +99,19 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         action="store_true",
         help="true rectangles by convergent quadrature instead of the thesis's facets",
     )
-    table.set_defaults(run=reproduce_appendix_b)
-    figures = what.add_parser("figures", help="figures of chapters 2 to 5 and appendix A")
+    figures = add_command(
+        what,
+        "figures",
+        reproduce_figures,
+        brief="figures of chapters 2 to 5 and appendix A",
+        description="Draw figures of chapters 2 to 5 and appendix A; needs matplotlib.",
+        examples="""
+            hybridtof reproduce figures --out figures
+            hybridtof reproduce figures --out figures --format pdf --only 2-6 3-1
+        """,
+    )
     figures.add_argument("--out", type=Path, required=True, metavar="DIR")
     figures.add_argument("--format", choices=("png", "svg", "pdf"), default="png")
     figures.add_argument(
         "--only", nargs="+", metavar="NAME", help="some figures only, such as 2-6 3-1"
     )
-    figures.set_defaults(run=reproduce_figures)

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 import pydantic
 
 from inference.posterior.settings import SamplerSettings
+from inference.tracking.settings import TrackingSettings
 from simulator.frames import FrameColumns
 from simulator.scene import Scene
 from simulator.sensor import Sensor
@@ -27,6 +28,7 @@ __all__ = [
     "TechniqueDescription",
     "TechniqueEstimates",
     "TechniquesResponse",
+    "TrackedSystem",
 ]
 
 AnySensor = Annotated[Sensor, pydantic.Field(discriminator="kind")]
@@ -42,6 +44,12 @@ class SystemDescription(Validated):
 
     sensor: AnySensor
     scene: Scene
+
+
+class TrackedSystem(SystemDescription):
+    """A sensor, the scene before it, and how its objects move."""
+
+    tracking: TrackingSettings = TrackingSettings()
 
 
 class EstimateRequest(SystemDescription):

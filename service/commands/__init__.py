@@ -7,20 +7,23 @@ import argparse
 from collections.abc import Callable
 
 from service import reproduce
-from service.commands import estimate, identifiability, infer, serve, simulate
+from service.commands import estimate, identifiability, infer, schema, serve, simulate, track
+from service.commands.command import Subparsers
 from service.demo import command as demo
 from service.report import command as report
 
 __all__ = ["COMMANDS", "AddParser"]
 
-AddParser = Callable[["argparse._SubParsersAction[argparse.ArgumentParser]"], None]
+AddParser = Callable[["Subparsers[argparse.ArgumentParser]"], None]
 
 COMMANDS: tuple[AddParser, ...] = (
     serve.add_parser,
     simulate.add_parser,
     estimate.add_parser,
     infer.add_parser,
+    track.add_parser,
     identifiability.add_parser,
+    schema.add_parser,
     reproduce.add_parser,
     demo.add_parser,
     report.add_parser,

@@ -3,17 +3,27 @@
 import argparse
 from pathlib import Path
 
+from service.commands.command import FRAMES_HELP, Subparsers, add_command, note
+
 __all__ = ["add_parser"]
 
 
-def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     """Add the command to the command line."""
-    parser = subparsers.add_parser(
+    parser = add_command(
+        subparsers,
         "estimate",
-        help="estimate the range of every frame, at once",
-        description="Estimate the range of every frame and print the results as JSON.",
+        _run,
+        brief="estimate the range of every frame, at once",
+        description="Estimate the range of every frame and print the results as JSON. A row of a "
+        'file that cannot be read is a frame of status "none", with the reason.',
+        examples="""
+            hybridtof estimate frames.csv --scene scene.json
+            hybridtof estimate frames.csv --scene scene.json --output ranges.csv
+            hybridtof estimate - --scene scene.json --technique conventional < frames.ndjson
+        """,
     )
-    parser.add_argument("frames", type=Path, help="frames as .csv, .ndjson or .json")
+    parser.add_argument("frames", type=Path, help=FRAMES_HELP)
     parser.add_argument(
         "--scene", type=Path, required=True, help="JSON file with members sensor and scene"
     )
@@ -23,23 +33,46 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         metavar="NAME",
         help="technique to use, may be repeated; left out: the cheapest that fits the scene",
     )
-    parser.set_defaults(run=_run)
+    parser.add_argument(
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="write the results here instead, as .csv, .ndjson (a row or line a frame) or .json",
+    )
 
 
 def _run(args: argparse.Namespace) -> int:
-    from inference.estimate import estimate
-    from service.checks import system_with_frames
-    from service.commands.files import naming, read_columns, read_document
-    from service.commands.output import write_result
-    from service.estimate_json import encode_estimates
-    from service.schemas import SystemDescription
+    import json
 
-    system = read_document(SystemDescription, args.scene)
-    columns = read_columns(args.frames)
+    from inference.estimate import estimate
+    from service.bad_rows import insert_answers
+    from service.commands.files import check_folder, naming
+    from service.commands.frames import checked
+    from service.commands.output import write_result
+    from service.estimate_files import check_estimate_suffix, estimates_as
+    from service.estimate_json import encode_estimates
+
+    if args.output is not None:
+        check_estimate_suffix(args.output)
+        check_folder("--output", args.output)
+    sensor, scene, frames, table = checked(args)
     sources = {"/frames": str(args.frames), "/techniques": "--technique", "": str(args.scene)}
     with naming(sources):
-        sensor, scene, frames = system_with_frames(system.sensor, system.scene, columns)
         estimates = estimate(sensor, scene, frames, args.technique)
-    write_result(encode_estimates(estimates))
+    encoded = encode_estimates(estimates)
+    if table.bad or args.output is not None:
+        document = json.loads(encoded)
+        insert_answers(document, table.bad)
+        if args.output is None:
+            encoded = json.dumps(document, allow_nan=False).encode("ascii")
+        else:
+            args.output.write_text(estimates_as(args.output.suffix, document), encoding="utf-8")
+    if args.output is None:
+        write_result(encoded)
+    if estimates.results:
+        return 0
+    if args.output is not None:
+        for item in estimates.left_out:
+            note(args, f"note: {item.name} is left out: {item.reason}")
     # why none serves stands in what is left out
-    return 0 if estimates.results else 3
+    return 3

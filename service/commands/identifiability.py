@@ -3,16 +3,24 @@
 import argparse
 from pathlib import Path
 
+from service.commands.command import Subparsers, add_command, note
+
 __all__ = ["add_parser"]
 
 
-def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     """Add the command to the command line."""
-    parser = subparsers.add_parser(
+    parser = add_command(
+        subparsers,
         "identifiability",
-        help="what frames at given ranges would tell of a scene",
+        _run,
+        brief="what frames at given ranges would tell of a scene",
         description="Rank, Cramer-Rao bounds and, for every unknown, whether it would be "
         "identified and why not, before any frame is taken, as JSON.",
+        examples="""
+            hybridtof identifiability --scene scene.json --ranges 0.3 0.6 1.2
+            hybridtof identifiability --scene scene.json --ranges 0.3 0.6 --at object.c0=0.08
+        """,
     )
     parser.add_argument(
         "--scene", type=Path, required=True, help="JSON file with members sensor and scene"
@@ -36,7 +44,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="value of an unknown at which the bounds are computed, may be repeated; left out: "
         "the medians of the priors",
     )
-    parser.set_defaults(run=_run)
 
 
 def _values(options: list[str]) -> dict[str, float]:
@@ -59,6 +66,7 @@ def _run(args: argparse.Namespace) -> int:
     from service.commands.files import naming, read_document
     from service.commands.output import write_result
     from service.identifiability_json import identifiability_of
+    from service.plausibility import doubts
     from service.schemas import IdentifiabilityRequest, SystemDescription
     from simulator.errors import InvalidInputError
     from simulator.validated import parse
@@ -66,6 +74,8 @@ def _run(args: argparse.Namespace) -> int:
     if args.empty < 0:
         raise InvalidInputError.at("--empty", "must not be negative")
     system = read_document(SystemDescription, args.scene)
+    for doubt in doubts(system.sensor):
+        note(args, f"note: {doubt}")
     # a frame without the object has a range that plays no part
     data = {
         "sensor": system.sensor,

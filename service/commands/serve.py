@@ -3,22 +3,30 @@
 import argparse
 import os
 
+from service.commands.command import Subparsers, add_command
+
 __all__ = ["add_parser"]
 
 
-def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     """Add the command to the command line."""
-    parser = subparsers.add_parser(
+    parser = add_command(
+        subparsers,
         "serve",
-        help="serve over HTTP until SIGTERM",
+        _run,
+        brief="serve over HTTP until SIGTERM",
         description="Serve over HTTP. Environment variables HYBRIDTOF_WORKERS, HYBRIDTOF_THREADS, "
         "HYBRIDTOF_MAX_BODY_BYTES, HYBRIDTOF_MAX_JOBS and HYBRIDTOF_SHUTDOWN_S are optional.",
+        examples="""
+            hybridtof serve
+            hybridtof serve --port 8080
+            HYBRIDTOF_WORKERS=2 hybridtof serve --host 0.0.0.0
+        """,
     )
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (%(default)s)")
     parser.add_argument(
         "--port", type=_port, default=8000, help="port, 0 for any free one (%(default)s)"
     )
-    parser.set_defaults(run=_run)
 
 
 def _port(text: str) -> int:
@@ -42,6 +50,7 @@ def _run(args: argparse.Namespace) -> int:
         access_log=False,
         # an open connection must not hold up the end
         timeout_graceful_shutdown=round(settings.shutdown_s),
+        log_level="warning" if args.quiet else "info",
     )
     server = uvicorn.Server(config)
     try:

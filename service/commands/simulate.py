@@ -4,16 +4,24 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from service.commands.command import Subparsers, add_command, note
+
 __all__ = ["add_parser"]
 
 
-def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     """Add the command to the command line."""
-    parser = subparsers.add_parser(
+    parser = add_command(
+        subparsers,
         "simulate",
-        help="simulate frames of a scene",
+        _run,
+        brief="simulate frames of a scene",
         description="Simulate frames of an object that moves along a line, and print them with "
         "the truth as JSON. Unknowns of the scene are drawn from their priors, once.",
+        examples="""
+            hybridtof simulate --scene scene.json --from-m 0.2 --to-m 2 --frames 20 --seed 1
+            hybridtof simulate --scene scene.json --trajectory path.json --output frames.csv
+        """,
     )
     parser.add_argument(
         "--scene", type=Path, required=True, help="JSON file with members sensor and scene"
@@ -28,7 +36,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--output", type=Path, help="write the frames here too, as .csv, .ndjson or .json"
     )
-    parser.set_defaults(run=_run)
 
 
 def _radial(args: argparse.Namespace) -> dict[str, Any]:
@@ -41,14 +48,18 @@ def _radial(args: argparse.Namespace) -> dict[str, Any]:
 def _run(args: argparse.Namespace) -> int:
     import pydantic_core
 
-    from service.commands.files import naming, read_data, read_document
+    from service.commands.files import check_folder, naming, read_data, read_document
     from service.commands.output import write_result
-    from service.frame_files import write_frames
+    from service.frame_files import check_suffix, write_frames
+    from service.plausibility import doubts
     from service.schemas import SimulationRequest, SystemDescription
     from service.simulation import simulation_of
     from simulator.errors import InvalidInputError
     from simulator.validated import parse
 
+    if args.output is not None:
+        check_suffix(args.output.suffix, "written to")
+        check_folder("--output", args.output)
     system = read_document(SystemDescription, args.scene)
     radial = _radial(args)
     data: dict[str, Any] = {} if args.seed is None else {"seed": args.seed}
@@ -60,6 +71,8 @@ def _run(args: argparse.Namespace) -> int:
     else:
         data["trajectory"] = read_data(args.trajectory)
         source = str(args.trajectory)
+    for doubt in doubts(system.sensor):
+        note(args, f"note: {doubt}")
     with naming({"/trajectory": source, "/seed": "--seed", "": str(args.scene)}):
         request = parse(SimulationRequest, {"sensor": system.sensor, "scene": system.scene} | data)
         result = simulation_of(request)

@@ -5,18 +5,26 @@ import sys
 import time
 from pathlib import Path
 
+from service.commands.command import Subparsers, add_command, can_draw, note
+
 __all__ = ["add_parser"]
 
 RECORDINGS = Path("../shared/data/tmf8820_plane.json")
 
 
-def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     """Add the command to the command line."""
-    parser = subparsers.add_parser(
+    parser = add_command(
+        subparsers,
         "demo",
-        help="start the service, send it readings, show distances with their uncertainty",
+        _run,
+        brief="start the service, send it readings, show distances with their uncertainty",
         description="Start the service on an unused port, send it recorded photons where they are "
         "at hand and simulated scenes, print the answers and draw them.",
+        examples="""
+            hybridtof demo
+            hybridtof demo --out pictures --recordings plane.json
+        """,
     )
     parser.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="for demo.png (%(default)s)"
@@ -28,7 +36,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         metavar="FILE",
         help="histograms of a plane; a simulated scene where it is absent (%(default)s)",
     )
-    parser.set_defaults(run=_run)
 
 
 def _run(args: argparse.Namespace) -> int:
@@ -41,8 +48,9 @@ def _run(args: argparse.Namespace) -> int:
     begin = time.perf_counter()
 
     def say(text: str) -> None:
-        sys.stderr.write(f"hybridtof: {time.perf_counter() - begin:5.1f} s  {text}\n")
+        note(args, f"{time.perf_counter() - begin:5.1f} s  {text}")
 
+    drawing = can_draw(args)
     args.out.mkdir(parents=True, exist_ok=True)
     episodes = []
     with running_service() as address, httpx.Client(base_url=address, timeout=300) as http:
@@ -51,13 +59,10 @@ def _run(args: argparse.Namespace) -> int:
             episodes.append(episode(Client(http), args.recordings))
             say(f"answered: {episodes[-1].title}")
     sys.stdout.write(table(episodes) + "\n")
-    try:
-        from service.demo.picture import draw
-    except ModuleNotFoundError as error:
-        if error.name != "matplotlib":
-            raise
-        say("no picture: it needs matplotlib, install hybridtof[plots]")
+    if not drawing:
         return 0
+    from service.demo.picture import draw
+
     path = args.out / "demo.png"
     draw(episodes, path)
     sys.stdout.write(f"picture: {path}\n")

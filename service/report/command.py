@@ -11,16 +11,24 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from service.report.measure import Row
 
+from service.commands.command import Subparsers, add_command, can_draw, note
+
 __all__ = ["add_parser"]
 
 
-def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     """Add the command to the command line."""
-    parser = subparsers.add_parser(
+    parser = add_command(
+        subparsers,
         "report",
-        help="measure error against run time of every technique and of the posterior",
+        _run,
+        brief="measure error against run time of every technique and of the posterior",
         description="Measure error against run time on four simulated scenes: a table on standard "
         "output, report.json and report.png in a directory.",
+        examples="""
+            hybridtof report --quick
+            hybridtof report --out measured
+        """,
     )
     parser.add_argument(
         "--quick", action="store_true", help="small batches: seconds instead of minutes"
@@ -28,7 +36,6 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="(%(default)s)"
     )
-    parser.set_defaults(run=_run)
 
 
 def _percent(value: float | None) -> str:
@@ -64,21 +71,19 @@ def _run(args: argparse.Namespace) -> int:
     from service.report.measure import FULL, QUICK, measure
     from service.report.scenes import SCENES
 
+    drawing = can_draw(args)
     args.out.mkdir(parents=True, exist_ok=True)
     rows = []
     for scene in SCENES:
-        sys.stderr.write(f"hybridtof: {scene.name}\n")
+        note(args, scene.name)
         rows += list(measure(scene, QUICK if args.quick else FULL))
     sys.stdout.write(table(rows))
     path = args.out / "report.json"
     path.write_text(json.dumps([dataclasses.asdict(row) for row in rows], indent=1) + "\n")
-    try:
-        from service.report.picture import draw
-    except ModuleNotFoundError as error:
-        if error.name != "matplotlib":
-            raise
-        sys.stderr.write("hybridtof: no picture: it needs matplotlib, hybridtof[plots]\n")
+    if not drawing:
         return 0
+    from service.report.picture import draw
+
     draw(rows, args.out / "report.png")
     sys.stdout.write(f"{path}, {args.out / 'report.png'}\n")
     return 0

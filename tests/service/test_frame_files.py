@@ -75,7 +75,7 @@ def test_csv_odd_cell(tmp_path: Path, odd: str) -> None:
 def test_csv_names_the_column(tmp_path: Path, text: str, pointer: str) -> None:
     with pytest.raises(InvalidInputError) as caught:
         read(tmp_path, ".csv", text)
-    assert [p.pointer for p in caught.value.problems] == [pointer]
+    assert caught.value.problems[0].pointer == pointer
 
 
 @pytest.mark.parametrize(
@@ -87,9 +87,9 @@ def test_csv_names_the_column(tmp_path: Path, text: str, pointer: str) -> None:
         (".csv", 'w1,w2\n1,"2\n', "line 2"),
         (".csv", b"w1,w2\n1,\xff\n", "UTF-8"),
         (".ndjson", "", "no frame"),
-        (".ndjson", '{"w1": 1}\nnope\n', "line 2: not JSON"),
+        (".ndjson", '{"w1": 1}\nnope\n', "line 2 cannot be read: not JSON"),
         (".ndjson", '{"w1": 1}\n[1]\n', "line 2 is not a JSON object"),
-        (".ndjson", '{"w1": 1, "w1": 2}\n', "line 1: /w1: the member is repeated"),
+        (".ndjson", '{"w1": 1, "w1": 2}\n', "line 1 cannot be read: /w1: the member is repeated"),
         (".json", "{", "not JSON"),
         (".txt", "1 2", ".csv"),
         ("", "1 2", ".csv"),
@@ -103,9 +103,9 @@ def test_unreadable(tmp_path: Path, suffix: str, content: str | bytes, match: st
 @pytest.mark.parametrize(
     ("text", "pointer"),
     [
-        ('{"w1": 1, "w2": 2}\n{"w1": 1}', "/w2"),
-        ('{"w1": 1}\n{"w1": 1, "w2": 2}', "/w2"),
-        ('{"w1": [1]}', "/w1"),
+        ('{"w1": 1, "w2": 2}\n{"w1": 1}', "/w2/1"),
+        ('{"w1": 1}\n{"w1": 1, "w2": 2}', "/w2/1"),
+        ('{"w1": [1]}', "/w1/0"),
         ('{"w1": NaN}', "/w1/0"),
         ('{"w1": 1e400}', "/w1/0"),
         ('{"w1": "1"}', "/w1/0"),

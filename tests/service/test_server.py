@@ -198,3 +198,24 @@ def test_reader_that_goes_away(tmp_path: Path, unbuffered: str) -> None:
     assert process.wait() == 128 + signal.SIGPIPE
     assert process.stderr.read() == ""
     process.stderr.close()
+
+
+def test_track_answers_a_line_before_the_next_is_there(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.json"
+    scene.write_text(json.dumps({"sensor": SENSOR, "scene": SCENE}))
+    with subprocess.Popen(
+        hybridtof("track", "-", "--scene", str(scene)),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=environment(),
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        for sequence in (1, 2):
+            frame = {"time_s": 0.1 * sequence, "w1": 0.02, "w2": 1.7}
+            process.stdin.write(json.dumps(frame) + "\n")
+            process.stdin.flush()
+            assert json.loads(process.stdout.readline())["sequence"] == sequence
+        process.stdin.close()
+        assert process.wait() == 0

@@ -1,0 +1,74 @@
+"""Names of columns in files of frames: those that are meant, and those that cannot be."""
+
+import difflib
+import re
+from collections.abc import Sequence
+
+from simulator.errors import InvalidInputError, Problem, escape
+from simulator.frames import FrameColumns
+
+__all__ = ["NAMES", "check_names", "ignored_names"]
+
+NAMES = tuple(FrameColumns.model_fields)
+
+# names that loggers give to columns which this project has under another name
+_OTHER_WORDS = {"t": "time_s", "time": "time_s", "timestamp": "time_s", "present": "object_present"}
+_ALIKE = 0.75  # difflib's ratio: one letter in four
+
+
+def _plain(name: str) -> str:
+    """Return the name without case, unit in brackets, and punctuation."""
+    return re.sub(r"\(.*\)|\[.*\]|[^a-z0-9]", "", name.lower())
+
+
+def _meant(name: str) -> list[str]:
+    """Return the columns that a name may stand for; none where it cannot be meant."""
+    plain = _plain(name)
+    same = [known for known in NAMES if _plain(known) == plain]
+    if same:
+        return same
+    if plain in _OTHER_WORDS:
+        return [_OTHER_WORDS[plain]]
+    if re.fullmatch(r"(time|t)(s|ms|us|ns|sec|seconds|millis)", plain):
+        return ["time_s"]
+    if re.fullmatch(r"d?w\d?(dt)?", plain):
+        return [known for known in NAMES if "w" in known and known[0] == plain[0]]
+    return difflib.get_close_matches(plain, NAMES, n=2, cutoff=_ALIKE) if len(plain) > 3 else []
+
+
+def check_names(names: Sequence[str]) -> None:
+    """Refuse names that must be mistakes.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the columns of a file.
+
+    Raises
+    ------
+    InvalidInputError
+        A pointer for each name that is repeated, that is close to a column's, or that is a number,
+        with a hint.
+    """
+    problems = [
+        Problem(f"/{escape(name)}", "the column is repeated")
+        for name in dict.fromkeys(names)
+        if names.count(name) > 1
+    ]
+    for name in ignored_names(names):
+        hint = ""
+        if meant := _meant(name):
+            hint = f"did you mean {' or '.join(meant)}?"
+        elif re.fullmatch(r"[-+.\d]+(e[-+]?\d+)?|", name, re.IGNORECASE):
+            hint = "the first line must name the columns"
+        if hint:
+            wanted = ", ".join(NAMES)
+            message = f"is not a column: {hint} The columns are {wanted}"
+            problems.append(Problem(f"/{escape(name)}", message))
+    if problems:
+        raise InvalidInputError(*problems)
+
+
+def ignored_names(names: Sequence[str]) -> list[str]:
+    """Return the names, in their order, that are not those of columns."""
+    return [name for name in dict.fromkeys(names) if name not in NAMES]

@@ -1,0 +1,60 @@
+"""``hybridtof track``: one answer a frame, as soon as the frame is read."""
+
+import argparse
+from pathlib import Path
+
+from service.commands.command import FRAMES_HELP, Subparsers, add_command, note
+
+__all__ = ["add_parser"]
+
+
+def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
+    """Add the command to the command line."""
+    parser = add_command(
+        subparsers,
+        "track",
+        _run,
+        brief="track one object through a stream of frames",
+        description="Track one object and print one JSON object a frame, at once: the range, its "
+        "hypotheses, and whether an object is there. Frames need time_s. A line that cannot be "
+        "read is answered by an error and changes nothing.",
+        examples="""
+            hybridtof track frames.csv --scene scene.json > tracked.ndjson
+            sensor-reader | hybridtof track - --scene scene.json
+        """,
+    )
+    parser.add_argument("frames", type=Path, help=FRAMES_HELP)
+    parser.add_argument(
+        "--scene", type=Path, required=True, help="JSON file with members sensor and scene, and "
+        "optionally tracking: settings of the tracker"
+    )  # fmt: skip
+
+
+def _run(args: argparse.Namespace) -> int:
+    from inference.tracking.tracker import tracker
+    from service.checks import system
+    from service.commands.files import naming, open_lines, read_document, reading
+    from service.commands.output import write_result
+    from service.plausibility import doubts
+    from service.schemas import TrackedSystem
+    from service.tracked_lines import TrackedLines, lines_like
+
+    stated = read_document(TrackedSystem, args.scene)
+    with naming({"/settings": f"{args.scene}#/tracking", "": str(args.scene)}):
+        sensor, scene = system(stated.sensor, stated.scene)
+        model = tracker(sensor, scene, stated.tracking)
+    for doubt in doubts(sensor):
+        note(args, f"note: {doubt}")
+    with reading(args.frames), open_lines(args.frames) as lines:
+        tracked: TrackedLines | None = None
+        for line in lines:
+            if not line.strip():
+                continue
+            if tracked is None:
+                form, is_frame = lines_like(line)
+                tracked = TrackedLines(model, form)
+                if not is_frame:
+                    continue
+            write_result(tracked.answer(line).encode("ascii"))
+    # of a stream in which no line is a frame nothing was answered
+    return 0 if tracked is not None and tracked.answered else 2

@@ -1,0 +1,95 @@
+"""What is valid, and yet looks like a mistake: a wrong unit, a noise that cannot be so small."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.frames import Frames
+from simulator.sensor import PulsedSensor, Sensor
+
+__all__ = ["doubts"]
+
+Array = NDArray[np.float64]
+
+# unambiguous ranges that a sensor of this kind may have [m]: light is seen neither over less than
+# its own electronics resolve nor over more than a horizon
+_SHORTEST, _LONGEST = 1e-2, 1e5
+# a few numbers that were typed are round by themselves
+_FEWEST = 6
+# decimal digits to which a double is exact
+_DIGITS = 15
+# a rounding has the standard deviation of its step over sqrt(12); noise below a tenth of that is
+# nothing beside it
+_SMALL = 0.1 / math.sqrt(12.0)
+_SLOW_S = 10.0  # whole numbers in such steps are milliseconds, or nobody is in a hurry
+_EPOCH_S = 1e11  # the year 5138
+
+
+def doubts(sensor: Sensor, frames: Frames | None = None) -> list[str]:
+    """Name what looks like a mistake.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        As stated.
+    frames : Frames, optional
+        Its frames.
+
+    Returns
+    -------
+    list of str
+        Sentences for a person; nothing follows from them.
+    """
+    found = list(_of_sensor(sensor))
+    if frames is not None:
+        found += _of_noise(sensor, frames)
+        if frames.time_s is not None:
+            found += _of_times(frames.time_s)
+    return found
+
+
+def _of_sensor(sensor: Sensor) -> Iterator[str]:
+    farthest = sensor.max_range_m
+    if not _SHORTEST <= farthest <= _LONGEST:
+        if isinstance(sensor, PulsedSensor):
+            stated, unit = f"pulse_width_s {sensor.pulse_width_s:g}", "seconds"
+        else:
+            stated, unit = f"frequency_hz {sensor.frequency_hz:g}", "hertz"
+        yield f"{stated} gives an unambiguous range of {farthest:.3g} m: is it in {unit}?"
+
+
+def _of_noise(sensor: Sensor, frames: Frames) -> Iterator[str]:
+    for k, column in enumerate(sensor.columns):
+        values = np.abs(frames.readings[:, k])
+        step = _rounding(values)
+        sd = math.sqrt(sensor.noise.read[k] ** 2 + sensor.noise.shot * float(np.median(values)))
+        if step is not None and sd < _SMALL * step:
+            yield (
+                f"{column} is rounded to {step:g}, and its stated noise is {sensor.noise.read[k]:g}"
+                f": state {step / math.sqrt(12.0):.2g} or more in noise.read, or standard "
+                "deviations are too small"
+            )
+
+
+def _rounding(values: Array) -> float | None:
+    """Return the power of ten to which values are rounded; None for those that are not."""
+    if np.unique(values).size < _FEWEST:
+        return None
+    largest = math.floor(math.log10(values.max()))
+    for digits in range(1, _DIGITS - 2):
+        step = 10.0 ** (largest + 1 - digits)
+        multiples = values / step
+        if np.all(np.abs(multiples - np.round(multiples)) <= 10.0 ** (digits - _DIGITS)):
+            return step
+    return None
+
+
+def _of_times(time_s: Array) -> Iterator[str]:
+    if np.abs(time_s).max() > _EPOCH_S:
+        yield f"time_s holds {time_s[0]:.15g}: are these milliseconds?"
+    elif time_s.size >= _FEWEST and np.array_equal(time_s, np.round(time_s)):
+        step = float(np.median(np.abs(np.diff(time_s))))
+        if step >= _SLOW_S:
+            yield f"time_s holds whole numbers in steps of {step:g}: are these milliseconds?"

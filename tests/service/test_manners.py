@@ -1,0 +1,471 @@
+"""The manners of the command line: what is hinted at, noted, passed over, and said in good time."""
+
+import importlib.util
+import io
+import json
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from inference.tracking.track import track
+from service.cli import main
+from service.commands import COMMANDS
+from simulator.frames import frames_from_columns
+from simulator.scene import parse_scene
+from simulator.sensor import parse_sensor
+from tests.service.conftest import SCENE, SENSOR
+
+CSV = "time_s,w1,w2\n0.0,0.021,1.71\n0.1,0.022,1.63\n0.2,0.023,1.55\n"
+SINE_WAVE = {"kind": "sine_wave", "frequency_hz": 5e6, "noise": {"read": [1e-3, 1e-3]}}
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    return written(tmp_path / "scene.json", {"sensor": SENSOR, "scene": SCENE})
+
+
+def written(path: Path, content: Any) -> Path:
+    path.write_text(content if isinstance(content, str) else json.dumps(content))
+    return path
+
+
+class Said:
+    """What a command said, and how it ended."""
+
+    def __init__(self, capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> None:
+        try:
+            self.code: Any = main([str(argument) for argument in arguments])
+        except SystemExit as end:
+            self.code = end.code
+        self.out, self.err = capsys.readouterr()
+
+    @property
+    def frames(self) -> list[dict[str, Any]]:
+        frames: list[dict[str, Any]] = json.loads(self.out)["results"][0]["frames"]
+        return frames
+
+
+def given(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    said = Said(capsys, "--version")
+    assert (said.code, said.out) == (0, f"hybridtof {version('hybridtof')}\n")
+
+
+def commands(capsys: pytest.CaptureFixture[str]) -> list[list[str]]:
+    """Every command, as the help lists them."""
+    listed = Said(capsys, "--help").out
+    names = [
+        line.split()[0] for line in listed.splitlines() if line[:4] == "    " and line[4] > " "
+    ]
+    assert len(names) == len(COMMANDS)
+    names.remove("reproduce")
+    return [[name] for name in names] + [["reproduce", "appendix-b"], ["reproduce", "figures"]]
+
+
+def test_every_help_has_examples_and_exit_codes(capsys: pytest.CaptureFixture[str]) -> None:
+    for command in commands(capsys):
+        said = Said(capsys, *command, "--help")
+        assert said.code == 0
+        examples = said.out[said.out.index("examples:") :].splitlines()
+        assert " ".join(["hybridtof", *command]) in examples[1], command
+        assert "exit codes: 0 answered" in examples[-1]
+        assert "--quiet" in said.out
+
+
+@pytest.mark.parametrize(
+    ("text", "rows"),
+    [
+        (CSV, 3),
+        ('{"time_s": 0, "w1": 0.02, "w2": 1.7}\n{"time_s": 1, "w1": 0.02, "w2": 1.6}\n', 2),
+        ('{"w1": [0.02], "w2": [1.7]}', 1),
+        ('{\n "w1": [0.02],\n "w2": [1.7]\n}\n', 1),
+    ],
+)
+def test_frames_from_standard_input(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    scene: Path,
+    text: str,
+    rows: int,
+) -> None:
+    given(monkeypatch, text)
+    said = Said(capsys, "estimate", "-", "--scene", scene)
+    assert (said.code, said.err) == (0, "")
+    assert len(said.frames) == rows
+
+
+def test_standard_input_is_named(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scene: Path
+) -> None:
+    given(monkeypatch, "w1\n1\n")
+    said = Said(capsys, "estimate", "-", "--scene", scene)
+    assert said.code == 2
+    assert "standard input#/w2: is missing" in said.err
+
+
+@pytest.mark.parametrize(
+    ("header", "hint"),
+    [
+        ("time_s,W1,w2", "#/W1: is not a column: did you mean w1?"),
+        ("time,w1,w2", "#/time: is not a column: did you mean time_s?"),
+        ("time_ms,w1,w2", "did you mean time_s?"),
+        ("w3,w1,w2", "did you mean w1 or w2?"),
+        ("object_presnt,w1,w2", "did you mean object_present?"),
+        ("0.1,w1,w2", "the first line must name the columns"),
+        ("time_s;w1;w2", "is the file separated by ';'?"),
+        ("time_s\tw1\tw2", "is the file separated by '\\t'?"),
+    ],
+)
+def test_hints(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path, header: str, hint: str
+) -> None:
+    path = written(tmp_path / "f.csv", header + "\n0.1,0.02,1.7\n")
+    said = Said(capsys, "estimate", path, "--scene", scene)
+    assert (said.code, said.out) == (2, "")
+    assert hint in said.err
+
+
+@pytest.mark.parametrize("name", ["I", "Q"])
+def test_hint_for_a_sine_wave(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str
+) -> None:
+    scene = written(tmp_path / "s.json", {"sensor": SINE_WAVE, "scene": SCENE})
+    header = "i,q".replace(name.lower(), name)
+    said = Said(capsys, "estimate", written(tmp_path / "f.csv", header + "\n1,1\n"),
+                "--scene", scene)  # fmt: skip
+    assert f"did you mean {name.lower()}?" in said.err
+
+
+@pytest.mark.parametrize(
+    ("suffix", "text"),
+    [
+        (".csv", "comment,w1,w2,known_range_m\nfirst,0.02,1.7,1\n"),
+        (".ndjson", '{"comment": "first", "w1": 0.02, "w2": 1.7, "known_range_m": 1}\n'),
+        (".json", '{"comment": ["first"], "w1": [0.02], "w2": [1.7], "known_range_m": [1]}'),
+    ],
+)
+def test_columns_that_cannot_be_meant_are_passed_over(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path, suffix: str, text: str
+) -> None:
+    path = written(tmp_path / f"f{suffix}", text)
+    said = Said(capsys, "estimate", path, "--scene", scene)
+    assert said.code == 0
+    assert len(said.frames) == 1
+    assert "ignored, since they are no columns: comment, known_range_m\n" in said.err
+    assert Said(capsys, "estimate", path, "--scene", scene, "--quiet").err == ""
+
+
+BAD = [
+    (
+        ".csv",
+        "w1,w2\n0.02,1.7\n0.02,abc\n0.03,1.6\n",
+        "line 3: w2 must be a finite number, is 'abc'",
+    ),
+    (".csv", "w1,w2\n0.02,1.7\n0.02\n0.03,1.6\n", "line 3: has 1 fields where the header has 2"),
+    (
+        ".csv",
+        "w1,w2,gain\n0.02,1.7,1\n0.02,1.7,0\n0.03,1.6,1\n",
+        "line 3: gain must be above 0, is 0",
+    ),
+    (
+        ".ndjson",
+        '{"w1": 0.02, "w2": 1.7}\n{"w1": NaN, "w2": 1}\n{"w1": 0.03, "w2": 1.6}\n',
+        "line 2: w1 must be a finite number, is nan",
+    ),
+    (
+        ".ndjson",
+        '{"w1": 0.02, "w2": 1.7}\n{"w1": 0.02}\n{"w1": 0.03, "w2": 1.6}\n',
+        "line 2: w2 is missing",
+    ),
+    (
+        ".ndjson",
+        '{"w1": 0.02, "w2": 1.7}\n{"w1": 0.0\n{"w1": 0.03, "w2": 1.6}\n',
+        "line 2: cannot be read: not JSON",
+    ),
+]
+
+
+@pytest.mark.parametrize(("suffix", "text", "reason"), BAD)
+def test_a_bad_row_is_a_frame_with_a_status(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    scene: Path,
+    suffix: str,
+    text: str,
+    reason: str,
+) -> None:
+    said = Said(capsys, "estimate", written(tmp_path / f"f{suffix}", text), "--scene", scene,
+                "--technique", "conventional")  # fmt: skip
+    assert said.code == 0
+    first, bad, last = said.frames
+    assert bad["status"] == "none"
+    assert bad["range_m"] is None
+    assert bad["reason"].startswith(reason)
+    assert reason in said.err
+    lines = text.splitlines(keepends=True)
+    del lines[2 if suffix == ".csv" else 1]
+    path = written(tmp_path / f"good{suffix}", "".join(lines))
+    good = Said(capsys, "estimate", path, "--scene", scene, "--technique", "conventional")
+    assert [first, last] == good.frames
+
+
+def test_rows_that_are_all_bad_are_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path
+) -> None:
+    path = written(tmp_path / "f.csv", "w1,w2\nx,1\n1,y\n")
+    said = Said(capsys, "estimate", path, "--scene", scene)
+    assert (said.code, said.out) == (2, "")
+    assert "f.csv#/w1/0: line 2: must be a finite number" in said.err
+
+
+@pytest.mark.slow
+def test_a_bad_row_of_a_posterior_has_no_range(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    noise = {"read": [1e-5, 1e-3]}
+    known = {"sensor": SENSOR | {"noise": noise}, "scene": SCENE}
+    frames = tmp_path / "f.csv"
+    simulated = Said(capsys, "simulate", "--scene", written(tmp_path / "known.json", known),
+                     "--from-m", "0.3", "--to-m", "1", "--frames", "6", "--seed", "1",
+                     "--output", frames)  # fmt: skip
+    assert simulated.code == 0
+    lines = frames.read_text().splitlines()
+    unknown = written(
+        tmp_path / "s.json", known | {"scene": {"object": {"c0": 0.0769, "c1": -0.123}}}
+    )
+    options = ("--scene", unknown, "--method", "importance", "--seed", "1")
+    good = Said(capsys, "infer", frames, *options)
+    written(frames, "\n".join([*lines[:3], "0.5,x,1", *lines[3:]]) + "\n")
+    bad = Said(capsys, "infer", frames, *options)
+    assert "line 4: w1 must be a finite number" in bad.err
+    with_all, with_hole = json.loads(good.out)["range_m"], json.loads(bad.out)["range_m"]
+    for name, column in with_hole.items():
+        assert not column.pop(2), name
+        assert column == with_all[name]
+
+
+def test_estimates_as_csv(capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path) -> None:
+    frames = written(tmp_path / "f.csv", CSV.replace("0.022", "abc"))
+    out = tmp_path / "out.csv"
+    techniques = ("--technique", "conventional", "--technique", "intensity")
+    shown = Said(capsys, "estimate", frames, "--scene", scene, *techniques)
+    said = Said(capsys, "estimate", frames, "--scene", scene, *techniques, "--output", out)
+    assert (said.code, said.out) == (0, "")
+    header, *rows = out.read_text().splitlines()
+    assert header == "technique,frame,status,range_m,sd_m,roots_m,roots_sd_m,near_fold,reason"
+    results = json.loads(shown.out)["results"]
+    for row, (result, index) in zip(
+        rows, [(result, index) for result in results for index in range(3)], strict=True
+    ):
+        cells = row.split(",", 8)
+        frame = result["frames"][index]
+        assert cells[:3] == [result["technique"], str(index), frame["status"]]
+        assert cells[3] == ("" if frame["range_m"] is None else repr(frame["range_m"]))
+        assert [float(root) for root in cells[5].split()] == frame["roots_m"]
+    assert rows[1].startswith("conventional,1,none,,,,,false,")
+    for suffix in (".ndjson", ".json"):
+        path = out.with_suffix(suffix)
+        assert Said(capsys, "estimate", frames, "--scene", scene, "--output", path).code == 0
+    lines = [json.loads(line) for line in out.with_suffix(".ndjson").read_text().splitlines()]
+    assert [line["frame"] for line in lines] == [0, 1, 2]
+    document = json.loads(out.with_suffix(".json").read_text())
+    assert {"technique": lines[0]["technique"], "frame": 0} | document["results"][0]["frames"][
+        0
+    ] == lines[0]
+
+
+@pytest.mark.parametrize("command", ["estimate", "simulate"])
+def test_a_file_that_cannot_be_written_is_refused_before_the_work(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, command: str
+) -> None:
+    # nothing is read: neither the scene nor the frames are there
+    options = {"estimate": ["none.csv"], "simulate": []}[command]
+    for path, message in (
+        (tmp_path / "x.txt", "not '.txt'"),
+        (tmp_path / "no" / "x.csv", "no such"),
+    ):
+        said = Said(capsys, command, *options, "--scene", "none.json", "--output", path)
+        assert said.code == 2
+        assert message in said.err
+
+
+@pytest.mark.parametrize("document", ["file", "sensor", "scene", "frames"])
+def test_schema(capsys: pytest.CaptureFixture[str], document: str) -> None:
+    schema = json.loads(Said(capsys, "schema", document).out)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    validator = jsonschema.Draft202012Validator(schema)
+    good: dict[str, Any] = {
+        "file": {"sensor": SENSOR, "scene": SCENE},
+        "sensor": SINE_WAVE,
+        "scene": SCENE,
+        "frames": {"w1": [1.0], "w2": [2.0]},
+    }
+    assert validator.is_valid(good[document])
+    assert not validator.is_valid(good[document] | {"colour": "red"})
+    if document == "file":
+        assert json.loads(Said(capsys, "schema").out) == schema
+
+
+@pytest.mark.parametrize(
+    ("sensor", "frames", "doubt"),
+    [
+        ({"frequency_hz": 20.0}, {}, "frequency_hz 20 gives an unambiguous range of 7.49e+06 m"),
+        (
+            {"noise": {"read": [1e-6, 1e-6]}},
+            {},
+            "i is rounded to 0.01, and its stated noise is 1e-06",
+        ),
+        ({}, {"time_s": [0, 33, 66, 100, 133, 166]}, "in steps of 33: are these milliseconds?"),
+        ({}, {"time_s": [1.7e12 + k for k in range(6)]}, "are these milliseconds?"),
+    ],
+)
+def test_doubts(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    sensor: dict[str, Any],
+    frames: dict[str, Any],
+    doubt: str,
+) -> None:
+    columns = {"i": [0.41, 0.42, 0.44, 0.45, 0.47, 0.48], "q": [0.11, 0.12, 0.13, 0.14, 0.15, 0.16]}
+    path = written(tmp_path / "f.json", columns | frames)
+    scene = written(tmp_path / "s.json", {"sensor": SINE_WAVE | sensor, "scene": SCENE})
+    plain = written(tmp_path / "plain.json", columns)
+    honest = written(tmp_path / "honest.json", {"sensor": SINE_WAVE, "scene": SCENE})
+    assert Said(capsys, "estimate", plain, "--scene", honest).err == ""
+    said = Said(capsys, "estimate", path, "--scene", scene)
+    assert said.code == 0
+    assert doubt in said.err
+    assert Said(capsys, "estimate", path, "--scene", scene, "--quiet").err == ""
+
+
+def test_a_pulse_of_100_s_is_doubted(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    system = {"sensor": SENSOR | {"pulse_width_s": 100.0}, "scene": SCENE}
+    said = Said(capsys, "identifiability", "--scene", written(tmp_path / "s.json", system),
+                "--ranges", "0.5")  # fmt: skip
+    assert "pulse_width_s 100 gives an unambiguous range of 1.5e+10 m" in said.err
+
+
+def test_full_noise_is_not_doubted(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    columns = {"i": rng.normal(0.4, 1e-3, 50).tolist(), "q": rng.normal(0.1, 1e-3, 50).tolist()}
+    sensor = SINE_WAVE | {"noise": {"read": [1e-9, 1e-9]}}  # small, but nothing is rounded
+    said = Said(capsys, "estimate", written(tmp_path / "f.json", columns), "--scene",
+                written(tmp_path / "s.json", {"sensor": sensor, "scene": SCENE}))  # fmt: skip
+    assert said.err == ""
+
+
+@pytest.mark.parametrize("command", ["demo", "report"])
+def test_a_missing_matplotlib_is_said_before_the_work(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    command: str,
+) -> None:
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util,
+        "find_spec",
+        lambda name, package=None: None if name == "matplotlib" else find(name, package),
+    )
+    # a file where the folder should be: the work ends before it begins
+    out = written(tmp_path / "out", "")
+    said = Said(capsys, command, "--out", out)
+    assert said.code == 2
+    assert said.err.startswith("hybridtof: there will be no picture: it needs matplotlib")
+
+
+# --- track
+
+
+def answers(said: Said) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in said.out.splitlines()]
+
+
+def test_track_is_the_tracker(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path
+) -> None:
+    simulated = tmp_path / "f.csv"
+    Said(capsys, "simulate", "--scene", scene, "--from-m", "0.5", "--to-m", "0.6", "--frames", "12",
+         "--duration-s", "1", "--seed", "1", "--output", simulated)  # fmt: skip
+    said = Said(capsys, "track", simulated, "--scene", scene)
+    assert (said.code, said.err) == (0, "")
+    found = answers(said)
+    header, *rows = (line.split(",") for line in simulated.read_text().splitlines())
+    columns = {name: [float(row[k]) for row in rows] for k, name in enumerate(header)}
+    sensor = parse_sensor(SENSOR)
+    whole = track(sensor, parse_scene(SCENE), frames_from_columns(sensor, columns))
+    assert [line["sequence"] for line in found] == list(range(1, 13))
+    assert [line["time_s"] for line in found] == columns["time_s"]
+    for i, line in enumerate(found):
+        assert line["range_m"] == (None if np.isnan(whole.range_m[i]) else whole.range_m[i])
+        assert line["present"] == whole.present[i]
+        count = int(np.isfinite(whole.hypotheses_m[i]).sum())
+        assert [h["weight"] for h in line["hypotheses"]] == whole.hypotheses_weight[
+            i, :count
+        ].tolist()
+        assert line["latency_s"] > 0
+        assert line.keys() == {
+            "sequence", "time_s", "status", "range_m", "sd_m", "hypotheses", "present", "outlier",
+            "rate_m_s", "misfit", "latency_s",
+        }  # fmt: skip
+    assert found[-1]["status"] == "unique"
+    # as NDJSON and as columns the same
+    as_json = written(tmp_path / "f.json", columns)
+    again = answers(Said(capsys, "track", as_json, "--scene", scene))
+    assert [line | {"latency_s": 0} for line in again] == [
+        line | {"latency_s": 0} for line in found
+    ]
+
+
+def test_a_bad_line_is_answered_and_changes_nothing(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scene: Path
+) -> None:
+    good = [
+        {"time_s": 0.0, "w1": 0.021, "w2": 1.71, "camera": "left", "sequence": 10},
+        {"time_s": 0.1, "w1": 0.022, "w2": 1.63},
+    ]
+    bad = ['{"time_s": 0.05, "w1": "x", "w2": 1.7, "camera": "left"}', "nope", '{"w1": 1, "w2": 2}',
+           '{"time_s": -1, "w1": 0.02, "w2": 1.7}', '{"time_s": 0.05, "W1": 0.02, "w2": 1.7}',
+           '{"time_s": 0.05, "w1": 0.02, "w2": 1.7, "sequence": "x"}']  # fmt: skip
+    given(monkeypatch, "\n".join([json.dumps(good[0]), *bad, json.dumps(good[1])]))
+    found = answers(Said(capsys, "track", "-", "--scene", scene))
+    given(monkeypatch, "\n".join(map(json.dumps, good)))
+    first, last = answers(Said(capsys, "track", "-", "--scene", scene))
+    assert found[0] | {"latency_s": 0} == first | {"latency_s": 0}
+    assert (first["camera"], first["sequence"], last["sequence"]) == ("left", 10, 11)
+    assert found[-1] | {"latency_s": 0} == last | {"latency_s": 0, "sequence": 17}
+    pointers = [line["error"]["pointer"] for line in found[1:-1]]
+    assert pointers == ["/w1", "", "/time_s", "/time_s", "/W1", "/sequence"]
+    assert found[1]["camera"] == "left"
+    assert all(line["error"]["title"] and line["error"]["type"] for line in found[1:-1])
+
+
+def test_a_stream_without_a_frame_is_bad_input(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scene: Path
+) -> None:
+    given(monkeypatch, "time_s,w1,w2\nx,1,2\n")
+    said = Said(capsys, "track", "-", "--scene", scene)
+    assert said.code == 2
+    assert answers(said)[0]["error"]["pointer"] == "/time_s"
+
+
+def test_settings_of_the_tracker(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    frames = written(tmp_path / "f.csv", CSV)
+    system = {"sensor": SENSOR, "scene": SCENE, "tracking": {"hypotheses": 1}}
+    said = Said(capsys, "track", frames, "--scene", written(tmp_path / "s.json", system))
+    assert all(len(line["hypotheses"]) <= 1 for line in answers(said))
+    system["tracking"] = {"hypotheses": 0}
+    said = Said(capsys, "track", frames, "--scene", written(tmp_path / "s.json", system))
+    assert said.code == 2
+    assert "s.json#/tracking/hypotheses: " in said.err
+    system |= {"scene": SCENE | {"motion": "tangential"}, "tracking": {}}
+    said = Said(capsys, "track", frames, "--scene", written(tmp_path / "s.json", system))
+    assert (said.code, said.out) == (3, "")
