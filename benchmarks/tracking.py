@@ -88,8 +88,8 @@ def particles(
     v = s * rng.standard_normal(u.size)
     decay = np.exp(-SECONDS / tau)
     out = np.empty(len(readings))
-    by_rate = model.curve.by_rate
-    units = np.asarray(model.units)
+    by_rate = model.model.table.by_rate
+    units = np.asarray(model.observed.units)
     used = np.array([model.settings.observables != "w2", True])
     for i, pair in enumerate(readings):
         if i:
@@ -112,15 +112,15 @@ def particles(
 def through_the_fold(name: str, model: Tracker, scene: Any, tracks: int, start: float) -> None:
     sensor, settings = model.sensor, model.settings
     terms = parameters_of(sensor, scene).terms(np.zeros((1, 0)))
-    grid = np.linspace(model.curve.start, model.curve.end, 8001)
+    grid = np.linspace(model.model.table.start, model.model.table.end, 8001)
     curve = mean_readings(sensor, terms, np.exp(grid))
-    by_rate = model.curve.by_rate
+    by_rate = model.model.table.by_rate
     table = np.gradient(curve, grid, axis=0) if by_rate else curve
     # what a single frame sees: w2, or the direction of the derivative
     seen = np.unwrap(np.arctan2(table[:, 0], table[:, 1]), period=np.pi) if by_rate else table[:, 1]
     fold = start
     at = int(np.argmin(np.abs(grid - fold)))
-    units = np.asarray(model.units)
+    units = np.asarray(model.observed.units)
     rng = np.random.default_rng(7)
     wrong = dict.fromkeys(("frame by frame", "nearest to the last", "particles", "tracker"), 0)
     total = spent = frames_count = 0
@@ -233,7 +233,7 @@ def both_windows(model: Tracker, scene: Any, tracks: int) -> None:
         while True:
             first = (np.log(FOLD_M) + 0.2 * side, -0.4 * side)
             u, _ = wander(rng, 150, model.settings, first, SECONDS)
-            if u.min() > model.curve.start + 0.1 and u.max() < model.curve.end - 0.1:
+            if u.min() > model.model.table.start + 0.1 and u.max() < model.model.table.end - 0.1:
                 break
         means = mean_readings(model.sensor, terms, np.exp(u))
         readings = means + np.asarray(model.sensor.noise.read) * rng.standard_normal(means.shape)

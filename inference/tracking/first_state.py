@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.tracking.hypotheses import ANCHOR, CROSSTALK1, Hypotheses
 from inference.tracking.settings import TrackingSettings
-from inference.tracking.shared_error import ANCHOR
 from inference.tracking.state import TrackState
 from simulator.scene import Scene
 
@@ -21,7 +21,7 @@ def first_state(
     settings: TrackingSettings,
     directions: int,
     crosstalk: Array | None,
-    crosstalk_columns: Array,
+    crosstalk_root: Array,
     scale: Array,
 ) -> TrackState:
     """Return the state before any frame.
@@ -34,7 +34,7 @@ def first_state(
         Number of uncertain directions that are carried along.
     crosstalk : ndarray, shape (2,), or None
         Where the crosstalk begins, in units of the read noise; None where it is not learnt.
-    crosstalk_columns : ndarray, shape (2, k)
+    crosstalk_root : ndarray, shape (2, k)
         Its change along every direction in which a posterior spreads, in the same units; k is 0
         where there is no posterior, and its prior holds.
     scale : ndarray, shape (2,)
@@ -44,25 +44,26 @@ def first_state(
     x, X = np.zeros((rows, n)), np.zeros((rows, n, n + directions))
     if crosstalk is not None:
         x = np.zeros((rows, ANCHOR + 1))
-        x[0, 2:ANCHOR] = crosstalk
+        x[0, CROSSTALK1:ANCHOR] = crosstalk
         values = scene.crosstalk_values
-        if crosstalk_columns.size:
-            # of its own, so that it can be learnt: its correlation with other globals is left out
-            upper = np.asarray(np.linalg.qr(crosstalk_columns.T, mode="r"))
-            X[0, 2:, 2 : 2 + len(upper)] = upper.T
+        if crosstalk_root.size:
+            # of its own, so that it can be learnt: its correlation with other unknowns is left out
+            upper = np.asarray(np.linalg.qr(crosstalk_root.T, mode="r"))
+            X[0, CROSSTALK1:, CROSSTALK1 : CROSSTALK1 + len(upper)] = upper.T
         elif values is not None:
             for k, value in enumerate(values):
+                state = CROSSTALK1 + k
                 if not isinstance(value, float | int):
                     mean, sd = _moments(value.distribution().from_normal)
-                    x[0, 2 + k], X[0, 2 + k, 2 + k] = mean * scale[k], sd * scale[k]
+                    x[0, state], X[0, state, state] = mean * scale[k], sd * scale[k]
     weight = np.zeros(rows)
     there = settings.visit_s / (settings.visit_s + settings.absence_s)
     weight[0] = 1.0 - there
-    return TrackState(x, X, weight, np.array([math.nan, there, 1.0, 0.0]))
+    return TrackState(Hypotheses(x, X, weight, np.array([math.nan, there, 1.0, 0.0])))
 
 
 def _moments(from_normal: Any) -> tuple[float, float]:
-    """Return mean and standard deviation of a law given by its map from the standard normal."""
+    """Return mean and standard deviation of a prior given by its map from the standard normal."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(60)
     values = from_normal(nodes)
     weights = weights / weights.sum()

@@ -1,55 +1,96 @@
 """Where a frame and what is known before it agree: all modes along the range, and their mass."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.tracking.curve import GLOBALS, Curve, Prior, add_factor, log_density
-from inference.tracking.masses import integrate
-from inference.tracking.peaks import climb, climb_plain
+from inference.tracking.candidates import Candidates
+from inference.tracking.frame_density import Frame, Prior, log_density
+from inference.tracking.mode_integration import Mode, integrate
+from inference.tracking.mode_search import Bracket, mode_by_differences, mode_of_plain
+from inference.tracking.places import Scan
+from inference.tracking.readings_table import ReadingsTable, nuisance_count
+from inference.tracking.roots import UNIT, add_root
 from simulator.compiled import compiled
 
-__all__ = ["REACH", "find_choices"]
+__all__ = ["Scanned", "find_modes", "scanned_for"]
 
 Array = NDArray[np.float64]
 
-REACH = 7.0  # standard deviations of a prediction that are searched
+_REACH = 7.0  # standard deviations of a prediction that are searched
+
+
+class Scanned(NamedTuple):
+    """Places that were looked at, and the log density there; overwritten."""
+
+    positions: Array
+    densities: Array
 
 
 @compiled
-def find_choices(
-    choices: Array,
+def scanned_for(scan: Scan) -> Scanned:
+    """Return room for all places of a scan and both ends."""
+    return Scanned(np.empty(scan.positions.size + 3), np.empty(scan.positions.size + 3))
+
+
+@compiled
+def _places_within(
+    low: float, high: float, table: ReadingsTable, scan: Scan, positions: Array
+) -> int:
+    """Fill both ends and the places of a scan between them; their number."""
+    k = scan.next_one[min(max(int((low - table.start) / table.step), 0), scan.next_one.size - 1)]
+    positions[0] = low
+    points = 1
+    while k < scan.positions.size and scan.positions[k] < high:
+        if scan.positions[k] > low:
+            positions[points] = scan.positions[k]
+            points += 1
+        k += 1
+    positions[points] = high
+    return points + 1
+
+
+@compiled
+def _mode_within(
+    bracket: Bracket, width: float, frame: Frame, prior: Prior, table: ReadingsTable
+) -> tuple[float, float]:
+    """Return a mode and its scale; ``width`` is that of the prior."""
+    plain = table.noise.plain and not table.by_rate
+    if plain and not (prior.position.born and nuisance_count(table) > 0):
+        root = add_root(UNIT, prior.added.root)
+        return mode_of_plain(bracket, frame, prior, root, table)
+    scale = min(width, bracket.high - bracket.low)
+    return mode_by_differences(bracket, scale, frame, prior, table)
+
+
+@compiled
+def find_modes(
+    to: Candidates,
     count: int,
-    parent: float,
-    first: float,
-    second: float,
+    parent: int,
+    frame: Frame,
     prior: Prior,
-    spread: Array,
-    curve: Curve,
-    scan: Array,
-    next_scan: NDArray[np.int64],
-    values: Array,
+    table: ReadingsTable,
+    scan: Scan,
+    scanned: Scanned,
 ) -> int:
     """Append every mode of a frame under one prior to a list.
 
     Parameters
     ----------
-    choices : ndarray, shape (capacity, CHOICE_COLUMNS)
+    to : Candidates
         The list; where it is full, its lightest member gives way.
     count : int
         Its length so far.
-    parent : float
-        What the last column says.
-    first, second : float
-        Readings in units of the read noise.
-    prior, spread, curve
+    parent : int
+        As in `Candidate`.
+    frame, prior, table
         As for `log_density`.
-    scan : ndarray, shape (s,)
-        Log ranges between which the curve is near straight, ascending from its start to its end.
-    next_scan : ndarray of int, shape (knots,)
-        Index of the first of them at or after each knot.
-    values : ndarray, shape (at least s + 2, 2)
+    scan : Scan
+        Where to look from.
+    scanned : Scanned
         Overwritten.
 
     Returns
@@ -57,67 +98,35 @@ def find_choices(
     int
         The new length.
     """
-    low, high, width = curve.start, curve.end, curve.end - curve.start
-    if not prior.born:
-        width = 1.0 / math.sqrt(prior.precision)
-        low = max(low, prior.centre - REACH * width)
-        high = min(high, prior.centre + REACH * width)
+    position = prior.position
+    low, high, width = table.start, table.end, table.end - table.start
+    if not position.born:
+        width = 1.0 / math.sqrt(position.precision)
+        low = max(low, position.centre - _REACH * width)
+        high = min(high, position.centre + _REACH * width)
         if not low < high:  # gone beyond the support
             return count
-    plain = curve.plain and not curve.by_rate
-    linear = spread.shape[1] > 2
-    plain = plain and not (prior.born and curve.table.shape[1] > GLOBALS)
-    root = add_factor((1.0, 0.0, 1.0), prior.root11, prior.root21)
-    root = add_factor(root, 0.0, prior.root22)
-    k = next_scan[min(max(int((low - curve.start) / curve.step), 0), next_scan.size - 1)]
-    values[0, 0] = low
-    points = 1
-    while k < scan.size and scan[k] < high:
-        if scan[k] > low:
-            values[points, 0] = scan[k]
-            points += 1
-        k += 1
-    values[points, 0] = high
-    points += 1
-    # with one knot within reach the curve is near straight over all of it
-    single = points <= 3 and not prior.born
-    if not single:
-        for j in range(points):
-            values[j, 1] = log_density(values[j, 0], first, second, prior, spread, curve)
+    at, logs = scanned.positions, scanned.densities
+    points = _places_within(low, high, table, scan, at)
+    if points <= 3 and not position.born:
+        # with one knot within reach the curve is near straight over all of it
+        start = min(max(position.centre, low), high)
+        u, scale = _mode_within(Bracket(start, low, high), width, frame, prior, table)
+        return integrate(to, count, parent, Mode(u, scale, low, high), frame, prior, table)
+    for j in range(points):
+        logs[j] = log_density(at[j], frame, prior, table)
     valley = 0
-    for j in range(1 if single else points):
-        start, below, above = min(max(prior.centre, low), high), low, high
-        left, right = low, high
-        if not single:
-            before = values[j - 1, 1] if j > 0 else -math.inf
-            after = values[j + 1, 1] if j + 1 < points else -math.inf
-            if not before <= values[j, 1] > after:
-                continue
-            last = j
-            while last + 1 < points and values[last + 1, 1] <= values[last, 1]:
-                last += 1
-            left, right = values[valley, 0], values[last, 0]
-            valley = last
-            start = values[j, 0]
-            below, above = values[max(j - 1, 0), 0], values[min(j + 1, points - 1), 0]
-        if plain:
-            u, scale = climb_plain(start, below, above, first, second, prior, root, curve)
-        else:
-            scale = min(width, above - below)
-            u, scale = climb(start, below, above, scale, first, second, prior, spread, curve)
-        count = integrate(
-            choices,
-            count,
-            parent,
-            u,
-            scale,
-            left,
-            right,
-            first,
-            second,
-            prior,
-            spread,
-            curve,
-            linear,
-        )
+    for j in range(points):
+        before = logs[j - 1] if j > 0 else -math.inf
+        after = logs[j + 1] if j + 1 < points else -math.inf
+        if not before <= logs[j] > after:
+            continue
+        last = j
+        while last + 1 < points and logs[last + 1] <= logs[last]:
+            last += 1
+        bracket = Bracket(at[j], at[max(j - 1, 0)], at[min(j + 1, points - 1)])
+        u, scale = _mode_within(bracket, width, frame, prior, table)
+        mode = Mode(u, scale, at[valley], at[last])
+        valley = last
+        count = integrate(to, count, parent, mode, frame, prior, table)
     return count

@@ -7,10 +7,10 @@ prediction is neither too sure nor endlessly wide; presence is a Markov chain of
 import math
 from typing import NamedTuple
 
-from inference.tracking.curve import Triple
+from inference.tracking.roots import Root
 from simulator.compiled import compiled
 
-__all__ = ["Presence", "Rules", "motion_over", "presence_over"]
+__all__ = ["Motion", "Presence", "Rules", "motion_over", "presence_over"]
 
 
 class Rules(NamedTuple):
@@ -56,6 +56,26 @@ class Rules(NamedTuple):
     unique_above: float
 
 
+class Motion(NamedTuple):
+    """How states move over one time step.
+
+    Attributes
+    ----------
+    carry, decay : float
+        u grows by carry du/dt, and du/dt shrinks by the factor decay.
+    noise : Root
+        Of the noise of (u, du/dt) that enters.
+    drift1, drift2 : float
+        Standard deviations by which the crosstalk drifts.
+    """
+
+    carry: float
+    decay: float
+    noise: Root
+    drift1: float
+    drift2: float
+
+
 class Presence(NamedTuple):
     """Probabilities over one time step.
 
@@ -88,20 +108,8 @@ def presence_over(seconds: float, leave: float, arrive: float) -> Presence:
 
 
 @compiled
-def motion_over(seconds: float, sd: float, time: float) -> tuple[float, float, Triple]:
-    """Return how (u, v) moves: carry, decay, and the triangular root of the noise that enters.
-
-    u grows by carry v and v shrinks by the factor decay (integrated Ornstein-Uhlenbeck process).
-
-    Parameters
-    ----------
-    seconds : float
-        Time step [s].
-    sd, time : float
-        Standard deviation [1/s] and correlation time [s] of v.
-    """
-    x = seconds / time
-    fall = -math.expm1(-x)
+def _noise_over(x: float, fall: float, sd: float, time: float) -> Root:
+    """Return the root of the noise of (u, v) that enters over x correlation times of v."""
     decay = 1.0 - fall
     if x < 0.1:
         # 2 x - 3 + 4 exp(-x) - exp(-2 x), whose first three orders cancel
@@ -122,7 +130,30 @@ def motion_over(seconds: float, sd: float, time: float) -> tuple[float, float, T
         square = 2.0 * x - 3.0 + 4.0 * decay - decay * decay
     first = sd * time * math.sqrt(square)
     if not first > 0.0:
-        return time * fall, decay, (0.0, 0.0, 0.0)
+        return Root(0.0, 0.0, 0.0)
     mixed = sd * fall * fall / math.sqrt(square)
     rest = -sd * sd * math.expm1(-2.0 * x) - mixed * mixed
-    return time * fall, decay, (first, mixed, math.sqrt(max(rest, 0.0)))
+    return Root(first, mixed, math.sqrt(max(rest, 0.0)))
+
+
+@compiled
+def motion_over(seconds: float, rules: Rules) -> Motion:
+    """Return how (u, v) and the crosstalk move: an integrated Ornstein-Uhlenbeck process.
+
+    Parameters
+    ----------
+    seconds : float
+        Time step [s].
+    rules : Rules
+        Standard deviation and correlation time of v, drift of the crosstalk.
+    """
+    x = seconds / rules.rate_time
+    fall = -math.expm1(-x)
+    root = math.sqrt(seconds)
+    return Motion(
+        rules.rate_time * fall,
+        1.0 - fall,
+        _noise_over(x, fall, rules.rate_sd, rules.rate_time),
+        rules.drift1 * root,
+        rules.drift2 * root,
+    )

@@ -6,6 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import Status
+from inference.tracking.hypotheses import (
+    COUNT,
+    CROSSTALK1,
+    CROSSTALK2,
+    Hypotheses,
+    U,
+    V,
+    learns_crosstalk,
+)
 from simulator.compiled import compiled
 
 __all__ = [
@@ -30,43 +39,28 @@ __all__ = [
 Array = NDArray[np.float64]
 
 # columns of a report
-STATUS, PRESENT, OUTLIER, SURPRISE, HYPOTHESES, BEST, CROSSTALK, REPORT_COLUMNS = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    11,
-    15,
-)
-# columns of a hypothesis, and of the best range: u, its sd, the part of it that is from globals,
-# rate, its sd, weight (of the best range given that an object is there)
+STATUS, PRESENT, OUTLIER, SURPRISE, HYPOTHESES, BEST = range(6)
+CROSSTALK, REPORT_COLUMNS = 11, 15
+# columns of a hypothesis, and of the best range: u, its sd, the part of it that is from nuisance
+# parameters, rate, its sd, weight (of the best range given that an object is there)
 POSITION, SD, STATIC_SD, RATE, RATE_SD, WEIGHT, HYPOTHESIS_COLUMNS = range(7)
 _UNIQUE, _AMBIGUOUS, _NONE = int(Status.UNIQUE), int(Status.AMBIGUOUS), int(Status.NONE)
 
 
 @compiled
-def _describe(rows: Array, i: int, at: int, x: Array, X: Array, weight: Array, j: int) -> None:
+def _describe(row: Array, of: Hypotheses, j: int) -> None:
     """Fill one row of the hypotheses."""
+    x, X = of.x, of.X
     own, common, rate = 0.0, 0.0, 0.0
     n = X.shape[1]
     for k in range(X.shape[2]):
-        square = X[j, 0, k] * X[j, 0, k]
+        square = X[j, U, k] * X[j, U, k]
         if k >= n:
             common += square
         own += square
-        rate += X[j, 1, k] * X[j, 1, k]
-    rows[i, at, POSITION], rows[i, at, SD], rows[i, at, STATIC_SD] = (
-        x[j, 0],
-        math.sqrt(own),
-        math.sqrt(common),
-    )
-    rows[i, at, RATE], rows[i, at, RATE_SD], rows[i, at, WEIGHT] = (
-        x[j, 1],
-        math.sqrt(rate),
-        weight[j],
-    )
+        rate += X[j, V, k] * X[j, V, k]
+    row[POSITION], row[SD], row[STATIC_SD] = x[j, U], math.sqrt(own), math.sqrt(common)
+    row[RATE], row[RATE_SD], row[WEIGHT] = x[j, V], math.sqrt(rate), of.weight[j]
 
 
 @compiled
@@ -90,34 +84,38 @@ def _pool(out: Array, rows: Array, i: int, first: int, last: int, total: float) 
 
 
 @compiled
-def _describe_crosstalk(out: Array, i: int, x: Array, X: Array, weight: Array, count: int) -> None:
+def _describe_crosstalk(out: Array, i: int, of: Hypotheses) -> None:
     """Fill mean and standard deviation of the crosstalk over all hypotheses."""
-    for k in range(2):
+    x, X, weight = of.x, of.X, of.weight
+    for k, state in enumerate((CROSSTALK1, CROSSTALK2)):
         mean, square, total = 0.0, 0.0, 0.0
-        for j in range(count + 1):
+        for j in range(int(of.numbers[COUNT]) + 1):
             variance = 0.0
             for c in range(X.shape[2]):
-                variance += X[j, 2 + k, c] * X[j, 2 + k, c]
-            gap = x[j, 2 + k] - x[0, 2 + k]
+                variance += X[j, state, c] * X[j, state, c]
+            gap = x[j, state] - x[0, state]
             mean += weight[j] * gap
             square += weight[j] * (variance + gap * gap)
             total += weight[j]
         mean, square = mean / total, square / total
-        out[i, CROSSTALK + k] = x[0, 2 + k] + mean
+        out[i, CROSSTALK + k] = x[0, state] + mean
         out[i, CROSSTALK + 2 + k] = math.sqrt(max(square - mean * mean, 0.0))
 
 
 @compiled
-def report(
-    out: Array,
-    rows: Array,
-    i: int,
-    x: Array,
-    X: Array,
-    weight: Array,
-    count: int,
-    unique_above: float,
-) -> None:
+def _sort_in(rows: Array, of: Hypotheses, count: int) -> None:
+    """Fill rows by ascending range, by insertion."""
+    for j in range(1, count + 1):
+        at = j - 1
+        while at > 0 and rows[at - 1, POSITION] > of.x[j, U]:
+            for k in range(HYPOTHESIS_COLUMNS):
+                rows[at, k] = rows[at - 1, k]
+            at -= 1
+        _describe(rows[at], of, j)
+
+
+@compiled
+def report(out: Array, rows: Array, i: int, of: Hypotheses, unique_above: float) -> None:
     """Describe the state after frame i.
 
     Parameters
@@ -130,22 +128,16 @@ def report(
         The hypotheses, by ascending range.
     i : int
         The frame.
-    x, X, weight, count
+    of : Hypotheses
         The state.
     unique_above : float
         As in `Rules`.
     """
+    count, weight = int(of.numbers[COUNT]), of.weight
     out[i, PRESENT], out[i, HYPOTHESES], out[i, STATUS] = 1.0 - weight[0], count, _NONE
-    for j in range(1, count + 1):
-        # by insertion, ascending
-        at = j - 1
-        while at > 0 and rows[i, at - 1, POSITION] > x[j, 0]:
-            for k in range(HYPOTHESIS_COLUMNS):
-                rows[i, at, k] = rows[i, at - 1, k]
-            at -= 1
-        _describe(rows, i, at, x, X, weight, j)
-    if X.shape[1] > 2:
-        _describe_crosstalk(out, i, x, X, weight, count)
+    _sort_in(rows[i], of, count)
+    if learns_crosstalk(of):
+        _describe_crosstalk(out, i, of)
     if weight[0] > 0.5 or count == 0:
         return
     # neighbours that overlap are one range; a mean is never taken over two that do not

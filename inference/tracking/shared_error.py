@@ -12,41 +12,68 @@ from it. What is motion for certain turns it with the errors of the crosstalk ke
 motion tells range and crosstalk apart.
 """
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import NamedTuple
 
-from inference.tracking.curve import Curve, mean_at
+from inference.tracking.hypotheses import (
+    ANCHOR,
+    CROSSTALK1,
+    CROSSTALK2,
+    Hypotheses,
+    U,
+    V,
+    variance_of,
+)
+from inference.tracking.readings_table import ReadingsTable, mean_at
 from simulator.compiled import compiled
 
-__all__ = ["ANCHOR", "certainty", "follow", "shared_part", "straighten", "turn_of"]
+__all__ = ["NOT_SHARED", "Shared", "certainty", "follow", "shared_part", "straighten"]
 
-Array = NDArray[np.float64]
-Pair = tuple[float, float]
-
-ANCHOR = 4  # column of x where crosstalk is learnt: log r at which tangents are taken
 _MOST = 0.5  # of the common part that a change of tangent may take up
 _SINGULAR = 1e-14  # of a determinant against the product of its diagonal
 
 
+class Shared(NamedTuple):
+    """What u errs with the crosstalk, and what was known before an update.
+
+    Attributes
+    ----------
+    back1, back2 : float
+        Regression of u on the two crosstalk readings.
+    turn1, turn2 : float
+        Derivatives of the readings along u at the anchor, less those that are taken.
+    crosstalk1, crosstalk2 : float
+        Means before the update.
+    """
+
+    back1: float
+    back2: float
+    turn1: float
+    turn2: float
+    crosstalk1: float
+    crosstalk2: float
+
+
+NOT_SHARED = Shared(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
 @compiled
-def shared_part(X: Array, row: int, n: int) -> tuple[float, float, float]:
+def shared_part(of: Hypotheses, row: int) -> tuple[float, float, float]:
     """Return how u follows the crosstalk, and the share of its variance that does.
 
     Parameters
     ----------
-    X : ndarray, shape (rows, n, n + p)
-        Roots of covariances; the first n columns count.
-    row, n : int
-        The hypothesis, and its number of states.
+    of, row : Hypotheses, int
+        The hypothesis; what nuisance parameters do to it plays no part.
 
     Returns
     -------
     (float, float, float)
         Regression of u on the two crosstalk readings, and the share of its variance.
     """
+    X = of.X
     uu, u1, u2, k11, k12, k22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(n):
-        u, first, second = X[row, 0, j], X[row, 2, j], X[row, 3, j]
+    for j in range(X.shape[1]):
+        u, first, second = X[row, U, j], X[row, CROSSTALK1, j], X[row, CROSSTALK2, j]
         uu += u * u
         u1 += u * first
         u2 += u * second
@@ -68,95 +95,74 @@ def shared_part(X: Array, row: int, n: int) -> tuple[float, float, float]:
 
 
 @compiled
-def certainty(x: Array, X: Array, row: int) -> float:
+def certainty(of: Hypotheses, row: int) -> float:
     """Return how much of a rate is motion rather than noise, from 0 to 1."""
-    variance = 0.0
-    for j in range(X.shape[1]):
-        variance += X[row, 1, j] * X[row, 1, j]
-    square = x[row, 1] * x[row, 1]
-    return square / (square + variance) if square > 0.0 else 0.0
+    square = of.x[row, V] * of.x[row, V]
+    return square / (square + variance_of(of, row, V)) if square > 0.0 else 0.0
 
 
 @compiled
-def turn_of(back: Pair, first: float, second: float) -> Pair:
-    """Return a change of tangent, held to what can be undone.
-
-    Parameters
-    ----------
-    back : (float, float)
-        From `shared_part`.
-    first, second : float
-        The change of the two derivatives.
-    """
-    along = back[0] * first + back[1] * second
-    held = min(1.0, _MOST / abs(along)) if along != 0.0 else 1.0
-    return held * first, held * second
-
-
-@compiled
-def straighten(X: Array, row: int, n: int, back: Pair, turn: Pair) -> None:
+def straighten(
+    of: Hypotheses, row: int, gain: float, slope1: float, slope2: float, table: ReadingsTable
+) -> Shared:
     """Let the crosstalk's errors take up what the common part of u does along another tangent.
 
     Parameters
     ----------
-    X : ndarray, shape (rows, n, n + p)
-        Roots of covariances; the row is changed in place.
-    row, n : int
-        The hypothesis, and its number of states.
-    back : (float, float)
-        From `shared_part`.
-    turn : (float, float)
-        Derivatives of the readings along u at the anchor, less those that will be taken.
+    of, row : Hypotheses, int
+        The hypothesis; its root is changed in place.
+    gain : float
+        The frame's factor on the sensor's gain.
+    slope1, slope2 : float
+        Derivatives of the frame's readings along u that will be taken.
+    table : ReadingsTable
+        Mean readings.
     """
-    for j in range(n):
-        common = back[0] * X[row, 2, j] + back[1] * X[row, 3, j]
-        X[row, 2, j] += turn[0] * common
-        X[row, 3, j] += turn[1] * common
+    x, X = of.x, of.X
+    back1, back2, _ = shared_part(of, row)
+    _, _, s1, s2 = mean_at(x[row, ANCHOR], table)
+    turn1, turn2 = gain * s1 - slope1, gain * s2 - slope2
+    # held to what can be undone
+    along = back1 * turn1 + back2 * turn2
+    held = min(1.0, _MOST / abs(along)) if along != 0.0 else 1.0
+    turn1, turn2 = held * turn1, held * turn2
+    for j in range(X.shape[1]):
+        common = back1 * X[row, CROSSTALK1, j] + back2 * X[row, CROSSTALK2, j]
+        X[row, CROSSTALK1, j] += turn1 * common
+        X[row, CROSSTALK2, j] += turn2 * common
+    return Shared(back1, back2, turn1, turn2, x[row, CROSSTALK1], x[row, CROSSTALK2])
 
 
 @compiled
-def follow(
-    x: Array,
-    X: Array,
-    row: int,
-    before: tuple[float, float, float],
-    back: Pair,
-    turn: Pair,
-    gain: float,
-    curve: Curve,
-) -> None:
+def follow(of: Hypotheses, row: int, shared: Shared, gain: float, table: ReadingsTable) -> None:
     """Undo `straighten` after an update, and bring the anchor to where the object is now.
 
     Parameters
     ----------
-    x, X : ndarray
-        Updated in the coordinates of `straighten`; changed in place.
-    row : int
-        The hypothesis.
-    before : (float, float, float)
-        u and crosstalk before the update.
-    back, turn
-        As for `straighten`.
-    gain : float
-        The frame's factor on the sensor's gain.
-    curve : Curve
-        The curve.
+    of, row : Hypotheses, int
+        The hypothesis, updated in the coordinates of `straighten`; changed in place.
+    shared : Shared
+        From `straighten`.
+    gain, table
+        As there.
     """
-    n = X.shape[1]
-    scale = 1.0 + back[0] * turn[0] + back[1] * turn[1]
-    change1, change2 = x[row, 2] - before[1], x[row, 3] - before[2]
-    common = (back[0] * change1 + back[1] * change2) / scale
+    x, X = of.x, of.X
+    back1, back2, turn1, turn2 = shared.back1, shared.back2, shared.turn1, shared.turn2
+    scale = 1.0 + back1 * turn1 + back2 * turn2
+    change1 = x[row, CROSSTALK1] - shared.crosstalk1
+    change2 = x[row, CROSSTALK2] - shared.crosstalk2
+    common = (back1 * change1 + back2 * change2) / scale
     # the curve bends away from its tangent: what the readings are expected to be stays
-    here1, here2, _, _ = mean_at(x[row, 0] - common, curve)
-    there1, there2, _, _ = mean_at(x[row, 0], curve)
-    _, _, s1, s2 = mean_at(x[row, ANCHOR], curve)
-    x[row, 2] += gain * (here1 + s1 * common - there1) - turn[0] * common
-    x[row, 3] += gain * (here2 + s2 * common - there2) - turn[1] * common
+    here1, here2, _, _ = mean_at(x[row, U] - common, table)
+    there1, there2, _, _ = mean_at(x[row, U], table)
+    _, _, s1, s2 = mean_at(x[row, ANCHOR], table)
+    x[row, CROSSTALK1] += gain * (here1 + s1 * common - there1) - turn1 * common
+    x[row, CROSSTALK2] += gain * (here2 + s2 * common - there2) - turn2 * common
     # what an update corrects is no motion: the readings' errors stay what they are
-    _, _, e1, e2 = mean_at(x[row, 0], curve)
-    bend1, bend2 = gain * (s1 - e1) - turn[0], gain * (s2 - e2) - turn[1]
-    x[row, ANCHOR] = x[row, 0]
-    for j in range(n):
-        follows = (back[0] * X[row, 2, j] + back[1] * X[row, 3, j]) / scale
-        X[row, 2, j] += bend1 * follows
-        X[row, 3, j] += bend2 * follows
+    _, _, e1, e2 = mean_at(x[row, U], table)
+    bend1, bend2 = gain * (s1 - e1) - turn1, gain * (s2 - e2) - turn2
+    x[row, ANCHOR] = x[row, U]
+    for j in range(X.shape[1]):
+        follows = (back1 * X[row, CROSSTALK1, j] + back2 * X[row, CROSSTALK2, j]) / scale
+        X[row, CROSSTALK1, j] += bend1 * follows
+        X[row, CROSSTALK2, j] += bend2 * follows

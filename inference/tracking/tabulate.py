@@ -1,15 +1,16 @@
-"""Making a `Curve`: the mean readings of a scene over all ranges that its prior allows."""
+"""Making a `ReadingsTable`: mean readings of a scene over all ranges that its prior allows."""
 
-import itertools
+import dataclasses
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.curve_table import integration_bounds
 from inference.density.integrand import Law, Quad, Triple, log_range_density
-from inference.tracking.curve import GROUP
+from inference.tracking.observed import Observed
+from inference.tracking.places import Places, Scan, boxes_of
+from inference.tracking.readings_table import ReadingsTable
 from simulator.compiled import compiled
 from simulator.errors import RefusedError
 from simulator.parameters import Terms
@@ -21,12 +22,22 @@ from simulator.readings import (
 )
 from simulator.sensor import PulsedSensor, Sensor, instrument
 
-__all__ = ["Knots", "boxes_of", "empty_readings", "knots_of", "means_over", "scan_of"]
+__all__ = [
+    "OBJECT",
+    "Knots",
+    "empty_readings",
+    "knots_of",
+    "means_over",
+    "places_of",
+    "table_of",
+]
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
-_VALUES, _SLOPES = [0, 1, 4, 5], [2, 3, 6, 7]  # columns of `means_over`
+# columns of `means_over`: mean readings, their slopes, the object's part of both
+MEAN, SLOPE, OBJECT, OBJECT_SLOPE = (slice(k, k + 2) for k in range(0, 8, 2))
+_VALUES, _SLOPES = [0, 1, 4, 5], [2, 3, 6, 7]
 _FEWEST = 256
 _MOST = 1 << 16
 _ERROR = 0.01  # standard deviations of a reading by which the table may be wrong
@@ -34,7 +45,6 @@ _RELATIVE_ERROR = 1e-11  # or this share of the reading, which no range feels
 _SCAN_SPACING = 0.0365
 _TURN = 0.7  # cosine of the largest turn of the curve at a scanned knot
 _VISIBLE = 0.1  # standard deviations of a reading below which a turn is not seen
-_LEAST_SPEED = 0.7  # of the least speed at knots: between them it may be less
 _DIFFERENCE = 3e-5  # of u, for second derivatives
 
 
@@ -118,11 +128,23 @@ def _bounds(sensor: Sensor, law: Law) -> tuple[float, float]:
     return low, high
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class Knots:
-    """Evenly spaced knots of u, dense enough for a table of mean readings."""
+    """Evenly spaced knots of u, dense enough for a table of mean readings.
 
-    def __init__(self, positions: Array, means: Array, log_prior: Array) -> None:
-        self.positions, self.means, self.log_prior = positions, means, log_prior
+    Attributes
+    ----------
+    positions : ndarray, shape (n,)
+        u = log r, ascending.
+    means : ndarray, shape (n, 8)
+        As `means_over`, in units of the noise.
+    log_prior : ndarray, shape (n,)
+        Log prior density of u.
+    """
+
+    positions: Array
+    means: Array
+    log_prior: Array
 
     @property
     def step(self) -> float:
@@ -130,21 +152,21 @@ class Knots:
         return float((self.positions[-1] - self.positions[0]) / (self.positions.size - 1))
 
 
-def knots_of(
-    sensor: Sensor, law: Law, means: Callable[[Array], Array], largest_factor: float
-) -> Knots:
+def knots_of(sensor: Sensor, terms: Terms, law: Law, observed: Observed, rate_sd: float) -> Knots:
     """Choose as many knots as the noise asks for.
 
     Parameters
     ----------
     sensor : Sensor
         The sensor.
+    terms : Terms
+        The first parameter vector is tabulated.
     law : tuple
         Prior of the range (`simulator.parameters.Terms.ranges`).
-    means : callable
-        Positions to means, slopes and the object's part in units of the noise, shape (n, 8).
-    largest_factor : float
-        What the means are multiplied by at most.
+    observed : Observed
+        What is read.
+    rate_sd : float
+        Standard deviation of the rate that derivatives are multiplied by [1/s].
 
     Returns
     -------
@@ -155,6 +177,8 @@ def knots_of(
     RefusedError
         Where the curve turns so quickly, or the noise is so small, that no table can hold it.
     """
+    factors = np.tile(observed.scale, 4)
+    error = _ERROR / (5.0 * rate_sd) if observed.by_rate else _ERROR
     low, high = _bounds(sensor, law)
     if not high > low:
         raise RefusedError(
@@ -164,13 +188,13 @@ def knots_of(
     count = _FEWEST
     while count <= _MOST:
         fine = np.linspace(low, high, 2 * count + 1)
-        values = means(fine)
+        values = means_over(fine, sensor, terms, observed.by_rate) * factors
         step = fine[2] - fine[0]
         left, right = values[:-2:2], values[2::2]
         middle = 0.5 * (left + right)[:, _VALUES]
         middle += 0.125 * step * (left - right)[:, _SLOPES]
         exact = values[1::2, _VALUES]
-        allowed = np.maximum(_ERROR / largest_factor, _RELATIVE_ERROR * np.abs(exact))
+        allowed = np.maximum(error, _RELATIVE_ERROR * np.abs(exact))
         if bool((np.abs(middle - exact) <= allowed).all()):
             prior = np.empty(count + 1)
             positions = np.ascontiguousarray(fine[::2])
@@ -183,28 +207,17 @@ def knots_of(
     )
 
 
-def scan_of(knots: Knots, by_rate: bool, rate_sd: float) -> NDArray[np.int64]:
+def _scan_of(knots: Knots, by_rate: bool, rate_sd: float) -> NDArray[np.int64]:
     """Choose knots between which a frame's density has at most one maximum.
 
-    They are at most `_SCAN_SPACING` apart, and closer where the curve turns visibly.
-
-    Parameters
-    ----------
-    knots : Knots
-        With means in units of the noise.
-    by_rate, rate_sd
-        Where means are factors of the rate, a turn back of their direction counts.
-
-    Returns
-    -------
-    ndarray of int
-        Indices of knots, ascending, both ends among them.
+    They are at most `_SCAN_SPACING` apart, and closer where the curve turns visibly; by rate a turn
+    back of its direction counts. Returns their indices, ascending, both ends among them.
     """
     last = knots.positions.size - 1
     stride = max(1, int(_SCAN_SPACING / knots.step))
     chosen = np.unique(np.append(np.arange(0, last, stride), last))
     while True:
-        values = knots.means[chosen, :2]
+        values = knots.means[chosen, MEAN]
         if by_rate:
             size = np.linalg.norm(values, axis=1) * 3.0 * rate_sd
             angle = np.unwrap(np.arctan2(values[:, 1], values[:, 0]), period=math.pi)
@@ -227,32 +240,48 @@ def scan_of(knots: Knots, by_rate: bool, rate_sd: float) -> NDArray[np.int64]:
         chosen = np.unique(np.concatenate([chosen, middle]))
 
 
-def boxes_of(knots: Knots, scan: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Return the boxes and groups of `inference.tracking.curve.Places`.
+def table_of(knots: Knots, nuisance: Array, crosstalk: Array, observed: Observed) -> ReadingsTable:
+    """Return the kernels' table.
 
     Parameters
     ----------
     knots : Knots
         With means in units of the noise.
-    scan : ndarray of int
-        From `scan_of`.
+    nuisance : ndarray, shape (knots, 2 p)
+        Nuisance Jacobian.
+    crosstalk : ndarray, shape (2,)
+        What is known of the crosstalk, in units of the noise.
+    observed : Observed
+        What is read.
     """
-    boxes = np.empty((scan.size - 1, 6))
-    for j, (a, b) in enumerate(itertools.pairwise(scan)):
-        part = knots.means[a : b + 1, :4]
-        low, high = part[:, :2].min(axis=0), part[:, :2].max(axis=0)
-        # the curve may leave the box of its knots a little
-        margin = 0.05 + 0.05 * (high - low)
-        boxes[j, :4] = np.column_stack([low - margin, high + margin]).ravel()
-        width = knots.positions[b] - knots.positions[a]
-        top = math.exp(knots.log_prior[a : b + 1].max())
-        chord = part[-1, :2] - part[0, :2]
-        length = float(np.linalg.norm(chord))
-        slowest = float((part[:, 2:] @ chord).min()) / length if length > 0.0 else 0.0
-        boxes[j, 4] = top * width
-        within = math.sqrt(2.0 * math.pi) / (_LEAST_SPEED * slowest) if slowest > 0.0 else width
-        boxes[j, 5] = top * min(within, width)
-    firsts = np.arange(0, boxes.shape[0], GROUP)
-    lows = np.minimum.reduceat(boxes[:, [0, 2]], firsts)
-    highs = np.maximum.reduceat(boxes[:, [1, 3]], firsts)
-    return boxes, np.column_stack([lows[:, 0], highs[:, 0], lows[:, 1], highs[:, 1]])
+    along = knots.means * np.repeat([1.0, knots.step, 1.0, knots.step], 2)
+    crosstalk1, crosstalk2 = crosstalk.tolist()
+    return ReadingsTable(
+        knots=np.ascontiguousarray(np.column_stack([along, knots.log_prior, nuisance])),
+        start=float(knots.positions[0]),
+        step=knots.step,
+        end=float(knots.positions[-1]),
+        crosstalk1=crosstalk1,
+        crosstalk2=crosstalk2,
+        by_rate=observed.by_rate,
+        noise=observed.noise,
+        channels=observed.channels,
+    )
+
+
+def places_of(knots: Knots, empty: Array, observed: Observed, rate_sd: float) -> Places:
+    """Return where the kernels look for an object.
+
+    Parameters
+    ----------
+    knots : Knots
+        With means in units of the noise.
+    empty : ndarray, shape (2, 1 + p)
+        Readings of the empty scene, and their change with the nuisance parameters.
+    observed, rate_sd
+        As for `knots_of`.
+    """
+    scan = _scan_of(knots, observed.by_rate, rate_sd)
+    next_one = np.searchsorted(scan, np.arange(knots.positions.size)).astype(np.int64)
+    boxes, groups = boxes_of(knots.positions, knots.means, knots.log_prior, scan)
+    return Places(Scan(knots.positions[scan], next_one), empty, boxes, groups)

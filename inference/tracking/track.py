@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from inference.estimates import Status
 from inference.posterior.answer.posterior import Posterior
-from inference.tracking.filter import EMPTY, EMPTY_SATURATED, SATURATED, TIME, run_filter
+from inference.tracking.filter import EMPTY, EMPTY_SATURATED, SATURATED, run_filter
+from inference.tracking.hypotheses import TIME, copied
 from inference.tracking.report import (
     BEST,
     CROSSTALK,
@@ -138,7 +139,7 @@ def step(
         raise InvalidInputError.at("/state", "belongs to another tracker")
     check_state(state, model.first)
     check_frames(model.sensor, frames)
-    times = _times(frames, float(state.numbers[TIME]))
+    times = _times(frames, float(state.hypotheses.numbers[TIME]))
     kinds = np.zeros(len(frames), dtype=np.uint8)
     if model.sensor.full_scale is not None:
         beyond = np.abs(frames.readings) >= np.asarray(model.sensor.full_scale)
@@ -152,11 +153,10 @@ def step(
     gain = np.ones(len(frames)) if frames.gain is None else frames.gain
     out = np.full((len(frames), REPORT_COLUMNS), np.nan)
     rows = np.full((len(frames), model.settings.hypotheses, HYPOTHESIS_COLUMNS), np.nan)
-    x, X, weight = state.x.copy(), state.X.copy(), state.weight.copy()
-    numbers = state.numbers.copy()
+    hypotheses = copied(state.hypotheses)
     table = np.ascontiguousarray(np.column_stack([values, gain]))
-    run_filter(out, rows, times, table, kinds, x, X, weight, numbers, *model.arguments, full)
-    return TrackState(x, X, weight, numbers, state.signature), _track(model, out, rows)
+    run_filter(out, rows, times, table, kinds, hypotheses, model.model, full)
+    return TrackState(hypotheses, state.signature), _track(model, out, rows)
 
 
 def track(
@@ -208,15 +208,13 @@ def _times(frames: Frames, last: float) -> Array:
 def _observations(model: Tracker, frames: Frames) -> Array:
     """Return what is tracked, in units of its noise, shape (n, 2)."""
     values = frames.readings
-    if model.curve.by_rate:
+    if model.observed.by_rate:
         if frames.derivatives is None:
             first, second = (f"d{name}_dt" for name in model.sensor.columns)
             raise InvalidInputError.at(f"/frames/{first}", f"is missing, with {second}")
         values = frames.derivatives
-    observables = model.settings.observables
-    used = np.array([observables != "w2", observables != "w1"])
     with np.errstate(over="ignore"):
-        scaled = np.where(used, values / np.asarray(model.units), 0.0)
+        scaled = np.where(model.observed.used, values / np.asarray(model.observed.units), 0.0)
     return np.clip(scaled, -_FARTHEST, _FARTHEST)
 
 
@@ -226,8 +224,8 @@ def _track(model: Tracker, out: Array, rows: Array) -> Track:
     rows = rows[:, :width]
     crosstalk = crosstalk_sd = None
     if model.learns_crosstalk:
-        crosstalk = out[:, CROSSTALK : CROSSTALK + 2] * model.units
-        crosstalk_sd = out[:, CROSSTALK + 2 : CROSSTALK + 4] * model.units
+        crosstalk = out[:, CROSSTALK : CROSSTALK + 2] * model.observed.units
+        crosstalk_sd = out[:, CROSSTALK + 2 : CROSSTALK + 4] * model.observed.units
     range_m, ranges = np.exp(out[:, BEST + POSITION]), np.exp(rows[:, :, POSITION])
     return Track(
         status=out[:, STATUS].astype(np.uint8),

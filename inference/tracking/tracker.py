@@ -2,24 +2,28 @@
 
 import dataclasses
 import hashlib
-import itertools
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from inference.density.rows import law_of
 from inference.posterior.answer.posterior import Posterior
-from inference.tracking.columns import columns_of, crosstalk_change
-from inference.tracking.curve import Curve, Places
 from inference.tracking.first_state import first_state
-from inference.tracking.globals import globals_of
+from inference.tracking.hypotheses import Hypotheses, learns_crosstalk
 from inference.tracking.motion import Rules
+from inference.tracking.nuisance import nuisance_of
+from inference.tracking.nuisance_jacobian import crosstalk_root, nuisance_jacobian
+from inference.tracking.observed import Observed, observed_of
+from inference.tracking.places import Places
+from inference.tracking.readings_table import ReadingsTable
+from inference.tracking.rules import rules_of, surprise_limit
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
-from inference.tracking.tabulate import boxes_of, empty_readings, knots_of, means_over, scan_of
+from inference.tracking.tabulate import empty_readings, knots_of, places_of, table_of
+from inference.tracking.weighing import Model
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.parameters import Terms, parameters_of
 from simulator.scene import Reference, Scene, Stroke
@@ -28,10 +32,6 @@ from simulator.sensor import PulsedSensor, Sensor
 __all__ = ["Tracker", "tracker"]
 
 Array = NDArray[np.float64]
-
-_BREADTH = 10.0
-_SAME = 0.05
-_SURPRISE_TAIL = 1e-4  # probability beyond which a single frame's surprise is cut
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -44,10 +44,10 @@ class Tracker:
         The sensor.
     settings : TrackingSettings
         The settings.
-    units : (float, float)
-        Noise of the two observables, in which the kernels count [reading units, or a second].
-    curve, places, rules : Curve, Places, Rules
-        The kernels' arguments.
+    observed : Observed
+        What is read of every frame.
+    model : Model
+        What the kernels take.
     limit : float
         Running surprise above which the model does not fit.
     first : TrackState
@@ -56,22 +56,15 @@ class Tracker:
 
     sensor: Sensor
     settings: TrackingSettings
-    units: tuple[float, float]
-    curve: Curve
-    places: Places
-    rules: Rules
+    observed: Observed
+    model: Model
     limit: float
     first: TrackState
 
     @property
-    def arguments(self) -> tuple[Curve, Places, Rules]:
-        """What the kernels take."""
-        return self.curve, self.places, self.rules
-
-    @property
     def learns_crosstalk(self) -> bool:
         """Whether the crosstalk is part of the state."""
-        return bool(self.first.x.shape[1] > 2)
+        return learns_crosstalk(self.first.hypotheses)
 
 
 def tracker(
@@ -115,101 +108,39 @@ def tracker(
     except InvalidInputError as error:
         raise error.below("/scene") from None
     _check(sensor, scene, settings)
-    by_rate = settings.observables == "derivatives"
-    crosstalk_names = parameters.crosstalk or ()
-    unknown_crosstalk = tuple(name for name in crosstalk_names if name in parameters.names)
-    learns = not by_rate and (
+    observed = observed_of(sensor, settings)
+    unknown_crosstalk = tuple(n for n in parameters.crosstalk or () if n in parameters.names)
+    learns = not observed.by_rate and (
         settings.crosstalk_drift is not None or (posterior is None and bool(unknown_crosstalk))
     )
     # derivatives do not see crosstalk at all
-    spared = unknown_crosstalk if learns or by_rate else ()
-    known = globals_of(parameters, posterior, spared)
-    if by_rate and known.plus:
+    spared = unknown_crosstalk if learns or observed.by_rate else ()
+    known = nuisance_of(parameters, posterior, spared)
+    if observed.by_rate and known.plus:
         raise RefusedError(
             "derivatives can be tracked only with a known scene; state its values as numbers, or "
             "track the readings"
         )
-    units = _units(sensor, by_rate)
-    used = np.array([settings.observables != "w2", settings.observables != "w1"])
-    scale = np.where(used, 1.0 / np.asarray(units), 0.0)
-    factors = np.tile(scale, 4)
-    law = _law(scene, known.centre)
-    rate = 5.0 * settings.rate_sd if by_rate else 1.0
-    knots = knots_of(
-        sensor, law, lambda u: means_over(u, sensor, known.centre, by_rate) * factors, rate
-    )
-    columns, empty_columns = columns_of(sensor, scene, known, knots, factors, not learns)
-    changes = [
-        crosstalk_change(*pair) * scale for pair in zip(known.plus, known.minus, strict=True)
-    ]
-    noise = sensor.noise
-    relative, shot = (0.0, 0.0) if by_rate else (noise.relative, noise.shot)
-    fixed, offset = np.zeros(2), np.zeros(2)
-    if known.centre.crosstalk is not None and not by_rate:
-        offset = known.centre.crosstalk[0] * scale
-    if not learns:
-        fixed = offset
-    scan = scan_of(knots, by_rate, settings.rate_sd)
-    curve = Curve(
-        table=np.ascontiguousarray(
-            np.column_stack(
-                [
-                    knots.means * np.repeat([1.0, knots.step, 1.0, knots.step], 2),
-                    knots.log_prior,
-                    columns,
-                ]
-            )
-        ),
-        start=float(knots.positions[0]),
-        step=knots.step,
-        end=float(knots.positions[-1]),
-        crosstalk1=float(fixed[0]),
-        crosstalk2=float(fixed[1]),
-        by_rate=by_rate,
-        plain=relative == 0.0 and shot == 0.0,
-        shot1=shot * float(scale[0]),
-        shot2=shot * float(scale[1]),
-        ratio=units[0] / units[1],
-        relative=relative,
-        pulsed=isinstance(sensor, PulsedSensor),
-        channels=int(used.sum()),
-    )
-    places = Places(
-        knots.positions[scan],
-        np.searchsorted(scan, np.arange(knots.positions.size)).astype(np.int64),
-        np.column_stack([empty_readings(sensor, known.centre, by_rate) * scale, empty_columns]),
-        *boxes_of(knots, scan),
-    )
-    memory = 1.0 - 1.0 / settings.window
-    freedom = 0.5 * curve.channels * (1.0 + memory) / (1.0 - memory)
-    drift = settings.crosstalk_drift or (0.0, 0.0)
-    rules = Rules(
-        leave=1.0 / settings.visit_s,
-        arrive=1.0 / settings.absence_s,
-        rate_sd=0.0 if scene.motion == "static" else settings.rate_sd,
-        rate_time=settings.rate_time_s,
-        drift1=drift[0] * float(scale[0]),
-        drift2=drift[1] * float(scale[1]),
-        outlier=settings.outlier,
-        breadth=_BREADTH,
-        log_negligible=math.log(settings.negligible),
-        same=_SAME,
-        memory=memory,
-        most_surprise=float(stats.chi2.isf(_SURPRISE_TAIL, curve.channels)),
-        unique_above=settings.unique_above,
-    )
-    limit = float(stats.gamma.isf(settings.false_alarm, freedom, scale=1.0 / freedom))
+    knots = knots_of(sensor, known.centre, _law(scene, known.centre), observed, settings.rate_sd)
+    jacobian = nuisance_jacobian(sensor, scene, known, knots, observed.scale, not learns)
+    crosstalk = np.zeros(2)
+    if known.centre.crosstalk is not None and not observed.by_rate:
+        crosstalk = known.centre.crosstalk[0] * observed.scale
+    table = table_of(knots, jacobian.along, np.zeros(2) if learns else crosstalk, observed)
+    empty = empty_readings(sensor, known.centre, observed.by_rate) * observed.scale
+    places = places_of(knots, np.column_stack([empty, jacobian.empty]), observed, settings.rate_sd)
+    rules = rules_of(settings, observed, scene.motion == "static")
+    limit = surprise_limit(settings, rules, observed.channels)
     first = first_state(
         scene,
         settings,
-        empty_columns.shape[1],
-        offset if learns else None,
-        np.array(changes).reshape(-1, 2).T,
-        scale,
+        jacobian.empty.shape[1],
+        crosstalk if learns else None,
+        crosstalk_root(known, observed.scale),
+        observed.scale,
     )
-    shapes = np.array([*first.x.shape, *first.X.shape])
-    first = dataclasses.replace(first, signature=_signature(curve, places, rules, (shapes,)))
-    return Tracker(sensor, settings, units, curve, places, rules, limit, first)
+    first = dataclasses.replace(first, signature=_signature(table, places, rules, first.hypotheses))
+    return Tracker(sensor, settings, observed, Model(table, places, rules), limit, first)
 
 
 def _check(sensor: Sensor, scene: Scene, settings: TrackingSettings) -> None:
@@ -237,13 +168,6 @@ def _check(sensor: Sensor, scene: Scene, settings: TrackingSettings) -> None:
         )
 
 
-def _units(sensor: Sensor, by_rate: bool) -> tuple[float, float]:
-    if by_rate:
-        assert sensor.noise.derivative is not None  # noqa: S101  # checked before
-        return sensor.noise.derivative
-    return sensor.noise.read
-
-
 def _law(scene: Scene, centre: Terms) -> Any:
     """Return the law of ranges; of one with unknowns of its own the support alone."""
     law = centre.ranges.copy()
@@ -253,11 +177,21 @@ def _law(scene: Scene, centre: Terms) -> Any:
     return law_of(law, 0)
 
 
-def _signature(*parts: Any) -> str:
+def _signature(table: ReadingsTable, places: Places, rules: Rules, hypotheses: Hypotheses) -> str:
     """Return a digest of everything that gives a state its meaning."""
     digest = hashlib.sha256()
-    for value in itertools.chain(*parts):
+    shapes = np.array([*hypotheses.x.shape, *hypotheses.X.shape])
+    for value in _leaves((table, places, rules, shapes)):
         array = np.asarray(value)
         digest.update(str((array.shape, array.dtype.str)).encode())
         digest.update(array.tobytes())
     return digest.hexdigest()[:16]
+
+
+def _leaves(value: Any) -> Iterator[Any]:
+    """Return the numbers and arrays of nested tuples, in order."""
+    if isinstance(value, tuple):
+        for part in value:
+            yield from _leaves(part)
+    else:
+        yield value

@@ -8,9 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate, linalg
 
-from inference.tracking.curve import add_factor, mass_bound, mean_at
-from inference.tracking.motion import motion_over, presence_over
-from inference.tracking.square_root import merge, merge_equals, move, update
+from inference.tracking.frame_density import Frame
+from inference.tracking.hypotheses import Hypotheses, scratch_for
+from inference.tracking.merging import merge, merge_equals
+from inference.tracking.motion import Motion, motion_over, presence_over
+from inference.tracking.places import mass_bound
+from inference.tracking.readings_table import mean_at
+from inference.tracking.roots import Root, add_factor
+from inference.tracking.square_root import Linear, move, update
 from inference.tracking.tracker import tracker
 from simulator.parameters import parameters_of
 from simulator.simulate import mean_readings
@@ -26,8 +31,8 @@ def test_add_factor_is_a_root_of_the_sum(
 ) -> None:
     lower = np.array([[root[0], 0.0], [root[1], root[2]]])
     vector = np.array([first, second])
-    new = add_factor(root, first, second)
-    made = np.array([[new[0], 0.0], [new[1], new[2]]])
+    new = add_factor(Root(*root), first, second)
+    made = np.array([[new.r11, 0.0], [new.r21, new.r22]])
     wanted = lower @ lower.T + np.outer(vector, vector)
     # rounding of squares: relative to the largest of them
     assert np.abs(made @ made.T - wanted).max() <= 1e-14 * max(wanted.max(), 1e-300)
@@ -38,15 +43,17 @@ def test_motion_is_that_of_an_integrated_ornstein_uhlenbeck_process(x: float) ->
     """Van Loan's matrix exponential; the short steps lose digits there, not here."""
     sd, time = 0.7, 2.0
     seconds = x * time
-    carry, decay, (a, b, c) = motion_over(seconds, sd, time)
+    rules = tracker(sensor_of(1e-4), scene_of(FOLDED)).model.rules
+    motion = motion_over(seconds, rules._replace(rate_sd=sd, rate_time=time))
+    a, b, c = motion.noise
     drift = np.array([[0.0, 1.0], [0.0, -1.0 / time]])
     noise = np.diag([0.0, 2.0 * sd * sd / time])
     block = linalg.expm(np.block([[-drift, noise], [np.zeros((2, 2)), drift.T]]) * seconds)
     step = block[2:, 2:].T
     made = np.array([[a * a, a * b], [a * b, b * b + c * c]])
     wanted = step @ block[:2, 2:]
-    assert carry == pytest.approx(step[0, 1], rel=1e-12)
-    assert decay == pytest.approx(step[1, 1], rel=1e-12)
+    assert motion.carry == pytest.approx(step[0, 1], rel=1e-12)
+    assert motion.decay == pytest.approx(step[1, 1], rel=1e-12)
     if x > 1e-3:
         assert made == pytest.approx(wanted, rel=1e-9)
     else:
@@ -66,27 +73,30 @@ def test_presence_is_a_markov_chain(seconds: float, leave: float, arrive: float)
     assert chance.stayed == pytest.approx(math.exp(-leave * seconds), rel=1e-9, abs=1e-15)
 
 
-def _random(rng: np.random.Generator, n: int, p: int, rows: int = 4):  # type: ignore[no-untyped-def]
+def _random(rng: np.random.Generator, n: int, p: int, rows: int = 4) -> Hypotheses:
     x = rng.standard_normal((rows, n))
     X = rng.standard_normal((rows, n, n + p))
     for row in X:
         row[:, :n] = np.tril(row[:, :n])
-    return x, X
+    return Hypotheses(x, X, np.zeros(rows), np.zeros(4))
 
 
 @pytest.mark.parametrize(("n", "p"), [(2, 0), (4, 0), (2, 3), (4, 3)])
-def test_steps_are_those_of_a_filter_that_considers_the_globals(n: int, p: int) -> None:
+def test_steps_are_those_of_a_filter_that_considers_the_nuisance(n: int, p: int) -> None:
     rng = np.random.default_rng(n + p)
-    x, X = _random(rng, n, p)
-    work, factors = np.zeros((n, 4 * n + n + p + 4)), np.zeros((4, n + p))
+    of = _random(rng, n, p)
+    x, X, scratch = of.x, of.X, scratch_for(of)
     mean, root = x[1].copy(), X[1].copy()
     # time
-    carry, decay, noise, drift = 0.3, 0.8, (0.2, 0.1, 0.4), (0.05, 0.07)
-    move(x, X, 1, carry, decay, noise, drift[0], drift[1], work)
+    motion = Motion(0.3, 0.8, Root(0.2, 0.1, 0.4), 0.05, 0.07)
+    move(of, 1, motion, scratch.work)
     F = np.eye(n)
-    F[0, 1], F[1, 1] = carry, decay
-    lower = np.array([[noise[0], 0.0], [noise[1], noise[2]]])
-    Q = linalg.block_diag(lower @ lower.T, np.diag(np.square(drift)))[:n, :n]
+    F[0, 1], F[1, 1] = motion.carry, motion.decay
+    a, b, c = motion.noise
+    lower = np.array([[a, 0.0], [b, c]])
+    Q = linalg.block_diag(lower @ lower.T, np.diag(np.square([motion.drift1, motion.drift2])))[
+        :n, :n
+    ]
     P = F @ root @ root.T @ F.T + Q
     cross = F @ root[:, n:]
     mean = F @ mean
@@ -94,19 +104,19 @@ def test_steps_are_those_of_a_filter_that_considers_the_globals(n: int, p: int) 
     assert X[1] @ X[1].T == pytest.approx(P, abs=1e-13)
     assert X[1][:, n:] == pytest.approx(cross, abs=1e-13)
     assert np.all(np.triu(X[1][:, :n], 1) == 0.0)
-    # a frame: with the globals as further states whose rows of the gain are left out
-    columns = rng.standard_normal((2, p))
-    slopes, read = (1.3, -0.4, 0.2, 0.9), (0.6, 0.2, 0.5)
+    # a frame: with the nuisance parameters as further states whose rows of the gain are left out
+    scratch.nuisance[:] = rng.standard_normal((2, p))
+    readings = Linear(0.7, -1.1, 1.3, -0.4, 0.2, 0.9, Root(0.6, 0.2, 0.5))
     H = np.zeros((2, n))
-    H[:, 0], H[:, 1] = slopes[:2], slopes[2:]
+    H[:, 0], H[:, 1] = (1.3, -0.4), (0.2, 0.9)
     H[:, 2:] = np.eye(2)[:, : n - 2]
-    lower = np.array([[read[0], 0.0], [read[1], read[2]]])
-    both = np.hstack([H, columns])
+    lower = np.array([[0.6, 0.0], [0.2, 0.5]])
+    both = np.hstack([H, scratch.nuisance])
     joint = np.block([[P, cross], [cross.T, np.eye(p)]])
     S = both @ joint @ both.T + lower @ lower.T
     residual = np.array([0.7, -1.1])
     gain = (joint @ both.T @ linalg.inv(S))[:n]
-    surprise = update(x, X, 1, residual[0], residual[1], slopes, read, columns, work, factors)
+    surprise = update(of, 1, readings, scratch)
     assert surprise == pytest.approx(residual @ linalg.solve(S, residual), rel=1e-12)
     assert x[1] == pytest.approx(mean + gain @ residual, abs=1e-12)
     whole = np.vstack([gain, np.zeros((p, 2))])
@@ -119,13 +129,14 @@ def test_steps_are_those_of_a_filter_that_considers_the_globals(n: int, p: int) 
 @pytest.mark.parametrize(("n", "p"), [(2, 0), (4, 2)])
 def test_a_merger_keeps_mean_and_covariance(n: int, p: int) -> None:
     rng = np.random.default_rng(3)
-    x, X = _random(rng, n, p)
+    of = _random(rng, n, p)
+    x, X = of.x, of.X
     share = 0.3
     mean = 0.7 * x[1] + 0.3 * x[2]
     cross = 0.7 * X[1][:, n:] + 0.3 * X[2][:, n:]
     gap = x[2] - x[1]
     wanted = 0.7 * X[1] @ X[1].T + 0.3 * X[2] @ X[2].T + 0.21 * np.outer(gap, gap)
-    merge(x, X, 1, 2, share, 0, np.zeros((n, 4 * n + n + p + 4)))
+    merge(of, 1, 2, share, 0, scratch_for(of).work)
     assert x[1] == pytest.approx(mean, abs=1e-13)
     assert X[1] @ X[1].T == pytest.approx(wanted, abs=1e-13)
     assert X[1][:, n:] == pytest.approx(cross, abs=1e-13)
@@ -135,7 +146,8 @@ def test_equals_merge_and_others_do_not() -> None:
     x = np.array([[0.0, 0.0], [1.0, 0.0], [1.01, 0.0], [2.0, 0.0], [0.99, 0.0]])
     X = np.repeat(np.diag([0.1, 0.1])[None], 5, axis=0)
     weight = np.array([0.0, 0.5, 0.2, 1e-3, 0.299])
-    left = merge_equals(x, X, weight, 4, 0.05, np.zeros((2, 20)))
+    of = Hypotheses(x, X, weight, np.zeros(4))
+    left = merge_equals(of, 4, 0.05, scratch_for(of).work)
     assert left == 2
     assert weight[1:3] == pytest.approx([0.999, 1e-3])
     assert x[2, 0] == 2.0
@@ -144,11 +156,11 @@ def test_equals_merge_and_others_do_not() -> None:
 @pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
 def test_the_table_holds_the_curve_within_its_noise(kind: str) -> None:
     sensor, scene = sensor_of(1e-7, kind), scene_of(FOLDED)
-    curve = tracker(sensor, scene).curve
+    table = tracker(sensor, scene).model.table
     terms = parameters_of(sensor, scene).terms(np.zeros((1, 0)))
-    u = np.linspace(curve.start, curve.end, 4321)
+    u = np.linspace(table.start, table.end, 4321)
     exact = mean_readings(sensor, terms, np.exp(u)) / 1e-7
-    made = np.array([mean_at(at, curve) for at in u])
+    made = np.array([mean_at(at, table) for at in u])
     assert np.abs(made[:, :2] - exact).max() < 0.02
     slope = np.gradient(exact, u, axis=0)[1:-1]
     assert made[1:-1, 2:] == pytest.approx(slope, abs=1e-2 * np.abs(slope).max())
@@ -160,16 +172,16 @@ def test_the_mass_of_a_new_object_is_bounded(read: float, gain: float) -> None:
     """Readings on the curve and off it: the bound is above the integral, and not far above it."""
     rng = np.random.default_rng(8)
     sensor, scene = sensor_of(read), scene_of(FOLDED)
-    model = tracker(sensor, scene)
+    model = tracker(sensor, scene).model
     # 30 points a standard deviation also where the curve is fastest
-    grid = np.linspace(model.curve.start, model.curve.end, 2_000_001)
+    grid = np.linspace(model.table.start, model.table.end, 2_000_001)
     terms = parameters_of(sensor, scene).terms(np.zeros((1, 0)))
     table = gain * mean_readings(sensor, terms, np.exp(grid)) / read
     for _ in range(8):
         at = table[rng.integers(len(table))] + rng.standard_normal(2) * rng.choice([1, 10])
         density = np.exp(-0.5 * ((table - at) ** 2).sum(axis=1))
         exact = integrate.trapezoid(density, grid) / (grid[-1] - grid[0])
-        bound = mass_bound(at[0], at[1], gain, 2, model.curve, model.places)
+        bound = mass_bound(Frame(at[0], at[1], gain), 2, model.table, model.places)
         assert bound >= exact * (1 - 1e-6)
         if exact > 1e-6:
             assert bound < 100 * exact

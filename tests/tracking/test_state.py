@@ -6,6 +6,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from inference.tracking.hypotheses import COUNT
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import state_from_bytes, state_to_bytes
 from inference.tracking.track import step
@@ -22,13 +23,15 @@ def test_states_of_another_shape_are_refused_before_any_kernel_sees_them() -> No
     frames = frames_of(np.zeros((1, 2)))
     with pytest.raises(InvalidInputError, match="/state"):
         step(one, many.first, frames)
-    cut = dataclasses.replace(one.first, numbers=one.first.numbers[:2])
+    first = one.first.hypotheses
+    cut = dataclasses.replace(one.first, hypotheses=first._replace(numbers=first.numbers[:2]))
     with pytest.raises(InvalidInputError, match="numbers"):
         step(one, cut, frames)
-    numbers = one.first.numbers.copy()
-    numbers[-1] = 3.0
+    numbers = first.numbers.copy()
+    numbers[COUNT] = 3.0
+    wrong = dataclasses.replace(one.first, hypotheses=first._replace(numbers=numbers))
     with pytest.raises(InvalidInputError, match="counts hypotheses"):
-        step(one, dataclasses.replace(one.first, numbers=numbers), frames)
+        step(one, wrong, frames)
 
 
 def test_bytes_with_something_missing_or_changed_are_refused() -> None:

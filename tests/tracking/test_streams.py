@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from inference.estimates import Status
-from inference.tracking.columns import discrepancy_shapes
+from inference.tracking.nuisance_jacobian import discrepancy_shapes
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import state_from_bytes
 from inference.tracking.track import step, track
@@ -146,7 +146,7 @@ def test_unknown_crosstalk_is_learnt_from_its_prior() -> None:
 def test_uncertain_globals_do_not_average_down(spread: float, observables: Any) -> None:
     """Draws of c0 and c2; the object stands still for 100 frames. Two bands of 1 in 10,000 each.
 
-    Whatever the number of frames, the error that the globals cause stays; what the noise adds goes.
+    Whatever the number of frames, the error that the scene causes stays; what the noise adds goes.
     """
     count = 200
     sensor = sensor_of(SNR_100 / 10)
@@ -356,7 +356,7 @@ def test_a_stroke_is_a_support_and_a_static_object_stands_still() -> None:
     sensor = sensor_of(SNR_100)
     stroke = scene_of(PLATE, range_m={"prior": "stroke", "low": 0.2, "high": 2.0})
     model = tracker(sensor, stroke)
-    assert np.exp(model.curve.start) == pytest.approx(0.2)
+    assert np.exp(model.model.table.start) == pytest.approx(0.2)
     static = scene_of(PLATE, motion="static")
     readings = read(sensor, static, np.full(100, 0.7), np.random.default_rng(1))
     result = track(sensor, static, frames_of(readings), TrackingSettings(visit_s=1e6))

@@ -1,62 +1,61 @@
-"""A peak of the density along the range: its top, and where it ends."""
+"""One mode of a frame's density along the range: its top, and where it ends."""
 
 import math
+from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from inference.tracking.curve import Curve, Prior, Triple, expected_at, log_density
+from inference.tracking.frame_density import Frame, Prior, expected_at, log_density
+from inference.tracking.readings_table import ReadingsTable
+from inference.tracking.roots import Root
 from simulator.compiled import compiled
 
-__all__ = ["climb", "climb_plain", "edge"]
-
-Array = NDArray[np.float64]
+__all__ = ["Bracket", "edge", "mode_by_differences", "mode_of_plain"]
 
 _CLOSE = 0.05  # standard deviations within which a mode has to be found
 _DROP = 18.0  # nats below the top where a numerical integral ends
 
 
+class Bracket(NamedTuple):
+    """Where to look for a mode: a start, and an interval that holds it; log range."""
+
+    start: float
+    low: float
+    high: float
+
+
 @compiled
-def climb_plain(
-    u: float,
-    low: float,
-    high: float,
-    first: float,
-    second: float,
-    prior: Prior,
-    root: Triple,
-    curve: Curve,
+def mode_of_plain(
+    bracket: Bracket, frame: Frame, prior: Prior, root: Root, table: ReadingsTable
 ) -> tuple[float, float]:
-    """Climb by bracketed Gauss-Newton where the covariance is constant.
+    """Find a mode by bracketed Gauss-Newton where the covariance is constant.
 
     Parameters
     ----------
-    u, low, high : float
-        Start and bracket, log range.
-    first, second : float
-        Readings in units of the read noise.
-    prior, curve
+    bracket : Bracket
+        Where to look.
+    frame, prior, table
         As for `log_density`.
-    root : (float, float, float)
-        Triangular root of the covariance of the readings.
+    root : Root
+        Of the covariance of the readings.
 
     Returns
     -------
     (float, float)
         The mode and its scale.
     """
+    position, added, gain = prior.position, prior.added, frame.gain
+    u, low, high = bracket
     curvature = 0.0
     moved = high - low
     for _ in range(60):
-        value1, value2, slope1, slope2 = expected_at(u, prior, curve)
-        away = 0.0 if prior.born else u - prior.centre
-        e1 = first - prior.gain * value1 - prior.offset1 - prior.slope1 * away
-        e2 = second - prior.gain * value2 - prior.offset2 - prior.slope2 * away
-        t1 = (prior.gain * slope1 + prior.slope1) / root[0]
-        t2 = (prior.gain * slope2 + prior.slope2 - root[1] * t1) / root[2]
-        z1 = e1 / root[0]
-        z2 = (e2 - root[1] * z1) / root[2]
-        precision = 0.0 if prior.born else prior.precision
+        value1, value2, slope1, slope2 = expected_at(u, prior, table)
+        away = 0.0 if position.born else u - position.centre
+        e1 = frame.first - gain * value1 - added.offset1 - added.slope1 * away
+        e2 = frame.second - gain * value2 - added.offset2 - added.slope2 * away
+        t1 = (gain * slope1 + added.slope1) / root.r11
+        t2 = (gain * slope2 + added.slope2 - root.r21 * t1) / root.r22
+        z1 = e1 / root.r11
+        z2 = (e2 - root.r21 * z1) / root.r22
+        precision = 0.0 if position.born else position.precision
         slope = t1 * z1 + t2 * z2 - away * precision
         curvature = t1 * t1 + t2 * t2 + precision
         if slope > 0.0:
@@ -76,26 +75,18 @@ def climb_plain(
 
 
 @compiled
-def climb(
-    u: float,
-    low: float,
-    high: float,
-    scale: float,
-    first: float,
-    second: float,
-    prior: Prior,
-    spread: Array,
-    curve: Curve,
+def mode_by_differences(
+    bracket: Bracket, scale: float, frame: Frame, prior: Prior, table: ReadingsTable
 ) -> tuple[float, float]:
-    """Climb by bracketed Newton with differences: the covariance changes along the way.
+    """Find a mode by bracketed Newton with differences: the covariance changes along the way.
 
     Parameters
     ----------
-    u, low, high : float
-        Start and bracket, log range.
+    bracket : Bracket
+        Where to look.
     scale : float
-        A first guess of the width of the peak.
-    first, second, prior, spread, curve
+        A first guess of the width of the mode.
+    frame, prior, table
         As for `log_density`.
 
     Returns
@@ -103,12 +94,13 @@ def climb(
     (float, float)
         The mode and its scale.
     """
+    u, low, high = bracket
     moved, width = high - low, high - low
     h = 0.3 * scale
     for _ in range(60):
-        middle = log_density(u, first, second, prior, spread, curve)
-        right = log_density(u + h, first, second, prior, spread, curve)
-        left = log_density(u - h, first, second, prior, spread, curve)
+        middle = log_density(u, frame, prior, table)
+        right = log_density(u + h, frame, prior, table)
+        left = log_density(u - h, frame, prior, table)
         if left == -math.inf or right == -math.inf:
             # at an end of the support: one side alone tells the way
             if max(left, right) <= middle and h < 1e-3 * width:
@@ -128,7 +120,7 @@ def climb(
         if curvature > 0.0:
             scale = 1.0 / math.sqrt(curvature)
             trial = u + slope / curvature
-            # steps of the differences and of the peak must be alike before either is believed
+            # steps of the differences and of the mode must be alike before either is believed
             if abs(trial - u) < _CLOSE * scale and 0.02 * scale < h < scale:
                 break
             h = min(0.3 * scale, 3.0 * h)
@@ -149,11 +141,9 @@ def edge(
     top: float,
     end: float,
     scale: float,
-    first: float,
-    second: float,
+    frame: Frame,
     prior: Prior,
-    spread: Array,
-    curve: Curve,
+    table: ReadingsTable,
 ) -> float:
     """Return where the density has fallen to nothing on the way from a mode to an end.
 
@@ -165,14 +155,14 @@ def edge(
         Where to stop at the latest, log range.
     scale : float
         Of the first step.
-    first, second, prior, spread, curve
+    frame, prior, table
         As for `log_density`.
     """
     step = math.copysign(scale, end - u)
     at = u
     while abs(end - at) > abs(step):
         at += step
-        if log_density(at, first, second, prior, spread, curve) < top - _DROP:
+        if log_density(at, frame, prior, table) < top - _DROP:
             return at
         step *= 1.5
     return end

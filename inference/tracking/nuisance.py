@@ -1,4 +1,4 @@
-"""What is known of the scene besides the range: a centre, and independent directions around it."""
+"""Nuisance parameters: a centre of what is not the range, and independent directions around it."""
 
 import dataclasses
 
@@ -9,7 +9,7 @@ from inference.posterior.answer.posterior import Posterior
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.parameters import Parameters, Terms
 
-__all__ = ["Globals", "globals_of"]
+__all__ = ["Nuisance", "nuisance_of"]
 
 Array = NDArray[np.float64]
 
@@ -17,8 +17,8 @@ _FEWEST_DRAWS = 20  # a direction
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Globals:
-    """A normal law of the unknowns, in the coordinates in which their prior is normal.
+class Nuisance:
+    """What is known of the unknowns: a normal in the coordinates in which their prior is normal.
 
     Attributes
     ----------
@@ -34,11 +34,11 @@ class Globals:
     minus: tuple[Terms, ...]
 
 
-def globals_of(
+def nuisance_of(
     parameters: Parameters,
     posterior: Posterior | Array | None,
     learnt: tuple[str, ...],
-) -> Globals:
+) -> Nuisance:
     """Summarise what is known of the unknowns.
 
     Parameters
@@ -52,7 +52,7 @@ def globals_of(
 
     Returns
     -------
-    Globals
+    Nuisance
 
     Raises
     ------
@@ -70,7 +70,7 @@ def globals_of(
                 f"{', '.join(free)} unknown: a tracker needs numbers or a posterior; infer one "
                 "from frames of this scene first, and pass it"
             )
-        return Globals(parameters.terms(origin[None]), (), ())
+        return Nuisance(parameters.terms(origin[None]), (), ())
     draws = _draws(parameters, posterior)
     with np.errstate(all="ignore"):
         z = parameters.standard(draws)
@@ -80,7 +80,7 @@ def globals_of(
     _, sizes, directions = np.linalg.svd(z - centre, full_matrices=False)
     roots = directions * (sizes / np.sqrt(len(z) - 1.0))[:, None]
     roots = roots[sizes > 1e-12 * sizes.max(initial=0.0)]
-    return Globals(
+    return Nuisance(
         parameters.terms(centre[None]),
         tuple(parameters.terms((centre + root)[None]) for root in roots),
         tuple(parameters.terms((centre - root)[None]) for root in roots),

@@ -1,0 +1,111 @@
+"""What a frame may make of the hypotheses: a list of modes with their masses."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.compiled import compiled
+
+__all__ = [
+    "NEW",
+    "Candidate",
+    "Candidates",
+    "add_candidate",
+    "candidates_for",
+    "heaviest_of",
+    "log_mass_of",
+    "take",
+]
+
+Array = NDArray[np.float64]
+
+NEW = 0
+"""Parent of a candidate that is an object that has just come."""
+
+
+class Candidate(NamedTuple):
+    """One mode of a frame's density under one hypothesis.
+
+    Attributes
+    ----------
+    log_mass : float
+        Log of what the density integrates to.
+    mean, sd : float
+        Of u = log r; a standard deviation of 0 was not integrated.
+    mode : float
+        Where the density is largest, log range.
+    parent : int
+        Row of the hypothesis, `NEW`, or less than 0: the frame is an outlier and leaves hypothesis
+        ``-parent`` as it was.
+    """
+
+    log_mass: float
+    mean: float
+    sd: float
+    mode: float
+    parent: int
+
+
+class Candidates(NamedTuple):
+    """Room for candidates, an array for each attribute of `Candidate`, shape (capacity,)."""
+
+    log_mass: Array
+    mean: Array
+    sd: Array
+    mode: Array
+    parent: NDArray[np.int64]
+
+
+@compiled
+def candidates_for(capacity: int) -> Candidates:
+    """Return room for as many candidates."""
+    return Candidates(
+        np.empty(capacity),
+        np.empty(capacity),
+        np.empty(capacity),
+        np.empty(capacity),
+        np.empty(capacity, dtype=np.int64),
+    )
+
+
+@compiled
+def add_candidate(to: Candidates, count: int, one: Candidate) -> int:
+    """Append a candidate, where there is no room in the place of the lightest; the new length."""
+    place = count
+    if count == to.log_mass.size:
+        place = 0
+        for j in range(count):
+            if to.log_mass[j] < to.log_mass[place]:
+                place = j
+    to.log_mass[place], to.mean[place], to.sd[place] = one.log_mass, one.mean, one.sd
+    to.mode[place], to.parent[place] = one.mode, one.parent
+    return max(count, place + 1)
+
+
+@compiled
+def log_mass_of(of: Candidates, first: int, last: int, least: float) -> float:
+    """Return the greatest log mass from one place to another, or ``least`` where none is."""
+    best = least
+    for j in range(first, last):
+        best = max(best, of.log_mass[j])
+    return best
+
+
+@compiled
+def heaviest_of(of: Candidates, count: int) -> int:
+    """Return the place of the heaviest candidate; there must be one."""
+    top = 0
+    for j in range(1, count):
+        if of.log_mass[j] > of.log_mass[top]:
+            top = j
+    return top
+
+
+@compiled
+def take(of: Candidates, place: int) -> Candidate:
+    """Return a candidate, which then weighs nothing."""
+    log_mass = of.log_mass[place]
+    of.log_mass[place] = -math.inf
+    return Candidate(log_mass, of.mean[place], of.sd[place], of.mode[place], of.parent[place])

@@ -1,0 +1,115 @@
+"""One frame and the empty scene: how well it explains the frame, and what crosstalk it tells."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.tracking.frame_density import Frame
+from inference.tracking.hypotheses import (
+    CROSSTALK1,
+    CROSSTALK2,
+    Hypotheses,
+    Scratch,
+    learns_crosstalk,
+)
+from inference.tracking.readings_table import FIRST, SECOND, ReadingsTable, noise_root
+from inference.tracking.roots import UNIT, Root, add_factor, solve
+from inference.tracking.square_root import Linear, update
+from simulator.compiled import compiled
+
+__all__ = ["Expected", "expect_empty", "learn_empty"]
+
+Array = NDArray[np.float64]
+
+
+class Expected(NamedTuple):
+    """What the empty scene expects of a frame.
+
+    Attributes
+    ----------
+    log_density : float
+        Of the frame, without the log of 2 pi.
+    surprise : float
+        Normalised innovation squared.
+    mean1, mean2 : float
+        Expected readings.
+    noise : Root
+        Of their noise's covariance.
+    """
+
+    log_density: float
+    surprise: float
+    mean1: float
+    mean2: float
+    noise: Root
+
+
+@compiled
+def expect_empty(
+    of: Hypotheses, frame: Frame, table: ReadingsTable, empty: Array, nuisance: Array
+) -> Expected:
+    """Hold a frame against the empty scene.
+
+    Parameters
+    ----------
+    of : Hypotheses
+        Row 0 is the empty scene.
+    frame : Frame
+        The frame.
+    table : ReadingsTable
+        Known crosstalk, and the noise.
+    empty : ndarray, shape (2, 1 + p)
+        Readings of the empty scene without crosstalk, and their change with the nuisance
+        parameters.
+    nuisance : ndarray, shape (2, p)
+        Filled with that change in this frame.
+    """
+    x, X, gain = of.x, of.X, frame.gain
+    n, m = X.shape[1], X.shape[2]
+    learns = learns_crosstalk(of)
+    m1 = gain * empty[FIRST, 0] + table.crosstalk1
+    m2 = gain * empty[SECOND, 0] + table.crosstalk2
+    if learns:
+        m1, m2 = m1 + x[0, CROSSTALK1], m2 + x[0, CROSSTALK2]
+    noise = UNIT
+    if not table.noise.plain and not table.by_rate:
+        noise = noise_root(m1, m2, 0.0, 0.0, table.noise)
+    root = noise
+    for j in range(m):
+        f1, f2 = 0.0, 0.0
+        if learns:
+            f1, f2 = X[0, CROSSTALK1, j], X[0, CROSSTALK2, j]
+        if j >= n:
+            g1, g2 = gain * empty[FIRST, 1 + j - n], gain * empty[SECOND, 1 + j - n]
+            nuisance[FIRST, j - n], nuisance[SECOND, j - n] = g1, g2
+            f1, f2 = f1 + g1, f2 + g2
+        root = add_factor(root, f1, f2)
+    e1, e2 = frame.first - m1, frame.second - m2
+    pull1, pull2 = solve(root, e1, e2)
+    surprise = e1 * pull1 + e2 * pull2
+    log_density = -0.5 * surprise - math.log(root.r11 * root.r22)
+    return Expected(log_density, surprise, m1, m2, noise)
+
+
+@compiled
+def learn_empty(
+    of: Hypotheses, frame: Frame, table: ReadingsTable, empty: Array, scratch: Scratch
+) -> float:
+    """Learn the crosstalk from a frame of the empty scene, where it is learnt; its surprise.
+
+    Parameters
+    ----------
+    of : Hypotheses
+        Row 0 is the empty scene; changed in place.
+    frame, table, empty
+        As for `expect_empty`.
+    scratch : Scratch
+        Overwritten.
+    """
+    expected = expect_empty(of, frame, table, empty, scratch.nuisance)
+    if learns_crosstalk(of):
+        e1, e2 = frame.first - expected.mean1, frame.second - expected.mean2
+        update(of, 0, Linear(e1, e2, 0.0, 0.0, 0.0, 0.0, expected.noise), scratch)
+    return expected.surprise

@@ -1,0 +1,189 @@
+"""One hypothesis and one frame: what it becomes."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.tracking.candidates import Candidate
+from inference.tracking.frame_density import Frame, Prior
+from inference.tracking.hypotheses import (
+    ANCHOR,
+    Hypotheses,
+    Scratch,
+    U,
+    V,
+    learns_crosstalk,
+    variance_of,
+)
+from inference.tracking.readings_table import (
+    FIRST,
+    SECOND,
+    ReadingsTable,
+    cell_of,
+    mean_at,
+    noise_root,
+    nuisance_at,
+    object_at,
+)
+from inference.tracking.roots import UNIT
+from inference.tracking.shared_error import NOT_SHARED, follow, straighten
+from inference.tracking.square_root import Linear, update
+from simulator.compiled import compiled
+
+__all__ = ["learn"]
+
+Array = NDArray[np.float64]
+
+_BROAD = 10.0  # standard deviation of log r before the first frame: vague, but no more
+
+
+class Tangent(NamedTuple):
+    """The curve of readings at one mode.
+
+    Attributes
+    ----------
+    u : float
+        The mode, log range.
+    at : float
+        Where the curve is taken, log range.
+    value1, value2, slope1, slope2 : float
+        Mean readings without crosstalk, and their derivatives along u.
+    """
+
+    u: float
+    at: float
+    value1: float
+    value2: float
+    slope1: float
+    slope2: float
+
+
+@compiled
+def _begin(of: Hypotheses, row: int, u: float, rate_sd: float) -> None:
+    """Begin a hypothesis: anywhere near u, so vaguely that the frame alone speaks."""
+    x, X = of.x, of.X
+    x[row, U], x[row, V] = u, 0.0
+    if learns_crosstalk(of):
+        x[row, ANCHOR] = u
+    for j in range(X.shape[2]):
+        X[row, U, j], X[row, V, j] = 0.0, 0.0
+    X[row, U, U], X[row, V, V] = _BROAD, rate_sd
+
+
+@compiled
+def _of_derivatives(
+    of: Hypotheses, row: int, tangent: Tangent, frame: Frame, prior: Prior
+) -> Linear:
+    """Linearise derivatives in time at a mode, and at the rate that the frame says there."""
+    x, t, expected = of.x, tangent, prior.rate
+    away = 0.0 if prior.position.born else t.u - prior.position.centre
+    mean = expected.mean + expected.slope * away
+    square = expected.sd * expected.sd
+    along = t.value1 * (frame.first - t.value1 * mean) + t.value2 * (frame.second - t.value2 * mean)
+    size = t.value1 * t.value1 + t.value2 * t.value2
+    rate = mean + square * along / (1.0 + square * size)
+    by_u1, by_u2 = t.slope1 * rate, t.slope2 * rate
+    e1 = frame.first - t.value1 * x[row, V] - by_u1 * (x[row, U] - t.u)
+    e2 = frame.second - t.value2 * x[row, V] - by_u2 * (x[row, U] - t.u)
+    return Linear(e1, e2, by_u1, by_u2, t.value1, t.value2, UNIT)
+
+
+@compiled
+def _of_readings(
+    of: Hypotheses,
+    row: int,
+    tangent: Tangent,
+    frame: Frame,
+    prior: Prior,
+    table: ReadingsTable,
+    nuisance: Array,
+) -> Linear:
+    """Linearise readings at a mode; ``nuisance`` is filled with their nuisance Jacobian."""
+    x, t, gain = of.x, tangent, frame.gain
+    m1, m2 = t.value1 + prior.added.offset1, t.value2 + prior.added.offset2
+    noise = UNIT
+    if not table.noise.plain:
+        o1, o2 = object_at(t.u, table)
+        noise = noise_root(m1, m2, gain * o1, gain * o2, table.noise)
+    i, part = cell_of(t.u, table)
+    for j in range(nuisance.shape[1]):
+        g1, g2 = nuisance_at(i, part, j, table)
+        nuisance[FIRST, j], nuisance[SECOND, j] = gain * g1, gain * g2
+    e1 = frame.first - m1 - t.slope1 * (x[row, U] - t.at)
+    e2 = frame.second - m2 - t.slope2 * (x[row, U] - t.at)
+    return Linear(e1, e2, t.slope1, t.slope2, 0.0, 0.0, noise)
+
+
+@compiled
+def _take_moments(of: Hypotheses, row: int, mean: float, sd: float) -> None:
+    """Give u the mean and standard deviation that were integrated along the curve, if they were."""
+    x, X = of.x, of.X
+    n, variance = X.shape[1], variance_of(of, row, U)
+    if not (variance > 0.0 and sd > 0.0):
+        return
+    stretch = sd / math.sqrt(variance) - 1.0
+    shift = mean - x[row, U]
+    for i in range(n - 1, -1, -1):
+        slope = 0.0
+        for j in range(n):
+            slope += X[row, i, j] * X[row, U, j]
+        slope /= variance
+        x[row, i] += slope * shift
+        for j in range(n):
+            X[row, i, j] += slope * stretch * X[row, U, j]
+
+
+@compiled
+def learn(
+    of: Hypotheses,
+    row: int,
+    candidate: Candidate,
+    frame: Frame,
+    prior: Prior,
+    table: ReadingsTable,
+    scratch: Scratch,
+) -> float:
+    """Update a hypothesis at one mode of a frame.
+
+    A Kalman step, linear at the mode, says what the frame tells about rate and crosstalk; the mean
+    and standard deviation of u are then those that were integrated along the curve, if they were.
+
+    Parameters
+    ----------
+    of, row : Hypotheses, int
+        The hypothesis as it was predicted; changed in place.
+    candidate : Candidate
+        The mode that is taken.
+    frame, prior, table
+        As for `log_density`.
+    scratch : Scratch
+        Overwritten.
+
+    Returns
+    -------
+    float
+        Normalised innovation squared.
+    """
+    u, gain, position = candidate.mode, frame.gain, prior.position
+    # where the curve is taken: as far as the error that u shares with the crosstalk goes, at u's
+    # prediction
+    at = u if position.born else position.centre + (1.0 - prior.share) * (u - position.centre)
+    value1, value2, d1, d2 = mean_at(at, table)
+    tangent = Tangent(u, at, gain * value1, gain * value2, gain * d1, gain * d2)
+    shares = learns_crosstalk(of) and not position.born
+    shared = NOT_SHARED
+    if shares:
+        shared = straighten(of, row, gain, tangent.slope1, tangent.slope2, table)
+    if position.born:
+        _begin(of, row, u, prior.rate.sd)
+    if table.by_rate:
+        readings = _of_derivatives(of, row, tangent, frame, prior)
+    else:
+        readings = _of_readings(of, row, tangent, frame, prior, table, scratch.nuisance)
+    surprise = update(of, row, readings, scratch)
+    if shares:
+        follow(of, row, shared, gain, table)
+    _take_moments(of, row, candidate.mean, candidate.sd)
+    return surprise + 1.0 if position.born else surprise

@@ -1,0 +1,175 @@
+"""The mass of one mode along the range, as one Gaussian or as several."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.tracking.candidates import Candidate, Candidates, add_candidate
+from inference.tracking.frame_density import Frame, Prior, log_density
+from inference.tracking.mode_search import edge
+from inference.tracking.readings_table import ReadingsTable
+from simulator.compiled import compiled
+
+__all__ = ["Mode", "integrate"]
+
+Array = NDArray[np.float64]
+
+_GAUSSIAN = 0.3  # nats by which a mode may leave its parabola at sqrt(3) standard deviations
+_WINDOWS = 2  # on either side of the middle one
+_NEGLIGIBLE_WINDOW = 1e-3  # share of a mode below which a window's part is left out
+_INTERVALS = 32  # of Simpson's rule on either side of a mode
+_ROOT3 = math.sqrt(3.0)
+_LOG_ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
+
+
+class Mode(NamedTuple):
+    """One mode of a density along the range.
+
+    Attributes
+    ----------
+    u, scale : float
+        Its place and its scale, log range.
+    low, high : float
+        The valleys on either side, log range.
+    """
+
+    u: float
+    scale: float
+    low: float
+    high: float
+
+
+@compiled
+def _simpson(
+    aways: Array,
+    masses: Array,
+    top: float,
+    mode: Mode,
+    frame: Frame,
+    prior: Prior,
+    table: ReadingsTable,
+) -> tuple[float, float, float]:
+    """Fill distances from a mode and their masses; their sum, mean and standard deviation."""
+    u, scale = mode.u, mode.scale
+    begin = edge(u, top, mode.low, scale, frame, prior, table)
+    end = edge(u, top, mode.high, scale, frame, prior, table)
+    total, mean, square = 0.0, 0.0, 0.0
+    for side in range(2):
+        width = ((begin if side == 0 else end) - u) / _INTERVALS
+        for k in range(_INTERVALS + 1):
+            weight = 1.0 if k in (0, _INTERVALS) else (4.0 if k % 2 == 1 else 2.0)
+            away = k * width
+            density = log_density(u + away, frame, prior, table)
+            part = weight * abs(width) / 3.0 * math.exp(min(density - top, 50.0))
+            row = side * (_INTERVALS + 1) + k
+            aways[row], masses[row] = away, part
+            total += part
+            mean += part * away
+            square += part * away * away
+    if not total > 0.0:
+        return 0.0, 0.0, 0.0
+    mean /= total
+    return total, mean, math.sqrt(max(square / total - mean * mean, 0.0))
+
+
+@compiled
+def _divide(
+    to: Candidates,
+    count: int,
+    parent: int,
+    mode: Mode,
+    frame: Frame,
+    prior: Prior,
+    table: ReadingsTable,
+) -> int:
+    """Append one mode that is not near a Gaussian, as at folds and ends of the support.
+
+    Simpson's rule gives its moments. It is then divided by smooth windows, a standard deviation
+    apart, into parts that are near enough to Gaussians.
+    """
+    u = mode.u
+    top = log_density(u, frame, prior, table)
+    aways, masses = np.empty(2 * _INTERVALS + 2), np.empty(2 * _INTERVALS + 2)
+    total, mean, sd = _simpson(aways, masses, top, mode, frame, prior, table)
+    if not total > 0.0:
+        return count
+    if not sd > 0.0:
+        log_mass = top + math.log(total)
+        return add_candidate(to, count, Candidate(log_mass, u + mean, sd, u + mean, parent))
+    for window in range(-_WINDOWS, _WINDOWS + 1):
+        share, shift, square = 0.0, 0.0, 0.0
+        for row in range(aways.size):
+            x = (aways[row] - mean) / sd
+            windows = 0.0
+            for other in range(-_WINDOWS, _WINDOWS + 1):
+                windows += math.exp(-0.5 * (x - other) ** 2)
+            part = masses[row] * math.exp(-0.5 * (x - window) ** 2) / windows
+            share += part
+            shift += part * x
+            square += part * x * x
+        if share > _NEGLIGIBLE_WINDOW * total:
+            shift /= share
+            own = sd * math.sqrt(max(square / share - shift * shift, 0.0))
+            at = u + mean + sd * shift
+            one = Candidate(top + math.log(share), at, own, at, parent)
+            count = add_candidate(to, count, one)
+    return count
+
+
+@compiled
+def integrate(
+    to: Candidates,
+    count: int,
+    parent: int,
+    mode: Mode,
+    frame: Frame,
+    prior: Prior,
+    table: ReadingsTable,
+) -> int:
+    """Append one mode between its valleys, with its log mass, mean and standard deviation.
+
+    Three Gauss-Hermite nodes where the mode is near a Gaussian, which is exact to the fifth power
+    of the distance.
+
+    Where u is wide because nuisance parameters or crosstalk are uncertain, only the mode is taken.
+    What they do to the readings is linear here, and the curve is not: integrated over a wide
+    density, the difference would pass for knowledge of the range, a little in every frame.
+
+    Parameters
+    ----------
+    to : Candidates
+        The list; where it is full, its lightest member gives way.
+    count : int
+        Its length so far.
+    parent : int
+        As in `Candidate`.
+    mode : Mode
+        The mode.
+    frame, prior, table
+        As for `log_density`.
+
+    Returns
+    -------
+    int
+        The new length.
+    """
+    u, scale = mode.u, mode.scale
+    if prior.added.spread.shape[1] > 2:
+        top = log_density(u, frame, prior, table)
+        log_mass = top + math.log(scale) + _LOG_ROOT_2PI
+        return add_candidate(to, count, Candidate(log_mass, u, 0.0, u, parent))
+    if u - _ROOT3 * scale >= mode.low and u + _ROOT3 * scale <= mode.high:
+        top = log_density(u, frame, prior, table)
+        left = log_density(u - _ROOT3 * scale, frame, prior, table) - top + 1.5
+        right = log_density(u + _ROOT3 * scale, frame, prior, table) - top + 1.5
+        if abs(left) < _GAUSSIAN and abs(right) < _GAUSSIAN:
+            left, right = math.exp(left), math.exp(right)
+            mass = (4.0 + left + right) / 6.0
+            shift = _ROOT3 * (right - left) / (6.0 * mass)
+            sd = scale * math.sqrt(0.5 * (left + right) / mass - shift * shift)
+            log_mass = top + math.log(mass * scale) + _LOG_ROOT_2PI
+            one = Candidate(log_mass, u + shift * scale, sd, u, parent)
+            return add_candidate(to, count, one)
+    return _divide(to, count, parent, mode, frame, prior, table)

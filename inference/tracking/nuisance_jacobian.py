@@ -1,0 +1,128 @@
+"""The nuisance Jacobian: what everything uncertain in the scene does to the readings."""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.tracking.nuisance import Nuisance
+from inference.tracking.tabulate import OBJECT, Knots, empty_readings, means_over
+from simulator.discrepancy import matern
+from simulator.parameters import Terms
+from simulator.scene import Scene
+from simulator.sensor import Sensor
+
+__all__ = ["NuisanceJacobian", "crosstalk_root", "discrepancy_shapes", "nuisance_jacobian"]
+
+Array = NDArray[np.float64]
+
+_FELT = 1e-3  # standard deviations of a reading that a direction must change to be carried along
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class NuisanceJacobian:
+    """Change of the readings with p independent standard normal nuisance parameters.
+
+    Attributes
+    ----------
+    along : ndarray, shape (knots, 2 p)
+        Of the readings along the range, in units of the noise.
+    empty : ndarray, shape (2, p)
+        Of those of an empty scene.
+    """
+
+    along: Array
+    empty: Array
+
+
+def nuisance_jacobian(
+    sensor: Sensor, scene: Scene, known: Nuisance, knots: Knots, scale: Array, with_crosstalk: bool
+) -> NuisanceJacobian:
+    """Return what each uncertain direction does to the readings, a standard deviation along it.
+
+    By the secant over both sides, not by a derivative: it is as far as the uncertainty goes.
+
+    Parameters
+    ----------
+    sensor, scene : Sensor, Scene
+        The scene; a discrepancy adds its shapes.
+    known : Nuisance
+        Centre and directions of what is uncertain.
+    knots : Knots
+        Where the readings are tabulated.
+    scale : ndarray, shape (2,)
+        From readings to units of the noise.
+    with_crosstalk : bool
+        Whether the crosstalk's own share is part of the change.
+
+    Returns
+    -------
+    NuisanceJacobian
+    """
+    along, empty = [], []
+    for plus, minus in zip(known.plus, known.minus, strict=True):
+        difference = means_over(knots.positions, sensor, plus, False) - means_over(
+            knots.positions, sensor, minus, False
+        )
+        change = (0.5 * difference)[:, :2] * scale
+        bare = empty_readings(sensor, plus, False) - empty_readings(sensor, minus, False)
+        bare = 0.5 * bare * scale
+        if with_crosstalk:
+            own = _crosstalk_change(plus, minus) * scale
+            change, bare = change + own, bare + own
+        if max(np.abs(change).max(), np.abs(bare).max()) > _FELT:
+            along.append(change)
+            empty.append(bare)
+    if scene.discrepancy is not None:
+        for shape in discrepancy_shapes(knots.positions, scene.discrepancy):
+            along.append(knots.means[:, OBJECT] * shape[:, None])
+            empty.append(np.zeros(2))
+    if not along:
+        return NuisanceJacobian(np.zeros((knots.positions.size, 0)), np.zeros((2, 0)))
+    return NuisanceJacobian(np.concatenate(along, axis=1), np.stack(empty, axis=1))
+
+
+def crosstalk_root(known: Nuisance, scale: Array) -> Array:
+    """Return a root of the crosstalk's covariance, shape (2, k), in units of the noise.
+
+    Parameters
+    ----------
+    known : Nuisance
+        With k directions.
+    scale : ndarray, shape (2,)
+        From readings to units of the noise.
+    """
+    pairs = zip(known.plus, known.minus, strict=True)
+    return np.array([_crosstalk_change(*pair) * scale for pair in pairs]).reshape(-1, 2).T
+
+
+def _crosstalk_change(plus: Terms, minus: Terms) -> Array:
+    """Return what one direction does to the crosstalk, shape (2,) [reading units]."""
+    if plus.crosstalk is None or minus.crosstalk is None:
+        return np.zeros(2)
+    return np.asarray(0.5 * (plus.crosstalk[0] - minus.crosstalk[0]))
+
+
+def discrepancy_shapes(positions: Array, sd: float) -> Array:
+    """Return the principal shapes of a smooth relative error of the object's flux.
+
+    Its covariance is `simulator.discrepancy.matern`. The shapes hold all but a thousandth of its
+    variance.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (n,)
+        u = log r.
+    sd : float
+        Standard deviation of the error.
+
+    Returns
+    -------
+    ndarray, shape (k, n)
+    """
+    nodes = np.linspace(positions[0], positions[-1], 200)
+    values, vectors = np.linalg.eigh(matern(nodes[:, None] - nodes))
+    values, vectors = values[::-1], vectors[:, ::-1]
+    kept = int(np.searchsorted(np.cumsum(values), 0.999 * values.sum())) + 1
+    shapes = sd * np.sqrt(values[:kept]) * vectors[:, :kept]
+    return np.array([np.interp(positions, nodes, shape) for shape in shapes.T])

@@ -1,0 +1,76 @@
+"""What a tracker reads of every frame, and the units in which it counts."""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.tracking.readings_table import ReadingsNoise
+from inference.tracking.settings import TrackingSettings
+from simulator.sensor import PulsedSensor, Sensor
+
+__all__ = ["Observed", "observed_of"]
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Observed:
+    """What is read of every frame.
+
+    Attributes
+    ----------
+    by_rate : bool
+        Whether derivatives in time are read, not the readings themselves.
+    units : (float, float)
+        Noise of the two observables, in which the kernels count [reading units, or a second].
+    used : (bool, bool)
+        Which of the two are used.
+    noise : ReadingsNoise
+        In those units.
+    """
+
+    by_rate: bool
+    units: tuple[float, float]
+    used: tuple[bool, bool]
+    noise: ReadingsNoise
+
+    @property
+    def scale(self) -> Array:
+        """From readings to units of the noise, shape (2,); 0 for what is not used."""
+        return _scale(self.units, self.used)
+
+    @property
+    def channels(self) -> int:
+        """How many of the two observables are used."""
+        return sum(self.used)
+
+
+def _scale(units: tuple[float, float], used: tuple[bool, bool]) -> Array:
+    return np.where(used, 1.0 / np.asarray(units), 0.0)
+
+
+def observed_of(sensor: Sensor, settings: TrackingSettings) -> Observed:
+    """Return what a tracker with these settings reads.
+
+    Parameters
+    ----------
+    sensor, settings : Sensor, TrackingSettings
+        That go together: derivatives are tracked only where their noise is known.
+    """
+    by_rate = settings.observables == "derivatives"
+    units = sensor.noise.read
+    if by_rate and sensor.noise.derivative is not None:
+        units = sensor.noise.derivative
+    used = (settings.observables != "w2", settings.observables != "w1")
+    relative, shot = (0.0, 0.0) if by_rate else (sensor.noise.relative, sensor.noise.shot)
+    scale1, scale2 = _scale(units, used).tolist()
+    noise = ReadingsNoise(
+        plain=relative == 0.0 and shot == 0.0,
+        shot1=shot * scale1,
+        shot2=shot * scale2,
+        ratio=units[0] / units[1],
+        relative=relative,
+        pulsed=isinstance(sensor, PulsedSensor),
+    )
+    return Observed(by_rate, units, used, noise)

@@ -1,0 +1,147 @@
+"""Where along the curve a frame can lie: places to look from, and a bound of what a place holds."""
+
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.tracking.frame_density import Frame
+from inference.tracking.readings_table import ReadingsTable, nuisance_count
+from simulator.compiled import compiled
+
+__all__ = ["Places", "Scan", "boxes_of", "mass_bound"]
+
+Array = NDArray[np.float64]
+
+_GROUP = 16  # boxes
+_UNSEEN = 120.0  # square of the distance beyond which a box holds nothing of a density
+_LEAST_SPEED = 0.7  # of the least speed at knots: between them it may be less
+# columns of a box
+_LOW1, _HIGH1, _LOW2, _HIGH2, _PROBABILITY, _MOST = range(6)
+
+
+class Scan(NamedTuple):
+    """Places along the curve between which it is near straight.
+
+    Attributes
+    ----------
+    positions : ndarray, shape (s,)
+        Their log ranges, ascending, both ends of the table among them.
+    next_one : ndarray of int, shape (knots,)
+        Index of the first of them at or after each knot.
+    """
+
+    positions: Array
+    next_one: NDArray[np.int64]
+
+
+class Places(NamedTuple):
+    """What goes with a table of readings, and is needed once a frame.
+
+    Attributes
+    ----------
+    scan : Scan
+        Where to look from.
+    empty : ndarray, shape (2, 1 + p)
+        Readings of the empty scene without crosstalk, and their change with the nuisance
+        parameters.
+    boxes : ndarray, shape (s - 1, 6)
+        Of every stretch between two places: least and greatest first and second reading, its prior
+        probability, and a bound of what it holds of any frame's density.
+    groups : ndarray, shape (g, 4)
+        Boxes around every 16 boxes.
+    """
+
+    scan: Scan
+    empty: Array
+    boxes: Array
+    groups: Array
+
+
+@compiled
+def _gap(value: float, low: float, high: float) -> float:
+    """Return the distance of a value from an interval."""
+    return max(low - value, value - high, 0.0)
+
+
+@compiled
+def _square_gap(y1: float, y2: float, boxes: Array, j: int) -> float:
+    """Return the square of the distance of two readings from a box."""
+    d1 = _gap(y1, boxes[j, _LOW1], boxes[j, _HIGH1])
+    d2 = _gap(y2, boxes[j, _LOW2], boxes[j, _HIGH2])
+    return d1 * d1 + d2 * d2
+
+
+@compiled
+def mass_bound(frame: Frame, states: int, table: ReadingsTable, places: Places) -> float:
+    """Return an upper bound of a frame's density averaged over the prior of the ranges.
+
+    A stretch of the curve lies in a box, and no reading is nearer to it than to the box; on a
+    stretch whose every piece advances along its chord the density integrates to at most
+    sqrt(2 pi) over the least speed. Where nuisance parameters or crosstalk are uncertain or the
+    noise depends on the range only that no density exceeds its top is used.
+
+    Parameters
+    ----------
+    frame : Frame
+        The frame.
+    states : int
+        Of a hypothesis: more than 2 where crosstalk is learnt.
+    table, places : ReadingsTable, Places
+        The scene.
+    """
+    if not table.noise.plain or table.by_rate or states > 2 or nuisance_count(table) > 0:
+        return 1.0
+    gain = frame.gain
+    y1, y2 = (frame.first - table.crosstalk1) / gain, (frame.second - table.crosstalk2) / gain
+    total = 0.0
+    farthest = _UNSEEN / gain / gain
+    groups, boxes = places.groups, places.boxes
+    for g in range(groups.shape[0]):
+        if _square_gap(y1, y2, groups, g) > farthest:
+            continue
+        for j in range(g * _GROUP, min((g + 1) * _GROUP, boxes.shape[0])):
+            square = _square_gap(y1, y2, boxes, j)
+            if square <= farthest:
+                near = boxes[j, _PROBABILITY] * math.exp(-0.5 * square * gain * gain)
+                total += min(near, boxes[j, _MOST] / gain)
+    return total + math.exp(-0.5 * _UNSEEN)
+
+
+def boxes_of(
+    positions: Array, means: Array, log_prior: Array, scan: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """Return the boxes and groups of `Places`.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (knots,)
+        u = log r.
+    means : ndarray, shape (knots, at least 4)
+        Mean readings in units of the noise, and their derivatives along u.
+    log_prior : ndarray, shape (knots,)
+        Log prior density of u.
+    scan : ndarray of int, shape (s,)
+        Indices of the knots between which the curve is near straight, ascending.
+    """
+    boxes = np.empty((scan.size - 1, 6))
+    for j, (a, b) in enumerate(itertools.pairwise(scan)):
+        curve, slopes = means[a : b + 1, :2], means[a : b + 1, 2:4]
+        low, high = curve.min(axis=0), curve.max(axis=0)
+        # the curve may leave the box of its knots a little
+        margin = 0.05 + 0.05 * (high - low)
+        boxes[j, :_PROBABILITY] = np.column_stack([low - margin, high + margin]).ravel()
+        width = positions[b] - positions[a]
+        top = math.exp(log_prior[a : b + 1].max())
+        chord = curve[-1] - curve[0]
+        length = float(np.linalg.norm(chord))
+        slowest = float((slopes @ chord).min()) / length if length > 0.0 else 0.0
+        boxes[j, _PROBABILITY] = top * width
+        within = math.sqrt(2.0 * math.pi) / (_LEAST_SPEED * slowest) if slowest > 0.0 else width
+        boxes[j, _MOST] = top * min(within, width)
+    firsts = np.arange(0, boxes.shape[0], _GROUP)
+    lows = np.minimum.reduceat(boxes[:, [_LOW1, _LOW2]], firsts)
+    highs = np.maximum.reduceat(boxes[:, [_HIGH1, _HIGH2]], firsts)
+    return boxes, np.stack([lows, highs], axis=2).reshape(-1, _PROBABILITY)

@@ -1,0 +1,198 @@
+"""From one frame to the next: time passes, and what a hypothesis then says of the readings."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.tracking.frame_density import Added, Position, Prior, Rate
+from inference.tracking.hypotheses import (
+    ANCHOR,
+    COUNT,
+    CROSSTALK1,
+    CROSSTALK2,
+    PENDING,
+    Hypotheses,
+    U,
+    V,
+    learns_crosstalk,
+    variance_of,
+)
+from inference.tracking.merging import merge
+from inference.tracking.motion import Motion, Rules, motion_over, presence_over
+from inference.tracking.readings_table import ReadingsTable, cell_of, mean_at, nuisance_at
+from inference.tracking.roots import Root, add_factor
+from inference.tracking.shared_error import certainty, shared_part
+from inference.tracking.square_root import move
+from simulator.compiled import compiled
+
+__all__ = ["born_prior", "predict", "prior_of"]
+
+Array = NDArray[np.float64]
+
+_LOG_2PI = math.log(2.0 * math.pi)
+
+
+@compiled
+def predict(seconds: float, of: Hypotheses, rules: Rules, work: Array) -> None:
+    """Predict everything to the time of the next frame.
+
+    Parameters
+    ----------
+    seconds : float
+        Until then [s].
+    of : Hypotheses
+        Changed in place.
+    rules : Rules
+        How objects move, come and go.
+    work : ndarray
+        As in `Scratch`.
+    """
+    x, weight, numbers = of.x, of.weight, of.numbers
+    chance = presence_over(seconds, rules.leave, rules.arrive)
+    motion = motion_over(seconds, rules)
+    learns = learns_crosstalk(of)
+    born = weight[0] * chance.arrived + numbers[PENDING] * (1.0 - chance.left)
+    empty = weight[0] * (1.0 - chance.arrived)
+    for j in range(1, int(numbers[COUNT]) + 1):
+        left = weight[j] * chance.left
+        empty += left
+        if learns and left > 1e-9 * empty:
+            merge(of, 0, j, left / empty, CROSSTALK1, work)
+        born += weight[j] * chance.replaced
+        weight[j] *= chance.stayed
+        along = motion.carry * x[j, V]
+        move(of, j, motion, work)
+        if learns:
+            x[j, ANCHOR] += certainty(of, j) * along
+    weight[0] = empty + numbers[PENDING] * chance.left
+    numbers[PENDING] = born
+    if learns:
+        still = Motion(0.0, 0.0, Root(0.0, 0.0, 0.0), motion.drift1, motion.drift2)
+        move(of, 0, still, work)
+
+
+@compiled
+def _crosstalk_given_u(of: Hypotheses, row: int, precision: float) -> tuple[float, float, Root]:
+    """Return how the crosstalk changes with u, and the root of its covariance given u."""
+    X = of.X
+    slope1, slope2 = 0.0, 0.0
+    for j in range(X.shape[1]):
+        slope1 += X[row, CROSSTALK1, j] * X[row, U, j] * precision
+        slope2 += X[row, CROSSTALK2, j] * X[row, U, j] * precision
+    root = Root(0.0, 0.0, 0.0)
+    for j in range(X.shape[1]):
+        own = X[row, U, j]
+        root = add_factor(
+            root, X[row, CROSSTALK1, j] - slope1 * own, X[row, CROSSTALK2, j] - slope2 * own
+        )
+    return slope1, slope2, root
+
+
+@compiled
+def _add_nuisance(root: Root, of: Hypotheses, row: int, gain: float, table: ReadingsTable) -> Root:
+    """Add what nuisance parameters do to the readings beyond what they have done to the range.
+
+    The filter runs at their centre: to it that is noise.
+    """
+    x, X = of.x, of.X
+    n = X.shape[1]
+    i, t = cell_of(x[row, U], table)
+    _, _, d1, d2 = mean_at(x[row, U], table)
+    for j in range(n, X.shape[2]):
+        f1, f2 = nuisance_at(i, t, j - n, table)
+        f1, f2 = gain * (f1 + d1 * X[row, U, j]), gain * (f2 + d2 * X[row, U, j])
+        if n > 2:
+            f1, f2 = f1 + X[row, CROSSTALK1, j], f2 + X[row, CROSSTALK2, j]
+        root = add_factor(root, f1, f2)
+    return root
+
+
+@compiled
+def _rate_given_u(of: Hypotheses, row: int, precision: float) -> Rate:
+    """Return what a hypothesis says of du/dt given u."""
+    X = of.X
+    slope, square = 0.0, 0.0
+    for j in range(X.shape[2]):
+        slope += X[row, U, j] * X[row, V, j] * precision
+    for j in range(X.shape[2]):
+        square += (X[row, V, j] - slope * X[row, U, j]) ** 2
+    return Rate(of.x[row, V], slope, math.sqrt(square))
+
+
+@compiled
+def _spread(of: Hypotheses) -> Array:
+    """Return the root of the crosstalk's covariance in the empty scene."""
+    return of.X[0, of.X.shape[1] - 2 :]
+
+
+@compiled
+def prior_of(
+    of: Hypotheses, row: int, gain: float, log_weight: float, table: ReadingsTable
+) -> Prior:
+    """Return what a hypothesis says of the next frame, as a density of u and the rest given u.
+
+    Parameters
+    ----------
+    of, row : Hypotheses, int
+        The hypothesis.
+    gain : float
+        The frame's factor on the sensor's gain.
+    log_weight : float
+        Log of what the density integrates to.
+    table : ReadingsTable
+        The scene.
+    """
+    x = of.x
+    precision = 1.0 / max(variance_of(of, row, U), 1e-300)
+    log_scale = log_weight + 0.5 * (math.log(precision) - _LOG_2PI)
+    offset1, offset2 = table.crosstalk1, table.crosstalk2
+    slope1, slope2, share, root = 0.0, 0.0, 0.0, Root(0.0, 0.0, 0.0)
+    if learns_crosstalk(of):
+        offset1, offset2 = offset1 + x[row, CROSSTALK1], offset2 + x[row, CROSSTALK2]
+        slope1, slope2, root = _crosstalk_given_u(of, row, precision)
+        _, _, share = shared_part(of, row)
+        _, _, d1, d2 = mean_at(x[row, ANCHOR], table)
+        slope1, slope2 = slope1 + gain * share * d1, slope2 + gain * share * d2
+    if of.X.shape[2] > of.X.shape[1]:
+        root = _add_nuisance(root, of, row, gain, table)
+    rate = Rate(x[row, V], 0.0, 0.0)
+    if table.by_rate:
+        rate = _rate_given_u(of, row, precision)
+    return Prior(
+        Position(False, x[row, U], precision, log_scale),
+        Added(offset1, offset2, slope1, slope2, root, _spread(of)),
+        rate,
+        share,
+    )
+
+
+@compiled
+def born_prior(of: Hypotheses, log_weight: float, rate_sd: float, table: ReadingsTable) -> Prior:
+    """Return what is known of an object that has just come: the prior of ranges, and crosstalk.
+
+    Row 0 holds the crosstalk as the empty scene has it.
+
+    Parameters
+    ----------
+    of : Hypotheses
+        Of which row 0 is used.
+    log_weight : float
+        Log of what the density integrates to.
+    rate_sd : float
+        Standard deviation of du/dt [1/s].
+    table : ReadingsTable
+        The scene.
+    """
+    offset1, offset2 = table.crosstalk1, table.crosstalk2
+    root = Root(0.0, 0.0, 0.0)
+    if learns_crosstalk(of):
+        offset1, offset2 = offset1 + of.x[0, CROSSTALK1], offset2 + of.x[0, CROSSTALK2]
+        for j in range(of.X.shape[2]):
+            root = add_factor(root, of.X[0, CROSSTALK1, j], of.X[0, CROSSTALK2, j])
+    return Prior(
+        Position(True, 0.0, 0.0, log_weight),
+        Added(offset1, offset2, 0.0, 0.0, root, _spread(of)),
+        Rate(0.0, 0.0, rate_sd),
+        0.0,
+    )

@@ -1,0 +1,172 @@
+"""The mean readings of a scene along its ranges, as a table.
+
+The filter knows no optics: it sees a curve in the plane of the readings, tabulated over u = log r
+in units of the read noise, its derivatives, and what the nuisance parameters do to it.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.tracking.roots import UNIT, Root, add_factor
+from simulator.compiled import compiled
+
+__all__ = [
+    "FIRST",
+    "LOG_PRIOR",
+    "NUISANCE",
+    "SECOND",
+    "ReadingsNoise",
+    "ReadingsTable",
+    "cell_of",
+    "mean_at",
+    "noise_root",
+    "nuisance_at",
+    "nuisance_count",
+    "object_at",
+]
+
+Array = NDArray[np.float64]
+
+FIRST, SECOND = range(2)  # the two readings
+# columns of a table: means and slopes, the object's part of both, log prior, nuisance Jacobian
+MEAN, SIGNAL, LOG_PRIOR, NUISANCE = 0, 4, 8, 9
+
+
+class ReadingsNoise(NamedTuple):
+    """Noise of the two readings, in units of their read noise.
+
+    Attributes
+    ----------
+    plain : bool
+        Whether it does not depend on the range.
+    shot1, shot2 : float
+        Shot noise variance per mean reading, both in units of the read noise.
+    ratio : float
+        Read noise of the first reading over that of the second.
+    relative : float
+        Common relative error of the object's signal.
+    pulsed : bool
+        Whether shot noise is shared by both readings.
+    """
+
+    plain: bool
+    shot1: float
+    shot2: float
+    ratio: float
+    relative: float
+    pulsed: bool
+
+
+class ReadingsTable(NamedTuple):
+    """What a frame's readings are expected to be, as a function of u = log r.
+
+    Attributes
+    ----------
+    knots : ndarray, shape (knots, 9 + 2 p)
+        Mean readings in units of the read noise and their derivatives along u times ``step``, the
+        object's part of both, log prior density of u, and the change of either reading with each of
+        p independent standard normal nuisance parameters. By rate the means are factors of du/dt.
+    start, step : float
+        First knot and spacing of u.
+    end : float
+        Last knot.
+    crosstalk1, crosstalk2 : float
+        Known crosstalk.
+    by_rate : bool
+        Whether the readings are derivatives in time.
+    noise : ReadingsNoise
+        Of the readings.
+    channels : int
+        How many of the two readings are used.
+    """
+
+    knots: Array
+    start: float
+    step: float
+    end: float
+    crosstalk1: float
+    crosstalk2: float
+    by_rate: bool
+    noise: ReadingsNoise
+    channels: int
+
+
+@compiled
+def _hermite(u: float, table: ReadingsTable, first: int) -> tuple[float, float, float, float]:
+    """Interpolate two columns and their derivatives, cubically."""
+    position = (u - table.start) / table.step
+    p = table.knots
+    i = min(max(int(position), 0), p.shape[0] - 2)
+    t = position - i
+    a1, a2, left1, left2 = p[i, first], p[i, first + 1], p[i, first + 2], p[i, first + 3]
+    right1, right2 = p[i + 1, first + 2], p[i + 1, first + 3]
+    gap1, gap2 = p[i + 1, first] - a1, p[i + 1, first + 1] - a2
+    c1, d1 = 3.0 * gap1 - 2.0 * left1 - right1, left1 + right1 - 2.0 * gap1
+    c2, d2 = 3.0 * gap2 - 2.0 * left2 - right2, left2 + right2 - 2.0 * gap2
+    return (
+        a1 + t * (left1 + t * (c1 + t * d1)),
+        a2 + t * (left2 + t * (c2 + t * d2)),
+        (left1 + t * (2.0 * c1 + 3.0 * t * d1)) / table.step,
+        (left2 + t * (2.0 * c2 + 3.0 * t * d2)) / table.step,
+    )
+
+
+@compiled
+def mean_at(u: float, table: ReadingsTable) -> tuple[float, float, float, float]:
+    """Return the two mean readings and their derivatives along u."""
+    return _hermite(u, table, MEAN)
+
+
+@compiled
+def object_at(u: float, table: ReadingsTable) -> tuple[float, float]:
+    """Return the object's part of the readings."""
+    value1, value2, _, _ = _hermite(u, table, SIGNAL)
+    return value1, value2
+
+
+@compiled
+def cell_of(u: float, table: ReadingsTable) -> tuple[int, float]:
+    """Return the knot before u and the share of the cell that lies before u."""
+    position = (u - table.start) / table.step
+    i = min(max(int(position), 0), table.knots.shape[0] - 2)
+    return i, min(max(position - i, 0.0), 1.0)
+
+
+@compiled
+def nuisance_count(table: ReadingsTable) -> int:
+    """Return the number of nuisance parameters."""
+    return int((table.knots.shape[1] - NUISANCE) // 2)
+
+
+@compiled
+def nuisance_at(i: int, t: float, j: int, table: ReadingsTable) -> tuple[float, float]:
+    """Return the change of the readings with nuisance parameter j, in the cell after knot i."""
+    p = table.knots
+    k = NUISANCE + 2 * j
+    return p[i, k] + t * (p[i + 1, k] - p[i, k]), p[i, k + 1] + t * (p[i + 1, k + 1] - p[i, k + 1])
+
+
+@compiled
+def noise_root(m1: float, m2: float, o1: float, o2: float, noise: ReadingsNoise) -> Root:
+    """Return the triangular root of the noise's covariance at mean readings m, object's part o."""
+    root = UNIT
+    if noise.shot1 > 0.0 or noise.shot2 > 0.0:
+        first, second = noise.shot1 * abs(m1), noise.shot2 * abs(m2)
+        if not noise.pulsed:
+            root = Root(math.sqrt(1.0 + first), 0.0, math.sqrt(1.0 + second))
+        elif abs(m1) * noise.ratio <= abs(m2):
+            own = second - first * noise.ratio * noise.ratio
+            root = Root(1.0, 0.0, math.sqrt(1.0 + max(own, 0.0)))
+            shared = math.sqrt(first)
+            root = add_factor(root, shared, shared * noise.ratio)
+        else:
+            own = first - second / noise.ratio / noise.ratio
+            root = Root(math.sqrt(1.0 + max(own, 0.0)), 0.0, 1.0)
+            shared = math.sqrt(second)
+            root = add_factor(root, shared / noise.ratio, shared)
+    if noise.relative > 0.0:
+        root = add_factor(root, noise.relative * o1, noise.relative * o2)
+    return root

@@ -1,0 +1,57 @@
+"""Triangular roots of covariances of two readings: nothing is ever subtracted."""
+
+import math
+from typing import NamedTuple
+
+from simulator.compiled import compiled
+
+__all__ = ["UNIT", "Root", "add_factor", "add_root", "solve"]
+
+
+class Root(NamedTuple):
+    """Lower triangular root of a covariance of two numbers, by its elements."""
+
+    r11: float
+    r21: float
+    r22: float
+
+
+UNIT = Root(1.0, 0.0, 1.0)
+"""Of independent numbers in units of their noise."""
+
+
+@compiled
+def add_factor(root: Root, first: float, second: float) -> Root:
+    """Return the triangular root of root root^T + f f^T, by one rotation: nothing cancels.
+
+    Parameters
+    ----------
+    root : Root
+        Lower triangular.
+    first, second : float
+        The vector f.
+    """
+    length = math.sqrt(root.r11 * root.r11 + first * first)
+    if first == 0.0 or length == 0.0:  # nothing, or squares that underflow
+        return Root(root.r11, root.r21, math.sqrt(root.r22 * root.r22 + second * second))
+    cosine, sine = root.r11 / length, first / length
+    rest = cosine * second - sine * root.r21
+    return Root(
+        length, cosine * root.r21 + sine * second, math.sqrt(root.r22 * root.r22 + rest * rest)
+    )
+
+
+@compiled
+def add_root(root: Root, more: Root) -> Root:
+    """Return the triangular root of the sum of two covariances."""
+    root = add_factor(root, more.r11, more.r21)
+    return add_factor(root, 0.0, more.r22)
+
+
+@compiled
+def solve(root: Root, first: float, second: float) -> tuple[float, float]:
+    """Return (root root^T)^-1 times a vector."""
+    z1 = first / root.r11
+    z2 = (second - root.r21 * z1) / root.r22
+    y2 = z2 / root.r22
+    return (z1 - root.r21 * y2) / root.r11, y2

@@ -1,0 +1,64 @@
+"""The numbers that a tracker's settings stand for."""
+
+import math
+
+from scipy import stats
+
+from inference.tracking.motion import Rules
+from inference.tracking.observed import Observed
+from inference.tracking.settings import TrackingSettings
+
+__all__ = ["rules_of", "surprise_limit"]
+
+_BREADTH = 10.0  # of an outlier's law, in units of the noise: wider than what noise explains
+_SAME = 0.05  # nats per weight: two hypotheses merge long before any of their intervals shows it
+_SURPRISE_TAIL = 1e-4  # probability beyond which a single frame's surprise is cut
+
+
+def rules_of(settings: TrackingSettings, observed: Observed, at_rest: bool) -> Rules:
+    """Return the kernels' rules.
+
+    Parameters
+    ----------
+    settings : TrackingSettings
+        How objects move, come and go.
+    observed : Observed
+        What is read, and its units.
+    at_rest : bool
+        Whether the object is known not to move.
+    """
+    scale1, scale2 = observed.scale.tolist()
+    drift1, drift2 = settings.crosstalk_drift or (0.0, 0.0)
+    return Rules(
+        leave=1.0 / settings.visit_s,
+        arrive=1.0 / settings.absence_s,
+        rate_sd=0.0 if at_rest else settings.rate_sd,
+        rate_time=settings.rate_time_s,
+        drift1=drift1 * scale1,
+        drift2=drift2 * scale2,
+        outlier=settings.outlier,
+        breadth=_BREADTH,
+        log_negligible=math.log(settings.negligible),
+        same=_SAME,
+        memory=1.0 - 1.0 / settings.window,
+        most_surprise=float(stats.chi2.isf(_SURPRISE_TAIL, observed.channels)),
+        unique_above=settings.unique_above,
+    )
+
+
+def surprise_limit(settings: TrackingSettings, rules: Rules, channels: int) -> float:
+    """Return the running surprise above which the model does not fit.
+
+    An exponential mean of chi-squares has the first two moments of a gamma law.
+
+    Parameters
+    ----------
+    settings : TrackingSettings
+        With the probability of a false alarm.
+    rules : Rules
+        With the memory of the mean.
+    channels : int
+        Readings of a frame that are used.
+    """
+    freedom = 0.5 * channels * (1.0 + rules.memory) / (1.0 - rules.memory)
+    return float(stats.gamma.isf(settings.false_alarm, freedom, scale=1.0 / freedom))
