@@ -143,7 +143,7 @@ def test_unknown_crosstalk_is_learnt_from_its_prior() -> None:
 
 @pytest.mark.parametrize("observables", ["w2", "readings"])
 @pytest.mark.parametrize("spread", [0.05, 0.2])
-def test_uncertain_globals_do_not_average_down(spread: float, observables: Any) -> None:
+def test_an_uncertain_scene_does_not_average_down(spread: float, observables: Any) -> None:
     """Draws of c0 and c2; the object stands still for 100 frames. Two bands of 1 in 10,000 each.
 
     Whatever the number of frames, the error that the scene causes stays; what the noise adds goes.
