@@ -3,14 +3,16 @@
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.metadata import version
+from typing import Any
 
 import anyio
 from fastapi import FastAPI
 
 from inference.posterior import fold as posterior_fold
 from service import openapi, problems
+from service.fold import Fold
 from service.job_store import MemoryJobStore
-from service.jobs import Fold, Jobs
+from service.jobs import Jobs
 from service.process_pool import ProcessPool
 from service.routes import (
     estimates,
@@ -26,7 +28,9 @@ from service.state import State
 __all__ = ["create_app"]
 
 
-def create_app(settings: Settings | None = None, fold: Fold = posterior_fold) -> FastAPI:
+def create_app(
+    settings: Settings | None = None, fold: Fold[Any, Any, Any, Any] = posterior_fold
+) -> FastAPI:
     """Make an application of its own: nothing is shared between two of them.
 
     Parameters

@@ -1,93 +1,32 @@
 """Posteriors as jobs: a fold over short pure chunks, on any executor.
 
-A job is never held in a worker. Between two chunks its checkpoint is stored, its progress is
-reported, and a request to cancel is honoured; a chunk that was lost with its process is computed
-again, to the same last bit.
+A job is never held in a worker: what runs there is one chunk (`service.job_runner`), and between
+two of them the job is in the store.
 """
 
 import asyncio
 import logging
-import math
-import time
 import uuid
-from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from typing import Any, Protocol, TypeVar
+from typing import Any, Generic
 
-from service.draws_formats import write_draws
+from inference.posterior.settings import SamplerSettings
 from service.errors import BusyError, ConflictError, GoneError, NotFoundError
+from service.fold import C, Fold, J, P, T
+from service.job_runner import Runner
 from service.job_store import FINISHED, JobRecord, JobStore
 from service.problems import describe
-from service.worker import timed
 from simulator.errors import HybridTofError
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
-__all__ = ["Fold", "Jobs"]
-
-T = TypeVar("T")
+__all__ = ["Jobs"]
 
 _log = logging.getLogger("hybridtof")
 
 
-class Fold(Protocol):
-    """What `inference.posterior.fold` offers; every function is pure and importable by name."""
-
-    Job: Any
-    Checkpoint: Any
-
-    def prepare(self, sensor: Sensor, scene: Scene, frames: Frames, settings: Any, /) -> Any:
-        """Validate and refuse; resolve the seed."""
-
-    def start(self, job: Any, /) -> Any:
-        """Return the first checkpoint."""
-
-    def tasks(self, job: Any, checkpoint: Any, /) -> Sequence[Any]:
-        """Return the independent pieces of the next chunk; none when finished."""
-
-    def run(self, task: Any, /) -> Any:
-        """Compute one piece."""
-
-    def merge(self, job: Any, checkpoint: Any, pieces: Sequence[Any], /) -> Any:
-        """Return the next checkpoint."""
-
-    def progress(self, job: Any, checkpoint: Any, /) -> Any:
-        """Return steps, target, ess, rhat, finished."""
-
-    def summarise(self, job: Any, checkpoint: Any, wall_s: float, cpu_s: float, /) -> Any:
-        """Return the posterior so far."""
-
-    def draw(self, job: Any, checkpoint: Any, /) -> Any:
-        """Return the job as it was sampled and its draws."""
-
-
-def _summary(summarise: Callable[..., Any], *arguments: Any) -> dict[str, Any]:
-    # made into JSON where it is computed: the draws stay in the worker
-    result: dict[str, Any] = summarise(*arguments).to_json()
-    return result
-
-
-def _finite(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else float(value)
-
-
-def _progress(progress: Any, wall_s: float) -> dict[str, Any]:
-    """Progress as sent to clients, with the time left at the speed so far."""
-    steps, target = int(progress.steps), int(progress.target)
-    left = 0.0 if progress.finished else None
-    if left is None and steps > 0:
-        left = wall_s * max(target / steps - 1.0, 0.0)
-    return {
-        "steps": steps,
-        "target": target,
-        "ess": _finite(progress.ess),
-        "rhat": _finite(progress.rhat),
-        "eta_s": _finite(left),
-    }
-
-
-class Jobs:
+class Jobs(Generic[J, C, T, P]):
     """Runs the posteriors of one process.
 
     Parameters
@@ -102,10 +41,13 @@ class Jobs:
         How many jobs run at a time; the others wait in the order of their arrival.
     """
 
-    def __init__(self, fold: Fold, store: JobStore, executor: Executor, running: int) -> None:
+    def __init__(
+        self, fold: Fold[J, C, T, P], store: JobStore, executor: Executor, running: int
+    ) -> None:
         self._fold = fold
         self._store = store
         self._executor = executor
+        self._runner = Runner(fold, store, executor)
         self._running = running
         self._slots = asyncio.Semaphore(running)
         self._tasks: dict[str, asyncio.Task[None]] = {}
@@ -139,7 +81,7 @@ class Jobs:
         sensor: Sensor,
         scene: Scene,
         frames: Frames,
-        settings: Any,
+        settings: SamplerSettings,
         *,
         key: str | None = None,
         digest: str = "",
@@ -172,11 +114,14 @@ class Jobs:
         if not self._open:
             raise BusyError("the service is ending")
         job = await asyncio.to_thread(self._fold.prepare, sensor, scene, frames, settings)
+        seed = job.settings.seed
+        if seed is None:
+            raise ValueError("`Fold.prepare` resolves the seed")
         record = JobRecord(
             id=uuid.uuid4().hex,
             job=await asyncio.to_thread(job.to_bytes),
             method=job.settings.method,
-            seed=job.settings.seed,
+            seed=seed,
             max_seconds=job.settings.max_seconds,
             key=key,
             digest=digest,
@@ -211,7 +156,7 @@ class Jobs:
         job_id : str
             Which job.
         media_type : str
-            One of `service.draws_formats.FORMATS`.
+            Of one of `service.exports.registry.EXPORTS`.
 
         Returns
         -------
@@ -237,9 +182,7 @@ class Jobs:
                 "the draws made room for those of other posteriors; the same request with this "
                 "seed gives the same draws"
             )
-        fold = (self._fold.Job.from_bytes, self._fold.Checkpoint.from_bytes, self._fold.draw)
-        data, _ = await self._execute(write_draws, fold, media_type, record.job, record.checkpoint)
-        return data
+        return await self._runner.draws(record, record.checkpoint, media_type)
 
     async def cancel(self, job_id: str) -> JobRecord:
         """End a job after the chunk that runs; one that has ended is left as it is.
@@ -290,7 +233,7 @@ class Jobs:
         try:
             async with self._slots:
                 self._waiting.discard(record.id)
-                await self._advance(record)
+                await self._runner.run(record)
         except HybridTofError as error:
             await self._fail(record.id, describe(error))
         except Exception as error:
@@ -303,58 +246,3 @@ class Jobs:
         await asyncio.to_thread(
             lambda: self._store.update(job_id, status="failed", problem=problem, checkpoint=None)
         )
-
-    async def _execute(self, function: Callable[..., T], *arguments: Any) -> tuple[T, float]:
-        """Run on the executor; return the result and the processor time [s]."""
-        future = self._executor.submit(timed, function, *arguments)
-        return await asyncio.wrap_future(future)
-
-    async def _save(self, job_id: str, **changes: Any) -> JobRecord | None:
-        return await asyncio.to_thread(lambda: self._store.update(job_id, **changes))
-
-    async def _advance(self, record: JobRecord) -> None:
-        """Fold until finished, cancelled, out of time or deleted; then summarise."""
-        fold = self._fold
-        began = time.monotonic() - record.wall_s
-        cpu_s = record.cpu_s
-        if await self._save(record.id, status="running") is None:
-            return
-        job = await asyncio.to_thread(fold.Job.from_bytes, record.job)
-        if record.checkpoint is None:
-            checkpoint, spent = await self._execute(fold.start, job)
-            cpu_s += spent
-        else:
-            checkpoint = await asyncio.to_thread(fold.Checkpoint.from_bytes, record.checkpoint)
-        while True:
-            wall_s = time.monotonic() - began
-            progress = await asyncio.to_thread(fold.progress, job, checkpoint)
-            known = await self._save(
-                record.id,
-                checkpoint=await asyncio.to_thread(checkpoint.to_bytes),
-                progress=_progress(progress, wall_s),
-                wall_s=wall_s,
-                cpu_s=cpu_s,
-            )
-            if known is None:
-                return
-            late = wall_s >= record.max_seconds
-            if progress.finished or known.cancel_requested or late:
-                break
-            tasks = await asyncio.to_thread(fold.tasks, job, checkpoint)
-            if not tasks:
-                break
-            pieces = await asyncio.gather(*(self._execute(fold.run, task) for task in tasks))
-            cpu_s += math.fsum(spent for _, spent in pieces)
-            checkpoint = await asyncio.to_thread(
-                fold.merge, job, checkpoint, [piece for piece, _ in pieces]
-            )
-        result, _ = await self._execute(_summary, fold.summarise, job, checkpoint, wall_s, cpu_s)
-        if late and not progress.finished:
-            reason = f"stopped at the time limit of {record.max_seconds:g} s"
-            result["verdict"] = {
-                "converged": False,
-                "reasons": [reason, *result["verdict"]["reasons"]],
-            }
-        cancelled = known.cancel_requested and not progress.finished
-        status = "cancelled" if cancelled else "done"
-        await self._save(record.id, status=status, result=result)

@@ -1,7 +1,7 @@
 """What the routes share: settings, jobs and the threads for numerical work."""
 
 import dataclasses
-from typing import cast
+from typing import Any, cast
 
 import anyio
 from fastapi import Request
@@ -27,7 +27,7 @@ class State:
     """
 
     settings: Settings
-    jobs: Jobs
+    jobs: Jobs[Any, Any, Any, Any]  # whatever they compute
     threads: anyio.CapacityLimiter
 
 

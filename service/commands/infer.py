@@ -42,7 +42,7 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     parser.add_argument("--ensembles", type=int)
     parser.add_argument("--target-ess", type=int)
     parser.add_argument("--max-seconds", type=float)
-    parser.add_argument("--draws", type=Path, help="write the draws here, as .nc or .ndjson")
+    parser.add_argument("--draws", type=Path, help="write the draws here, as .nc (NetCDF), .ndjson")
     parser.add_argument("--seed", type=int, help="left out: drawn and printed")
 
 
@@ -74,14 +74,14 @@ def _run(args: argparse.Namespace) -> int:
 def _format_of(path: Path) -> str:
     """Return the media type of a file, before any time is spent on what goes into it."""
     from service.commands.files import check_folder
-    from service.draws_formats import FORMATS
+    from service.exports.registry import EXPORTS
     from simulator.errors import InvalidInputError, Problem
 
     check_folder("--draws", path)
-    for form in FORMATS:
+    for form in EXPORTS:
         if path.suffix == form.suffix:
             return form.media_type
-    known = " or ".join(form.suffix for form in FORMATS)
+    known = " or ".join(form.suffix for form in EXPORTS)
     raise InvalidInputError(Problem(f"--draws {path}", f"draws are written as {known}"))
 
 

@@ -10,8 +10,9 @@ from fastapi.responses import JSONResponse, Response
 
 from service.bodies import body_of, openapi_body
 from service.checks import system_with_frames
-from service.draws_formats import FORMATS, accepted_format
 from service.errors import MalformedError, NotAcceptableError
+from service.exports.negotiation import accepted_export
+from service.exports.registry import EXPORTS
 from service.posterior_json import brief, full
 from service.problems import problem_responses
 from service.schemas import PosteriorPage, PosteriorRequest, PosteriorResponse
@@ -89,15 +90,15 @@ async def get(request: Request, job_id: str) -> Response:
     response_model=None,
     response_class=Response,
     responses={
-        200: {"content": {form.media_type: {} for form in FORMATS}},
+        200: {"content": {form.media_type: {} for form in EXPORTS}},
         **problem_responses(404, 406, 409, 410),
     },
 )
 async def draws(request: Request, job_id: str) -> Response:
-    """Return the draws of a finished posterior as NetCDF that ArviZ reads, or as NDJSON."""
-    form = accepted_format(",".join(request.headers.getlist("accept")))
+    """Return the draws of a finished posterior in a form that ``Accept`` names."""
+    form = accepted_export(",".join(request.headers.getlist("accept")))
     if form is None:
-        names = " or ".join(form.media_type for form in FORMATS)
+        names = " or ".join(form.media_type for form in EXPORTS)
         raise NotAcceptableError(f"draws come as {names}")
     data = await state_of(request).jobs.draws(job_id, form.media_type)
     name = f'attachment; filename="{job_id}{form.suffix}"'

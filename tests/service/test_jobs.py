@@ -22,6 +22,7 @@ from tests.service import fake_fold
 from tests.service.conftest import FRAMES, SENSOR
 
 pytestmark = pytest.mark.anyio
+FakeJobs = Jobs[fake_fold.Job, fake_fold.Checkpoint, fake_fold.Task, float]
 SETTINGS = SamplerSettings(seed=5, ensembles=2)
 
 
@@ -33,7 +34,7 @@ def system() -> tuple[Sensor, Scene, Frames]:
 @asynccontextmanager
 async def running(
     store: MemoryJobStore | None = None, workers: int = 2, running: int = 2
-) -> AsyncIterator[tuple[Jobs, ProcessPool]]:
+) -> AsyncIterator[tuple[FakeJobs, ProcessPool]]:
     pool = ProcessPool(workers)
     jobs = Jobs(fake_fold, store or MemoryJobStore(100), pool, running)
     await jobs.start()
@@ -43,7 +44,7 @@ async def running(
         await jobs.close()
 
 
-async def ended(jobs: Jobs, job_id: str) -> JobRecord:
+async def ended(jobs: FakeJobs, job_id: str) -> JobRecord:
     assert await jobs.wait(job_id)
     return await jobs.get(job_id)
 
@@ -60,7 +61,7 @@ async def undisturbed() -> float:
         return mean_of(await ended(jobs, record.id))
 
 
-async def until(jobs: Jobs, job_id: str, steps: int) -> None:
+async def until(jobs: FakeJobs, job_id: str, steps: int) -> None:
     while True:
         progress = (await jobs.get(job_id)).progress
         if progress is not None and progress["steps"] >= steps:

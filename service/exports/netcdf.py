@@ -9,13 +9,13 @@ to some of the draws: their ``draw`` coordinate names them.
 import io
 from typing import Any
 
-import h5netcdf
 import numpy as np
 from numpy.typing import NDArray
 
-from service.draws_described import DescribedDraws, unit_of
+from service.exports.described import DescribedDraws, unit_of
+from service.exports.export import Export
 
-__all__ = ["to_netcdf"]
+__all__ = ["EXPORT", "to_netcdf"]
 
 
 def to_netcdf(described: DescribedDraws) -> bytes:
@@ -33,6 +33,9 @@ def to_netcdf(described: DescribedDraws) -> bytes:
         ``posterior_predictive`` (replicated readings, and ``range_m`` at which they were made),
         ``log_likelihood``, ``observed_data`` and ``constant_data``.
     """
+    # imported where it is needed: a service that never exports starts without HDF5
+    import h5netcdf
+
     draws = described.draws
     _, walkers, steps = draws.log_density.shape
     walker, step = (index.ravel() for index in np.mgrid[:walkers, :steps])
@@ -139,3 +142,6 @@ def _per_draw(group: Any, name: str, values: NDArray[Any], **attributes: str) ->
     dimensions = ("chain", "draw", "frame")[: flat.ndim]
     # makes coordinates, not data, of walker and step (CF conventions, 5)
     _variable(group, name, dimensions, flat, coordinates="walker step", **attributes)
+
+
+EXPORT = Export("application/x-netcdf", ".nc", to_netcdf)

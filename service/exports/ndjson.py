@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service.draws_described import DescribedDraws
+from service.exports.described import DescribedDraws
+from service.exports.export import Export
 
-__all__ = ["to_ndjson"]
+__all__ = ["EXPORT", "to_ndjson"]
 
 
 def _plain(values: NDArray[Any]) -> list[float | None]:
@@ -58,3 +59,6 @@ def to_ndjson(described: DescribedDraws) -> bytes:
         a frame was saturated or holds no object; the others lack these members.
     """
     return b"".join(line.encode() + b"\n" for line in _lines(described))
+
+
+EXPORT = Export("application/x-ndjson", ".ndjson", to_ndjson)

@@ -1,0 +1,142 @@
+"""What the service asks of a computation that is a fold over chunks."""
+
+from collections.abc import Sequence
+from typing import Any, Protocol, TypeVar
+
+from inference.posterior import job as posterior_job
+from inference.posterior.answer.draws import Draws
+from inference.posterior.settings import SamplerSettings
+from simulator.frames import Frames
+from simulator.scene import Scene
+from simulator.sensor import Sensor
+
+__all__ = ["Fold", "FoldProgress", "Stored", "StoredCheckpoint", "StoredJob", "Summary"]
+
+
+class Stored(Protocol):
+    """What a store keeps as bytes."""
+
+    def to_bytes(self) -> bytes:
+        """Return it as bytes."""
+        ...
+
+
+class StoredJob(Stored, Protocol):
+    """A prepared job."""
+
+    @property
+    def settings(self) -> SamplerSettings:
+        """How it is sampled, with a seed."""
+        ...
+
+
+class StoredCheckpoint(Stored, Protocol):
+    """Where a job stands."""
+
+    @property
+    def method(self) -> str:
+        """What is being done."""
+        ...
+
+
+class FoldProgress(Protocol):
+    """How far a job is."""
+
+    @property
+    def steps(self) -> int:
+        """Steps so far."""
+        ...
+
+    @property
+    def target(self) -> int:
+        """Steps that may be needed, as far as can be told."""
+        ...
+
+    @property
+    def ess(self) -> float | None:
+        """Least effective sample size."""
+        ...
+
+    @property
+    def rhat(self) -> float | None:
+        """Largest R-hat."""
+        ...
+
+    @property
+    def finished(self) -> bool:
+        """Whether only the summary is left."""
+        ...
+
+
+class Summary(Protocol):
+    """An answer."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain JSON data."""
+        ...
+
+
+J = TypeVar("J", bound=StoredJob)
+C = TypeVar("C", bound=StoredCheckpoint)
+T = TypeVar("T")
+P = TypeVar("P")
+S = TypeVar("S", covariant=True)
+
+
+class Reader(Protocol[S]):
+    """A class whose instances can be read again from bytes."""
+
+    def from_bytes(self, data: bytes, /) -> S:
+        """Read what ``to_bytes`` wrote."""
+        ...
+
+
+class Fold(Protocol[J, C, T, P]):
+    """What `inference.posterior.fold` offers; every function is pure and importable by name.
+
+    Its types are a job, a checkpoint, a task (one share of a chunk) and what becomes of it.
+    """
+
+    @property
+    def Job(self) -> Reader[J]:  # noqa: N802  (a class)
+        """The job's class."""
+        ...
+
+    @property
+    def Checkpoint(self) -> Reader[C]:  # noqa: N802
+        """The checkpoint's class."""
+        ...
+
+    def prepare(
+        self, sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSettings, /
+    ) -> J:
+        """Validate and refuse; resolve the seed."""
+        ...
+
+    def start(self, job: J, /) -> C:
+        """Return the first checkpoint."""
+        ...
+
+    def tasks(self, job: J, checkpoint: C, /) -> Sequence[T]:
+        """Return the independent pieces of the next chunk; none when finished."""
+        ...
+
+    def run(self, task: T, /) -> P:
+        """Compute one piece."""
+        ...
+
+    def merge(self, job: J, checkpoint: C, pieces: Sequence[P], /) -> C:
+        """Return the next checkpoint."""
+        ...
+
+    def progress(self, job: J, checkpoint: C, /) -> FoldProgress:
+        """Return steps, target, ess, rhat, finished."""
+        ...
+
+    def summarise(self, job: J, checkpoint: C, wall_s: float, cpu_s: float, /) -> Summary:
+        """Return the posterior so far."""
+        ...
+
+    def draw(self, job: J, checkpoint: C, /) -> tuple[posterior_job.Job, Draws]:
+        """Return the job as it was sampled and its draws."""
+        ...
