@@ -16,6 +16,7 @@ ALLOWED = {
     "inference/identifiability": ["inference.identifiability", "inference.frame", "simulator"],
     "inference/realtime": [
         "inference.realtime",
+        "inference.frame",
         "inference.technique",
         "inference.known",
         "inference.estimates",

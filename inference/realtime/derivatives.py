@@ -210,15 +210,9 @@ def derivatives_of(
         raise InvalidInputError.at(
             "/frames/time_s", f"must increase: entry {backward[0] + 1} does not"
         )
-    net = net_readings(sensor, crosstalk or (0.0, 0.0), frames)
+    # the relative error is independent from frame to frame, so it does not cancel in a difference
+    net = net_readings(sensor, crosstalk or (0.0, 0.0), frames, with_relative=True)
     usable = np.flatnonzero(net.state == 0)
-    var1, var2, cov = net.var1, net.var2, net.cov
-    with np.errstate(all="ignore"):
-        if net.relative > 0:
-            # independent from frame to frame, so it does not cancel in a difference
-            var1 = var1 + (net.relative * net.first) ** 2
-            var2 = var2 + (net.relative * net.second) ** 2
-            cov = cov + net.relative**2 * net.first * net.second
     gain = frames.gain if crosstalk is None else None
     n = len(frames)
     windows = _Windows(*(np.full(n, np.nan) for _ in range(6)))
@@ -227,7 +221,7 @@ def derivatives_of(
         part = _Windows(*(np.full(usable.size, np.nan) for _ in range(6)))
         _differences(
             frames.time_s[usable],
-            net._replace(var1=var1, var2=var2, cov=cov).select(usable),
+            net.select(usable),
             None if gain is None else gain[usable],
             _HALF_WIDTHS,
             part,

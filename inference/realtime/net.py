@@ -5,9 +5,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.frame.arguments import instrument_of
+from inference.frame.noise import covariances
 from inference.technique import Task
 from simulator.frames import Frames
-from simulator.sensor import PulsedSensor, Sensor
+from simulator.sensor import Sensor
 
 __all__ = [
     "ABSENT",
@@ -48,9 +50,9 @@ class Net(NamedTuple):
     first, second : ndarray, shape (n,)
         Readings less crosstalk, over the frame's gain.
     var1, var2, cov : ndarray, shape (n,)
-        Their noise but for the relative error of the object's signal.
+        Their noise (`inference.frame.noise`), the relative error of the object's signal apart.
     relative : float
-        Standard deviation of that relative error.
+        Standard deviation of that relative error; 0 where it is part of the noise.
     state : ndarray of uint8, shape (n,)
         0, or the index among `COMMON_REASONS` of what rules the frame out.
     """
@@ -105,7 +107,9 @@ def rule_out(sensor: Sensor, frames: Frames) -> NDArray[np.uint8]:
     return state
 
 
-def net_readings(sensor: Sensor, crosstalk: tuple[float, float], frames: Frames) -> Net:
+def net_readings(
+    sensor: Sensor, crosstalk: tuple[float, float], frames: Frames, with_relative: bool = False
+) -> Net:
     """Subtract known crosstalk and divide by the frame's gain.
 
     Parameters
@@ -116,31 +120,33 @@ def net_readings(sensor: Sensor, crosstalk: tuple[float, float], frames: Frames)
         To subtract, in reading units.
     frames : Frames
         The frames.
+    with_relative : bool
+        Whether the relative error of the object's signal, which frames do not share, is part of
+        the noise; it is apart otherwise.
 
     Returns
     -------
     Net
         Signals and noise.
     """
-    raw1, raw2 = frames.readings[:, 0], frames.readings[:, 1]
-    noise = sensor.noise
+    noise = instrument_of(sensor)
+    own = noise if with_relative else noise._replace(relative=None)
     with np.errstate(all="ignore"):
-        first, second = raw1 - crosstalk[0], raw2 - crosstalk[1]
-        var1, var2 = np.full(raw1.size, noise.read[0] ** 2), np.full(raw1.size, noise.read[1] ** 2)
-        cov = np.zeros(raw1.size)
-        if noise.shot > 0:
-            shot1, shot2 = noise.shot * np.abs(raw1), noise.shot * np.abs(raw2)
-            var1, var2 = var1 + shot1, var2 + shot2
-            if isinstance(sensor, PulsedSensor):
-                cov = np.minimum(shot1, shot2)
+        signals = frames.readings - np.asarray(crosstalk)
+        matrices = covariances(own, frames.readings, signals)
+        # parts of a variance that is beyond what a number can hold
+        matrices[np.isnan(matrices)] = np.inf
         if frames.gain is not None:
-            first, second = first / frames.gain, second / frames.gain
-            square = frames.gain**2
-            var1, var2, cov = var1 / square, var2 / square, cov / square
+            signals /= frames.gain[:, None]
+            matrices /= (frames.gain**2)[:, None, None]
+        # kernels are compiled for columns that lie in one piece
+        first, second = np.ascontiguousarray(signals.T)
+        var1, cov, _, var2 = np.ascontiguousarray(matrices.reshape(-1, 4).T)
     state = rule_out(sensor, frames)
     bad = ~(np.isfinite(first) & np.isfinite(second))
     state[bad & (state == 0)] = UNREPRESENTABLE
-    return Net(first, second, var1, var2, cov, noise.relative, state)
+    apart = 0.0 if with_relative else sensor.noise.relative
+    return Net(first, second, var1, var2, cov, apart, state)
 
 
 def known_net_readings(task: Task) -> Net:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulator.compiled import compiled
+from simulator.readings import noise_parts
 
 __all__ = ["Codes", "Columns", "Pulse", "explain", "pulsed_ranges", "ranges_alone"]
 
@@ -28,8 +29,10 @@ class Pulse(NamedTuple):
         Range at which the whole pulse is late [m].
     crosstalk_late, crosstalk_whole : float
         To subtract [reading units].
-    var_late, var_whole, shot : float
-        Read noise, and shot noise over the reading.
+    read : (float, float)
+        Standard deviations of the read noise.
+    shot : float
+        Variance per reading.
     low, high : float
         Ranges that are allowed [m].
     full_late, full_whole : float
@@ -39,8 +42,7 @@ class Pulse(NamedTuple):
     r0: float
     crosstalk_late: float
     crosstalk_whole: float
-    var_late: float
-    var_whole: float
+    read: tuple[float, float]
     shot: float
     low: float
     high: float
@@ -125,11 +127,10 @@ def pulsed_ranges(flat: Array, pulse: Pulse, columns: Columns) -> int:
         share = late * inverse
         r = pulse.r0 * share
         # gradient of the ratio: (1, -share) / whole; shared photons enter with 1 - share
-        first, second = pulse.shot * abs(raw1), pulse.shot * abs(raw2)
-        shared = first if first < second else second
-        variance = pulse.var_late + first - shared
-        variance += share * share * (pulse.var_whole + second - shared)
-        variance += (1.0 - share) * (1.0 - share) * shared
+        own1, own2, shared, _, _ = noise_parts(
+            pulse.read, pulse.shot, None, True, (raw1, raw2), (0.0, 0.0)
+        )
+        variance = own1 + share * share * own2 + (1.0 - share) * (1.0 - share) * shared
         sd = pulse.r0 * inverse * math.sqrt(variance)
         # readings are rounded, however little noise they have
         sd = max(sd, _ROUNDING * r)

@@ -101,14 +101,12 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
     slack = 8 * np.finfo(float).eps
     low, high = task.known.support if task.physical else (0.0, math.inf)
     full_late, full_whole = sensor.full_scale or (math.inf, math.inf)
-    read_late, read_whole = sensor.noise.read
     crosstalk_late, crosstalk_whole = task.known.crosstalk
     pulse = Pulse(
         r0=sensor.r0,
         crosstalk_late=crosstalk_late,
         crosstalk_whole=crosstalk_whole,
-        var_late=read_late * read_late,
-        var_whole=read_whole * read_whole,
+        read=sensor.noise.read,
         shot=sensor.noise.shot,
         low=low * (1 - slack),
         high=high * (1 + slack),
