@@ -1,13 +1,15 @@
 """Readings net of known crosstalk, at the sensor's own gain, with their covariance."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.frame.arguments import instrument_of
-from inference.frame.noise import covariances
+from inference.frame.arguments import Instrument, instrument_of
+from inference.frame.noise import covariance, noise_of
 from inference.technique import Task
+from simulator.compiled import compiled
 from simulator.frames import Frames
 from simulator.sensor import Sensor
 
@@ -129,24 +131,49 @@ def net_readings(
     Net
         Signals and noise.
     """
+    n = len(frames)
     noise = instrument_of(sensor)
-    own = noise if with_relative else noise._replace(relative=None)
-    with np.errstate(all="ignore"):
-        signals = frames.readings - np.asarray(crosstalk)
-        matrices = covariances(own, frames.readings, signals)
-        # parts of a variance that is beyond what a number can hold
-        matrices[np.isnan(matrices)] = np.inf
-        if frames.gain is not None:
-            signals /= frames.gain[:, None]
-            matrices /= (frames.gain**2)[:, None, None]
-        # kernels are compiled for columns that lie in one piece
-        first, second = np.ascontiguousarray(signals.T)
-        var1, cov, _, var2 = np.ascontiguousarray(matrices.reshape(-1, 4).T)
-    state = rule_out(sensor, frames)
-    bad = ~(np.isfinite(first) & np.isfinite(second))
-    state[bad & (state == 0)] = UNREPRESENTABLE
-    apart = 0.0 if with_relative else sensor.noise.relative
-    return Net(first, second, var1, var2, cov, apart, state)
+    # sizes of zero rather than None: the machine code is one, and here costs nothing
+    whole = noise._replace(
+        shot=noise.shot or 0.0, relative=(noise.relative or 0.0) if with_relative else 0.0
+    )
+    gain = np.ones(n) if frames.gain is None else frames.gain
+    net = Net(
+        first=np.empty(n),
+        second=np.empty(n),
+        var1=np.empty(n),
+        var2=np.empty(n),
+        cov=np.empty(n),
+        relative=0.0 if with_relative else sensor.noise.relative,
+        state=rule_out(sensor, frames),
+    )
+    _fill(np.ascontiguousarray(frames.readings), crosstalk, gain, whole, net)
+    return net
+
+
+@compiled
+def _fill(
+    readings: Array, crosstalk: tuple[float, float], gain: Array, instrument: Instrument, net: Net
+) -> None:
+    """Fill in signals and noise, and mark the frames that are beyond what a number can hold."""
+    first_crosstalk, second_crosstalk = crosstalk
+    for i in range(gain.size):
+        raw1, raw2 = readings[i, 0], readings[i, 1]
+        first, second = raw1 - first_crosstalk, raw2 - second_crosstalk
+        matrix = covariance(noise_of((raw1, raw2), (first, second), instrument))
+        square = gain[i] * gain[i]
+        net.first[i], net.second[i] = first / gain[i], second / gain[i]
+        net.var1[i], net.var2[i] = _held(matrix.e11) / square, _held(matrix.e22) / square
+        net.cov[i] = _held(matrix.e21) / square
+        finite = math.isfinite(net.first[i]) and math.isfinite(net.second[i])
+        if not finite and net.state[i] == 0:
+            net.state[i] = UNREPRESENTABLE
+
+
+@compiled
+def _held(variance: float) -> float:
+    """Return a variance: infinite where its parts are beyond what a number can hold."""
+    return variance if variance == variance else math.inf
 
 
 def known_net_readings(task: Task) -> Net:
