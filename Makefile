@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report readme picture notebook-data calibrate coverage test check lint format types fast lock clean
+.PHONY: help setup demo report readme api picture notebook-data calibrate coverage test check lint format types fast lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -27,6 +27,9 @@ report: $(READY) ## Error against run time of every technique: a table, out/repo
 
 readme: $(READY) ## Write the table of techniques into the README anew
 	$(BIN)/python -m service.technique_table README.md
+
+api: $(READY) ## Write docs/api.md from the docstrings anew
+	$(BIN)/python docs/make_api.py > docs/api.md
 
 picture: $(READY) ## Make the README's picture anew
 	$(BIN)/hybridtof demo --out docs
