@@ -25,8 +25,8 @@ demo: $(READY) ## Readings to distances through the running service: a table, ou
 report: $(READY) ## Error against run time of every technique: a table, out/report.json, out/report.png
 	$(BIN)/hybridtof report --quick --out out
 
-readme: $(READY) ## Write the table of techniques into the README anew
-	$(BIN)/python -m service.technique_table README.md
+readme: $(READY) ## Write the table of techniques in docs/techniques.md anew
+	$(BIN)/python -m service.technique_table docs/techniques.md
 
 api: $(READY) ## Write docs/api.md from the docstrings anew
 	$(BIN)/python docs/make_api.py > docs/api.md

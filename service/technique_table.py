@@ -1,6 +1,6 @@
-"""The README's table of techniques, from the registry.
+"""The table of techniques in the documents, from the registry.
 
-    python -m service.technique_table README.md
+    python -m service.technique_table docs/techniques.md
 
 writes it anew between the two comments that mark its place.
 """
