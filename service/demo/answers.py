@@ -83,7 +83,10 @@ def of_estimates(name: str, truth_m: Sequence[float], frames: Sequence[dict[str,
 
 
 def of_posterior(name: str, truth_m: Sequence[float], posterior: dict[str, Any]) -> Answer:
-    """Read a posterior: medians, 90 % intervals, modes; several modes are ambiguous."""
+    """Read a posterior: medians, 90 % intervals, modes; several modes are ambiguous.
+
+    Frames after those of which the truth is given, such as empty ones, are left out.
+    """
     ranges = posterior["range_m"]
     points = []
     for index, truth in enumerate(truth_m):

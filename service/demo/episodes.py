@@ -14,6 +14,7 @@ __all__ = ["EPISODES", "crosstalk", "derivatives", "nearest", "phases"]
 Body = dict[str, Any]
 
 _SEED = 1
+_EMPTY = 5  # frames without the object
 _PULSED: Body = {
     "kind": "pulsed",
     "pulse_width_s": 1e-7,
@@ -33,7 +34,8 @@ def _estimates(
 ) -> Answer:
     body = {"sensor": sensor, "scene": scene, "frames": frames, "techniques": [technique]}
     (result,) = client.post("/v1/estimates", body)["results"]
-    return of_estimates(technique, truth, result["frames"])
+    # empty frames come last, and have no truth
+    return of_estimates(technique, truth, result["frames"][: len(truth)])
 
 
 def _posterior(
@@ -90,20 +92,31 @@ def _recorded(client: Client, path: Path) -> tuple[Body, Body, list[float]]:
 
 
 def crosstalk(client: Client, _: Path) -> Episode:
-    """Send crosstalk of unknown size and a plate of unknown size."""
-    truth_scene = {"object": _PLATE, "crosstalk": [0.004, 0.4]}
-    trajectory = {"kind": "radial", "from_m": 0.15, "to_m": 2.0, "frames": 40, "spacing": "log"}
-    frames, truth = _simulated(client, _PULSED, truth_scene, trajectory)
+    """Send a plate of unknown size behind a cover glass, and five frames without it."""
+    glass = {"object": _PLATE, "crosstalk": [0.004, 0.4]}
+    way = {"kind": "radial", "from_m": 0.15, "to_m": 2.0, "frames": 24, "spacing": "log"}
+    _, truth = _simulated(client, _PULSED, glass, way)
+    count = len(truth)
+    # the ranges of an empty scene play no part
+    trajectory = {
+        "range_m": truth + [1.0] * _EMPTY,
+        "time_s": [0.01 * i for i in range(count + _EMPTY)],
+        "object_present": [True] * count + [False] * _EMPTY,
+    }
+    everything, _ = _simulated(client, _PULSED, glass, trajectory)
+    frames = {
+        name: column[:count] for name, column in everything.items() if name != "object_present"
+    }
     unknown = [{"prior": "halfnormal", "sd": 0.02}, {"prior": "halfnormal", "sd": 2.0}]
-    sized = {key: _PLATE[key] for key in ("c0", "c1")}
-    known_shape = {"object": sized, "crosstalk": unknown}
+    ranges = {"prior": "reference", "low": 0.02, "high": 5.0}
+    scene = {"crosstalk": unknown, "range_m": ranges}
     answers = (
         # as if there were none
         _estimates(client, _PULSED, {}, frames, truth, "conventional"),
-        _estimates(client, _PULSED, known_shape, frames, truth, "differential"),
-        _posterior(client, _PULSED, {"crosstalk": unknown}, frames, truth),
+        _estimates(client, _PULSED, scene, everything, truth, "joint_fit"),
+        _posterior(client, _PULSED, scene, everything, truth),
     )
-    return Episode("Unknown crosstalk", "simulated", answers)
+    return Episode("A cover glass: crosstalk of unknown size", "simulated", answers)
 
 
 def derivatives(client: Client, _: Path) -> Episode:
@@ -149,6 +162,8 @@ def phases(client: Client, _: Path) -> Episode:
         single.append(_posterior(client, sensor, scene, frame, [range_m], method="auto"))
     points = tuple(answer.points[0] for answer in single)
     answers = (
+        # as if there were none
+        _estimates(client, sensor, {}, frames, truth, "conventional"),
         _estimates(client, sensor, scene, frames, truth, "background_cancelling"),
         Answer("posterior", points, "a posterior of each frame alone"),
     )
