@@ -18,6 +18,7 @@ from service.technique_table import END, START, technique_table
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+TECHNIQUES_PAGE = (ROOT / "docs" / "techniques.md").read_text(encoding="utf-8")
 DOCUMENTS = [
     *sorted(ROOT.glob("*.md")),
     *sorted((ROOT / "docs").glob("*.md")),
@@ -78,8 +79,54 @@ async def test_curl_example() -> None:
                 assert rounded(frame[key]) == rounded(value), key
 
 
+def test_python_example(capsys: pytest.CaptureFixture[str]) -> None:
+    code = block("python: executed by tests/test_readme.py")
+    exec(compile(code, "README.md", "exec"), {})  # noqa: S102  # our own text
+    printed = capsys.readouterr().out.strip()
+    assert f"prints `{printed}`" in README
+    assert len(code.splitlines()) <= 10
+    # through the front door alone
+    assert set(re.findall(r"^(?:import|from) (\w+)", code, re.MULTILINE)) == {"numpy", "hybridtof"}
+
+
+def test_command_line_example(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The files are those that the text describes: what the Python example holds."""
+    code = block("python: executed by tests/test_readme.py").splitlines()
+    names: dict[str, Any] = {}
+    exec("\n".join(code[:-2]), names)  # noqa: S102  # our own text
+    documents = {
+        name: names[name].model_dump(mode="json", exclude_unset=True)
+        for name in ("sensor", "scene")
+    }
+    monkeypatch.chdir(tmp_path)
+    Path("scene.json").write_text(json.dumps(documents), encoding="utf-8")
+    rows = [f"{w1},{w2}" for w1, w2 in zip(names["w1"], names["w2"], strict=True)]
+    Path("frames.csv").write_text("\n".join(["w1,w2", *rows]) + "\n", encoding="utf-8")
+    program, *words = shlex.split(block("command: executed by tests/test_readme.py"))
+    assert program == "hybridtof"
+    assert main(words) == 0
+    capsys.readouterr()
+    shown = block("output: compared by tests/test_readme.py").splitlines()
+    found = Path("ranges.csv").read_text(encoding="utf-8").splitlines()
+    assert found[0] == shown[0]
+    assert len(found) == len(shown) == 4
+    for line, cut in zip(found[1:], shown[1:], strict=True):
+        for value, short in zip(line.split(","), cut.split(","), strict=True):
+            if "." in short:
+                assert float(value) == pytest.approx(float(short), abs=0.51e-4)
+            else:
+                assert value == short
+
+
+def test_front_page_is_short() -> None:
+    assert len(README.splitlines()) <= 120
+    assert README.count("![") == 1
+
+
 def test_table_of_techniques() -> None:
-    shown = README.split(START)[1].split(END)[0].strip()
+    shown = TECHNIQUES_PAGE.split(START)[1].split(END)[0].strip()
     assert shown == technique_table(), "run `make readme`"
     assert all(f"| `{name}` |" in shown for name in TECHNIQUES)
 

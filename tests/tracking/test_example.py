@@ -1,4 +1,4 @@
-"""The example of the README runs, and says what it should."""
+"""The example of docs/streams.md runs, and says what it should."""
 
 import re
 from pathlib import Path
@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "streams.md"
 
 
-def test_the_example_of_the_readme(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_example_of_the_page(capsys: pytest.CaptureFixture[str]) -> None:
     mark = "<!-- executed by tests/tracking/test_example.py -->"
-    found = re.search(rf"{mark}\n```python\n(.*?)\n```", README.read_text("utf-8"), re.DOTALL)
+    found = re.search(rf"{mark}\n```python\n(.*?)\n```", PAGE.read_text("utf-8"), re.DOTALL)
     assert found is not None
     names: dict[str, object] = {}
-    exec(compile(found[1], str(README), "exec"), names)  # noqa: S102  # our own text
+    exec(compile(found[1], str(PAGE), "exec"), names)  # noqa: S102  # our own text
     first, second = capsys.readouterr().out.splitlines()
     numbers = [float(word) for word in re.findall(r"[\d.]+|nan", first)]
     present, ranges, deviations = np.reshape(numbers, (3, 3))
