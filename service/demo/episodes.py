@@ -95,7 +95,7 @@ def crosstalk(client: Client, _: Path) -> Episode:
     """Send a plate of unknown size behind a cover glass, and five frames without it."""
     glass = {"object": _PLATE, "crosstalk": [0.004, 0.4]}
     way = {"kind": "radial", "from_m": 0.15, "to_m": 2.0, "frames": 24, "spacing": "log"}
-    _, truth = _simulated(client, _PULSED, glass, way)
+    truth = _simulated(client, _PULSED, glass, way)[1]
     count = len(truth)
     # the ranges of an empty scene play no part
     trajectory = {
@@ -103,7 +103,7 @@ def crosstalk(client: Client, _: Path) -> Episode:
         "time_s": [0.01 * i for i in range(count + _EMPTY)],
         "object_present": [True] * count + [False] * _EMPTY,
     }
-    everything, _ = _simulated(client, _PULSED, glass, trajectory)
+    everything = _simulated(client, _PULSED, glass, trajectory)[0]
     frames = {
         name: column[:count] for name, column in everything.items() if name != "object_present"
     }
