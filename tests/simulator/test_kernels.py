@@ -11,6 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from simulator.background import shadow, shadow_slope
+from simulator.object_arrays import object_fluxes, quadratics, shadows
 from simulator.object_model import (
     C1_LIMIT_DIFFERENTIAL,
     C1_LIMIT_INTENSITY,
@@ -326,3 +327,16 @@ def test_curves_are_monotone_down_to_the_limit_and_no_further(
         values = np.array([curve(x, limit * relative) for x in r.tolist()])
         steps = -np.diff(values) if falls else np.diff(values)
         assert bool(np.all(steps > 0)) is monotone
+
+
+@settings(deadline=None)
+@given(st.lists(shapes(), min_size=1, max_size=4), st.lists(ranges, min_size=1, max_size=3))
+def test_arrays_are_the_kernels_element_by_element(shape: list[Pair], r: list[float]) -> None:
+    c0, c1 = np.array(shape).T[:, :, None]
+    q, flux, share = quadratics(r, c0, c1), object_fluxes(r, 3.0, c0, c1), shadows(r, c0, c1)
+    assert q.shape == flux.shape == share.shape == (len(shape), len(r))
+    for i, (a, b) in enumerate(shape):
+        for j, x in enumerate(r):
+            assert q[i, j] == quadratic(x, a, b)
+            assert flux[i, j] == object_flux(x, 3.0, a, b)
+            assert share[i, j] == shadow(x, a, b)

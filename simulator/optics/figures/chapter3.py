@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from simulator.object_arrays import object_fluxes
 from simulator.optics.brdf import ConstantFresnel, Material
 from simulator.optics.figures.style import axes, note
 from simulator.optics.parametrisation import fit_object
@@ -212,7 +213,7 @@ _RANGES: Array = np.linspace(0.02, 2.0, 200)
 
 
 def _object(r: Array) -> Array:
-    return np.asarray(_C0 * _C2 / (r * r * (r * r + _C1 * r + _C0)))
+    return object_fluxes(r, _C0 * _C2, _C0, _C1)
 
 
 def _crosstalk(figure: Figure, title: str, cases: Sequence[tuple[str, float, float]]) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from simulator.object_model import object_flux
+from simulator.object_arrays import object_fluxes, shadows
 from simulator.optics.figures.solvers import background_cancelling, conventional, differential
 from simulator.optics.figures.style import axes, note
 
@@ -25,13 +25,12 @@ _BACKGROUND_M, _STRENGTH = 10.0, 1e-3
 
 
 def _flux(r: Array) -> Array:
-    return np.array([object_flux(x, C0 * C2, C0, C1) for x in r.tolist()])
+    return object_fluxes(r, C0 * C2, C0, C1)
 
 
 def _background(r: Array) -> Array:
     """Return the background beside an object whose shadow has c0' = 0.73 c0 and c1' = 0.24 |c1|."""
-    area, edge = 0.73 * C0, 0.24 * abs(C1)
-    return np.asarray(_STRENGTH * (1 - area / (r * r + edge * r + area)))
+    return _STRENGTH * shadows(r, 0.73 * C0, 0.24 * abs(C1))
 
 
 def _slope(w1: Callable[[Array], Array], w2: Callable[[Array], Array], r: Array) -> Array:
