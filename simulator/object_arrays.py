@@ -34,9 +34,10 @@ def quadratics(r: ArrayLike, c0: ArrayLike, c1: ArrayLike) -> Array:
     ndarray
         Of the common shape, to the last bit what `object_model.quadratic` gives.
     """
-    parts = np.broadcast_arrays(*(np.asarray(part, dtype=np.float64) for part in (r, c0, c1)))
-    flat = (np.ascontiguousarray(part).reshape(-1) for part in parts)
-    return np.asarray(_quadratics(*flat).reshape(parts[0].shape))
+    parts = [np.asarray(part, dtype=np.float64) for part in (r, c0, c1)]
+    shape = np.broadcast_shapes(*(part.shape for part in parts))
+    flat = (np.broadcast_to(part, shape).flatten() for part in parts)
+    return np.asarray(_quadratics(*flat).reshape(shape))
 
 
 def object_fluxes(r: ArrayLike, strength: ArrayLike, c0: ArrayLike, c1: ArrayLike) -> Array:
