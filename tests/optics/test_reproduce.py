@@ -1,13 +1,12 @@
 """The command line `hybridtof reproduce`."""
 
-import argparse
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from service.reproduce import add_parser
+from service.cli import main
 
 FIGURES = (
     *(f"2-{i}" for i in range(6, 14)),
@@ -20,10 +19,7 @@ FIGURES = (
 
 
 def run(*arguments: str) -> int:
-    parser = argparse.ArgumentParser()
-    add_parser(parser.add_subparsers(required=True))
-    args = parser.parse_args(["reproduce", *arguments])
-    return int(args.run(args))
+    return main(["reproduce", *arguments])
 
 
 def test_csv(capsys: pytest.CaptureFixture[str]) -> None:
@@ -72,7 +68,7 @@ def test_all_figures(tmp_path: Path) -> None:
 
 def test_importing_the_command_does_not_import_plotting() -> None:
     code = (
-        "import sys, service.reproduce;"
+        "import sys, service.cli;"
         "sys.exit(any(name.startswith('matplotlib') for name in sys.modules))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
