@@ -16,9 +16,9 @@ import numpy as np
 
 from inference.estimate import estimate
 from inference.estimates import Status
+from service.answers.estimates import encode_estimates
 from service.checks import system_with_frames
-from service.estimate_json import encode_estimates
-from service.schemas import EstimateRequest
+from service.requests import EstimateRequest
 from service.strict_json import check_bulk, decode
 from simulator.validated import parse
 

@@ -14,14 +14,7 @@ from service.fold import Fold
 from service.job_store import MemoryJobStore
 from service.jobs import Jobs
 from service.process_pool import ProcessPool
-from service.routes import (
-    estimates,
-    health,
-    identifiability,
-    posteriors,
-    simulations,
-    techniques,
-)
+from service.routes import ROUTERS
 from service.settings import Settings
 from service.state import State
 
@@ -68,7 +61,7 @@ def create_app(
     )
     app.state.shared = state
     problems.install(app)
-    openapi.install(app)
-    for module in (estimates, identifiability, posteriors, simulations, techniques, health):
-        app.include_router(module.router)
+    openapi.install(app, ROUTERS)
+    for router in ROUTERS:
+        app.include_router(router)
     return app

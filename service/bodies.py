@@ -1,7 +1,7 @@
 """Request bodies: bytes, bounded; then JSON; then a validated request."""
 
-from collections.abc import AsyncIterator, Awaitable, Callable
-from typing import Any, TypeVar
+from collections.abc import AsyncIterator
+from typing import Generic, TypeVar
 
 import anyio.to_thread
 from fastapi import Request
@@ -11,7 +11,7 @@ from service.state import state_of
 from service.strict_json import check_bulk, decode
 from simulator.validated import Validated, parse
 
-__all__ = ["body_of", "openapi_body", "parse_document", "read_limited"]
+__all__ = ["BodyOf", "parse_document", "read_limited"]
 
 T = TypeVar("T", bound=Validated)
 
@@ -92,36 +92,35 @@ def _check_media_type(header: str | None) -> None:
         raise UnsupportedMediaTypeError("Content-Type must be application/json")
 
 
-def body_of(model: type[T]) -> Callable[[Request], Awaitable[tuple[T, bytes]]]:
-    """Make the FastAPI dependency that reads a request body of one type.
+class BodyOf(Generic[T]):
+    """FastAPI dependency that reads a request body of one type: the request, and its bytes.
 
     FastAPI's own parsing runs on the event loop, takes NaN and repeated members, and does not
-    bound the body.
+    bound the body. The OpenAPI document shows the type by itself (`service.openapi`).
 
     Parameters
     ----------
     model : type
         A subclass of `Validated`.
-
-    Returns
-    -------
-    callable
-        Gives the request and the bytes that it was read from.
     """
 
-    async def dependency(request: Request) -> tuple[T, bytes]:
+    def __init__(self, model: type[T]) -> None:
+        self.model = model
+
+    async def __call__(self, request: Request) -> tuple[T, bytes]:
+        """Read, bounded; then parse and validate in a thread.
+
+        Raises
+        ------
+        UnsupportedMediaTypeError, BodyTooLargeError, MalformedError, InvalidInputError
+            Each as its name says.
+        """
         _check_media_type(request.headers.get("content-type"))
         state = state_of(request)
         raw = await read_limited(
             request.stream(), request.headers.get("content-length"), state.settings.max_body_bytes
         )
-        parsed = await anyio.to_thread.run_sync(parse_document, model, raw, limiter=state.threads)
+        parsed = await anyio.to_thread.run_sync(
+            parse_document, self.model, raw, limiter=state.threads
+        )
         return parsed, raw
-
-    return dependency
-
-
-def openapi_body(model: type[Validated]) -> dict[str, Any]:
-    """Return what OpenAPI says of a body that `body_of` reads, for ``openapi_extra``."""
-    schema = {"$ref": f"#/components/schemas/{model.__name__}"}
-    return {"requestBody": {"required": True, "content": {"application/json": {"schema": schema}}}}

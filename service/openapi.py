@@ -1,37 +1,40 @@
 """The OpenAPI document, with the bodies that the service reads by itself."""
 
+from collections.abc import Iterator, Sequence
 from typing import Any
 
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
 from fastapi.openapi.utils import get_openapi
+from fastapi.routing import APIRoute
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
+from service.bodies import BodyOf
 from service.problems import ProblemDetails
-from service.schemas import (
-    EstimateRequest,
-    IdentifiabilityRequest,
-    PosteriorRequest,
-    SimulationRequest,
-)
 
 __all__ = ["install"]
 
-_MODELS: tuple[type[BaseModel], ...] = (
-    EstimateRequest,
-    IdentifiabilityRequest,
-    PosteriorRequest,
-    SimulationRequest,
-)
+
+def _bodies(routers: Sequence[APIRouter]) -> Iterator[tuple[str, str, type[BaseModel]]]:
+    """Yield path, method and type of every body that `BodyOf` reads."""
+    for route in (route for router in routers for route in router.routes):
+        if not isinstance(route, APIRoute):
+            continue
+        for dependency in route.dependant.dependencies:
+            if isinstance(dependency.call, BodyOf):
+                for method in route.methods or ():
+                    yield route.path_format, method.lower(), dependency.call.model
 
 
-def install(app: FastAPI) -> None:
+def install(app: FastAPI, routers: Sequence[APIRouter]) -> None:
     """Let the application describe itself, once, when it is asked to.
 
     Parameters
     ----------
     app : FastAPI
         The application.
+    routers : sequence of APIRouter
+        Its routers.
     """
 
     def openapi() -> dict[str, Any]:
@@ -39,13 +42,18 @@ def install(app: FastAPI) -> None:
             document = get_openapi(
                 title=app.title, version=app.version, description=app.description, routes=app.routes
             )
-            reference = "#/components/schemas/{model}"
-            for mode, models in (("validation", _MODELS), ("serialization", (ProblemDetails,))):
-                _, found = models_json_schema(
-                    [(model, mode) for model in models],  # type: ignore[misc]
-                    ref_template=reference,
-                )
-                document["components"]["schemas"] |= found["$defs"]
+            bodies = list(_bodies(routers))
+            models = {model: None for _, _, model in bodies}
+            references, found = models_json_schema(
+                [(model, "validation") for model in models] + [(ProblemDetails, "serialization")],
+                ref_template="#/components/schemas/{model}",
+            )
+            document["components"]["schemas"] |= found["$defs"]
+            for path, method, model in bodies:
+                document["paths"][path][method]["requestBody"] = {
+                    "required": True,
+                    "content": {"application/json": {"schema": references[model, "validation"]}},
+                }
             _drop_supposed_refusals(document)
             app.openapi_schema = document
         return app.openapi_schema

@@ -45,12 +45,12 @@ def _run(args: argparse.Namespace) -> int:
     import json
 
     from inference.estimate import estimate
+    from service.answers.estimates import encode_estimates
     from service.bad_rows import insert_answers
     from service.commands.files import check_folder, naming
     from service.commands.frames import checked
     from service.commands.output import write_result
     from service.estimate_files import check_estimate_suffix, estimates_as
-    from service.estimate_json import encode_estimates
 
     if args.output is not None:
         check_estimate_suffix(args.output)

@@ -61,13 +61,15 @@ def _values(options: list[str]) -> dict[str, float]:
 
 
 def _run(args: argparse.Namespace) -> int:
+    import dataclasses
+
     import pydantic_core
 
+    from service.answers.identifiability import identifiability_of
     from service.commands.files import naming, read_document
     from service.commands.output import write_result
-    from service.identifiability_json import identifiability_of
     from service.plausibility import doubts
-    from service.schemas import IdentifiabilityRequest, SystemDescription
+    from service.requests import IdentifiabilityRequest, SystemDescription
     from simulator.errors import InvalidInputError
     from simulator.validated import parse
 
@@ -87,5 +89,5 @@ def _run(args: argparse.Namespace) -> int:
     sources = {"/ranges_m": "--ranges", "/object_present": "--empty", "/at": "--at"}
     with naming(sources | {"": str(args.scene)}):
         result = identifiability_of(parse(IdentifiabilityRequest, data))
-    write_result(pydantic_core.to_json(result))
+    write_result(pydantic_core.to_json(dataclasses.asdict(result)))
     return 0

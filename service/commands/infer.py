@@ -48,10 +48,10 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
 
 def _run(args: argparse.Namespace) -> int:
     from inference.posterior.settings import SamplerSettings
+    from service.answers.posteriors import full
     from service.commands.files import naming, source
     from service.commands.frames import checked_whole
     from service.commands.output import write_result
-    from service.posterior_json import full
     from simulator.validated import parse
 
     form = None if args.draws is None else _format_of(args.draws)

@@ -48,12 +48,12 @@ def _radial(args: argparse.Namespace) -> dict[str, Any]:
 def _run(args: argparse.Namespace) -> int:
     import pydantic_core
 
+    from service.answers.simulations import simulation_of
     from service.commands.files import check_folder, naming, read_data, read_document
     from service.commands.output import write_result
     from service.frame_files import check_suffix, write_frames
     from service.plausibility import doubts
-    from service.schemas import SimulationRequest, SystemDescription
-    from service.simulation import simulation_of
+    from service.requests import SimulationRequest, SystemDescription
     from simulator.errors import InvalidInputError
     from simulator.validated import parse
 

@@ -36,7 +36,7 @@ def _run(args: argparse.Namespace) -> int:
     from service.commands.files import naming, open_lines, read_document, reading
     from service.commands.output import write_result
     from service.plausibility import doubts
-    from service.schemas import TrackedSystem
+    from service.requests import TrackedSystem
     from service.tracked_lines import TrackedLines, lines_like
 
     stated = read_document(TrackedSystem, args.scene)

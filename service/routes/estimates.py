@@ -7,17 +7,17 @@ from fastapi import APIRouter, Depends, Request
 from fastapi.responses import Response
 
 from inference.estimate import estimate
-from service.bodies import body_of, openapi_body
+from service.answers.estimates import EstimatesResponse, encode_estimates
+from service.bodies import BodyOf
 from service.checks import system_with_frames
-from service.estimate_json import encode_estimates
 from service.problems import problem_responses
-from service.schemas import EstimateRequest, EstimatesResponse
+from service.requests import EstimateRequest
 from service.state import state_of
 
 __all__ = ["answer", "router"]
 
 router = APIRouter(prefix="/v1/estimates", tags=["estimates"])
-Body = Annotated[tuple[EstimateRequest, bytes], Depends(body_of(EstimateRequest))]
+Body = Annotated[tuple[EstimateRequest, bytes], Depends(BodyOf(EstimateRequest))]
 
 
 def answer(request: EstimateRequest) -> bytes:
@@ -46,7 +46,6 @@ def answer(request: EstimateRequest) -> bytes:
     "",
     response_model=None,
     responses={200: {"model": EstimatesResponse}, **problem_responses(400, 413, 415, 422)},
-    openapi_extra=openapi_body(EstimateRequest),
 )
 async def create(request: Request, body: Body) -> Response:
     """Return all physical roots of every frame."""

@@ -1,5 +1,6 @@
 """What frames would tell of a scene, before they are taken."""
 
+import dataclasses
 from typing import Annotated
 
 import anyio.to_thread
@@ -7,30 +8,29 @@ import pydantic_core
 from fastapi import APIRouter, Depends, Request
 from fastapi.responses import Response
 
-from service.bodies import body_of, openapi_body
-from service.identifiability_json import identifiability_of
+from service.answers.identifiability import IdentifiabilityResponse, identifiability_of
+from service.bodies import BodyOf
 from service.problems import problem_responses
-from service.schemas import IdentifiabilityRequest, IdentifiabilityResponse
+from service.requests import IdentifiabilityRequest
 from service.state import state_of
 
 __all__ = ["router"]
 
 router = APIRouter(prefix="/v1/identifiability", tags=["identifiability"])
-Body = Annotated[tuple[IdentifiabilityRequest, bytes], Depends(body_of(IdentifiabilityRequest))]
+Body = Annotated[tuple[IdentifiabilityRequest, bytes], Depends(BodyOf(IdentifiabilityRequest))]
 
 
 @router.post(
     "",
     response_model=None,
     responses={200: {"model": IdentifiabilityResponse}, **problem_responses(400, 413, 415, 422)},
-    openapi_extra=openapi_body(IdentifiabilityRequest),
 )
 async def create(request: Request, body: Body) -> Response:
     """Return rank, Cramer-Rao bounds, and a status with a reason for every unknown."""
     limiter = state_of(request).threads
 
     def content() -> bytes:
-        return pydantic_core.to_json(identifiability_of(body[0]))
+        return pydantic_core.to_json(dataclasses.asdict(identifiability_of(body[0])))
 
     text = await anyio.to_thread.run_sync(content, limiter=limiter)
     return Response(text, media_type="application/json")

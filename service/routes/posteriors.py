@@ -8,20 +8,20 @@ import anyio.to_thread
 from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.responses import JSONResponse, Response
 
-from service.bodies import body_of, openapi_body
+from service.answers.posteriors import PosteriorPage, PosteriorResponse, brief, full
+from service.bodies import BodyOf
 from service.checks import system_with_frames
 from service.errors import MalformedError, NotAcceptableError
 from service.exports.negotiation import accepted_export
 from service.exports.registry import EXPORTS
-from service.posterior_json import brief, full
 from service.problems import problem_responses
-from service.schemas import PosteriorPage, PosteriorRequest, PosteriorResponse
+from service.requests import PosteriorRequest
 from service.state import state_of
 
 __all__ = ["router"]
 
 router = APIRouter(prefix="/v1/posteriors", tags=["posteriors"])
-Body = Annotated[tuple[PosteriorRequest, bytes], Depends(body_of(PosteriorRequest))]
+Body = Annotated[tuple[PosteriorRequest, bytes], Depends(BodyOf(PosteriorRequest))]
 
 _KEY = re.compile(r"[\x21-\x7e]{1,255}")
 
@@ -37,7 +37,6 @@ def _key(header: str | None) -> str | None:
     status_code=202,
     response_model=None,
     responses={202: {"model": PosteriorResponse}, **problem_responses(400, 413, 415, 422, 503)},
-    openapi_extra=openapi_body(PosteriorRequest),
 )
 async def create(
     request: Request,

@@ -7,23 +7,22 @@ import pydantic_core
 from fastapi import APIRouter, Depends, Request
 from fastapi.responses import Response
 
-from service.bodies import body_of, openapi_body
+from service.answers.simulations import SimulationResponse, simulation_of
+from service.bodies import BodyOf
 from service.problems import problem_responses
-from service.schemas import SimulationRequest, SimulationResponse
-from service.simulation import simulation_of
+from service.requests import SimulationRequest
 from service.state import state_of
 
 __all__ = ["router"]
 
 router = APIRouter(prefix="/v1/simulations", tags=["simulations"])
-Body = Annotated[tuple[SimulationRequest, bytes], Depends(body_of(SimulationRequest))]
+Body = Annotated[tuple[SimulationRequest, bytes], Depends(BodyOf(SimulationRequest))]
 
 
 @router.post(
     "",
     response_model=None,
     responses={200: {"model": SimulationResponse}, **problem_responses(400, 413, 415, 422)},
-    openapi_extra=openapi_body(SimulationRequest),
 )
 async def create(request: Request, body: Body) -> Response:
     """Simulate frames; unknowns of the scene are drawn from their priors, once."""

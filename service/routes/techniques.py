@@ -1,32 +1,16 @@
 """What the techniques need, what they are immune to, what they cost."""
 
 from fastapi import APIRouter
+from pydantic import BaseModel
 
-from inference.techniques import ALL_TECHNIQUES
-from service.schemas import TechniqueDescription, TechniquesResponse
+from service.answers.techniques import TechniquesResponse, all_techniques
 
 __all__ = ["router"]
 
 router = APIRouter(prefix="/v1/techniques", tags=["techniques"])
 
 
-@router.get("")
-async def techniques() -> TechniquesResponse:
+@router.get("", response_model=TechniquesResponse)
+async def techniques() -> BaseModel:
     """List the techniques."""
-    return TechniquesResponse(
-        techniques=[
-            TechniqueDescription(
-                name=technique.name,
-                kinds=list(technique.kinds),
-                observables=technique.observables,
-                needs=list(technique.needs),
-                immune_to=list(technique.immune_to),
-                uses_background=technique.uses_background,
-                differential=technique.differential,
-                cost=technique.cost,
-                equations=technique.equations,
-                roots=technique.roots,
-            )
-            for technique in ALL_TECHNIQUES.values()
-        ]
-    )
+    return all_techniques()

@@ -8,13 +8,10 @@ from typing import Any
 import httpx
 import pytest
 
+from service.answers.estimates import EstimatesResponse
+from service.answers.posteriors import PosteriorPage, PosteriorResponse
+from service.answers.simulations import SimulationResponse
 from service.app import create_app
-from service.schemas import (
-    EstimatesResponse,
-    PosteriorPage,
-    PosteriorResponse,
-    SimulationResponse,
-)
 from service.settings import Settings
 from tests.service import fake_fold
 

@@ -8,8 +8,8 @@ from typing import Any
 import httpx
 import pytest
 
+from service.answers.identifiability import IdentifiabilityResponse
 from service.cli import main
-from service.schemas import IdentifiabilityResponse
 from tests.service.conftest import SENSOR
 from tests.service.test_http import assert_problem, changed
 

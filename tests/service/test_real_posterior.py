@@ -12,13 +12,14 @@ import pytest
 
 from inference.posterior import fold
 from inference.posterior.settings import SamplerSettings
+from service.answers.posteriors import PosteriorResponse
+from service.answers.simulations import simulation_of
 from service.app import create_app
 from service.job_store import MemoryJobStore
 from service.jobs import Jobs
 from service.process_pool import ProcessPool
-from service.schemas import PosteriorRequest, PosteriorResponse, SimulationRequest
+from service.requests import PosteriorRequest, SimulationRequest
 from service.settings import Settings
-from service.simulation import simulation_of
 from simulator.frames import frames_from_columns
 from simulator.validated import parse
 from tests.service.conftest import SENSOR

@@ -4,10 +4,20 @@ import math
 import secrets
 from typing import Any
 
-from service.schemas import SimulationRequest
+import pydantic
+
+from service.requests import SimulationRequest
 from simulator.simulate import simulate
 
-__all__ = ["simulation_of"]
+__all__ = ["SimulationResponse", "simulation_of"]
+
+
+class SimulationResponse(pydantic.BaseModel):
+    """Answer of ``POST /v1/simulations``."""
+
+    frames: dict[str, list[float] | list[bool]]
+    truth: dict[str, Any]
+    seed: int
 
 
 def simulation_of(request: SimulationRequest) -> dict[str, Any]:

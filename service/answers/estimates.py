@@ -7,17 +7,93 @@ but for their numbers, so each kind is one template that is filled from columns 
 import dataclasses
 import json
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+import pydantic
 import pydantic_core
 from numpy.typing import NDArray
 
 from inference.estimates import Estimates, Status, TechniqueResult
 
-__all__ = ["encode_estimates"]
+__all__ = [
+    "EstimatesResponse",
+    "FrameEstimate",
+    "LeftOutTechnique",
+    "TechniqueEstimates",
+    "encode_estimates",
+]
 
 Array = NDArray[np.float64]
+
+
+class FrameEstimate(pydantic.BaseModel):
+    """One technique's answer for one frame."""
+
+    status: Literal["unique", "ambiguous", "none", "saturated"]
+    range_m: float | None
+    sd_m: float | None
+    roots_m: list[float]
+    roots_sd_m: list[float | None]
+    near_fold: bool
+    reason: str | None = None
+    range_bounds_m: tuple[float, float] | None = None
+    power_law: float | None = None
+    zeta: float | None = None
+
+
+class FittedParameter(pydantic.BaseModel):
+    """An unknown that a technique of many frames found; sd is the bound times `widening`."""
+
+    value: float | None
+    sd: float | None
+    status: Literal["identified", "weak", "not_identified"]
+    reason: str | None = None
+
+
+class FittedOptimum(pydantic.BaseModel):
+    """One of the distinct optima of a fit; the deviance is -2 log likelihood."""
+
+    excess_deviance: float
+    parameters: dict[str, float | None]
+
+
+class TechniqueFit(pydantic.BaseModel):
+    """How well a technique of many frames explains them."""
+
+    chi_square: float
+    deviance: float | None = None
+    degrees_of_freedom: int
+    p_value: float
+    misfit: bool
+    rank: int
+    widening: float | None = None
+    optima: list[FittedOptimum]
+
+
+class TechniqueEstimates(pydantic.BaseModel):
+    """One technique's answer."""
+
+    technique: str
+    frames: list[FrameEstimate]
+    parameters: dict[str, FittedParameter] | None
+    fit: TechniqueFit | None = None
+    runtime_s: float
+
+
+class LeftOutTechnique(pydantic.BaseModel):
+    """A technique that was not used, and why."""
+
+    technique: str
+    reason: str
+
+
+class EstimatesResponse(pydantic.BaseModel):
+    """Answer of ``POST /v1/estimates``."""
+
+    chosen: str | None
+    results: list[TechniqueEstimates]
+    left_out: list[LeftOutTechnique]
 
 
 # frames that are encoded in one go: their texts stay in the processor's cache, and between two goes

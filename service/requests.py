@@ -1,0 +1,83 @@
+"""What clients send, and what files hold: the types by which both are validated."""
+
+from typing import Annotated
+
+import pydantic
+
+from inference.posterior.settings import SamplerSettings
+from inference.tracking.settings import TrackingSettings
+from simulator.frames import FrameColumns
+from simulator.scene import Scene
+from simulator.sensor import Sensor
+from simulator.trajectories import Trajectory
+from simulator.validated import Validated
+
+__all__ = [
+    "AnySensor",
+    "EstimateRequest",
+    "IdentifiabilityRequest",
+    "PosteriorRequest",
+    "SimulationRequest",
+    "SystemDescription",
+    "TrackedSystem",
+]
+
+AnySensor = Annotated[Sensor, pydantic.Field(discriminator="kind")]
+# the largest integer that every JSON reader keeps exactly
+Seed = Annotated[int, pydantic.Field(ge=0, le=2**53 - 1)]
+Name = Annotated[str, pydantic.Field(max_length=64)]
+Positive = Annotated[float, pydantic.Field(gt=0)]
+_PLANNED = pydantic.Field(min_length=1, max_length=10_000, fail_fast=True)
+
+
+class SystemDescription(Validated):
+    """A sensor and the scene before it: what every request and every scene file holds."""
+
+    sensor: AnySensor
+    scene: Scene
+
+
+class TrackedSystem(SystemDescription):
+    """A sensor, the scene before it, and how its objects move."""
+
+    tracking: TrackingSettings = TrackingSettings()
+
+
+class EstimateRequest(SystemDescription):
+    """Body of ``POST /v1/estimates``."""
+
+    frames: FrameColumns
+    techniques: Annotated[list[Name], pydantic.Field(min_length=1, max_length=64)] | None = None
+
+
+class PosteriorRequest(SystemDescription):
+    """Body of ``POST /v1/posteriors``."""
+
+    frames: FrameColumns
+    sampler: SamplerSettings = SamplerSettings()
+
+
+class SimulationRequest(SystemDescription):
+    """Body of ``POST /v1/simulations``; a seed that is left out is drawn and returned."""
+
+    trajectory: Trajectory
+    seed: Seed | None = None
+
+
+class IdentifiabilityRequest(SystemDescription):
+    """Body of ``POST /v1/identifiability``: frames before they are taken.
+
+    Attributes
+    ----------
+    ranges_m : list of float
+        Range of the object in every frame [m].
+    object_present : list of bool, optional
+        False for a frame without the object.
+    at : dict of str to float, optional
+        Values of unknowns by scene path at which the bounds are computed; the others are at the
+        medians of their priors.
+    """
+
+    ranges_m: Annotated[list[Positive], _PLANNED]
+    object_present: Annotated[list[bool], _PLANNED] | None = None
+    at: Annotated[dict[Name, float], pydantic.Field(max_length=64)] | None = None
