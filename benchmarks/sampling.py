@@ -5,19 +5,17 @@ as many.
 """
 
 import dataclasses
-from typing import TypeVar
 
 from inference.posterior import fold
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.sampling.verdict import MAX_R_HAT
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages.walking import WalkTask
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
 __all__ = ["Sampled", "sample"]
-
-T = TypeVar("T")
 
 _MOST_CHUNKS = 80
 _MOST_STEPS = 130
@@ -33,9 +31,9 @@ class Sampled:
     rhat: float | None
 
 
-def _shortened(task: T) -> T:
+def _shortened(task: fold.Task) -> fold.Task:
     """Shorten the walk of an ensemble; other tasks are left as they are."""
-    if isinstance(task, fold.Task) and task.ensemble is not None:
+    if isinstance(task, WalkTask):
         return dataclasses.replace(task, steps=min(task.steps, _MOST_STEPS))
     return task
 

@@ -117,8 +117,8 @@ class Fold(Protocol[J, C, T, P]):
         """Return the first checkpoint."""
         ...
 
-    def tasks(self, job: J, checkpoint: C, /) -> Sequence[T]:
-        """Return the independent pieces of the next chunk; none when finished."""
+    def tasks(self, job: J, checkpoint: C, wall_s: float, /) -> Sequence[T]:
+        """Return the independent pieces of the next chunk; none when finished or out of time."""
         ...
 
     def run(self, task: T, /) -> P:

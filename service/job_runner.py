@@ -94,10 +94,9 @@ class Runner(Generic[J, C, T, P]):
             )
             if known is None:
                 return
-            late = wall_s >= record.max_seconds
-            if progress.finished or known.cancel_requested or late:
+            if known.cancel_requested:
                 break
-            tasks = await asyncio.to_thread(fold.tasks, job, checkpoint)
+            tasks = await asyncio.to_thread(fold.tasks, job, checkpoint, wall_s)
             if not tasks:
                 break
             pieces = await asyncio.gather(*(self._execute(fold.run, task) for task in tasks))
@@ -106,12 +105,6 @@ class Runner(Generic[J, C, T, P]):
                 fold.merge, job, checkpoint, [piece for piece, _ in pieces]
             )
         result, _ = await self._execute(_summary, fold.summarise, job, checkpoint, wall_s, cpu_s)
-        if late and not progress.finished:
-            reason = f"stopped at the time limit of {record.max_seconds:g} s"
-            result["verdict"] = {
-                "converged": False,
-                "reasons": [reason, *result["verdict"]["reasons"]],
-            }
         cancelled = known.cancel_requested and not progress.finished
         status = "cancelled" if cancelled else "done"
         await self._save(record.id, status=status, result=result)

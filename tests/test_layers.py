@@ -42,6 +42,7 @@ ALLOWED: dict[str, str] = {
     "inference/posterior/selection": (
         "inference.posterior.sampling inference.density inference.frame"
     ),
+    "inference/posterior/stages": _POSTERIOR,
     "inference/tracking": f"{_POSTERIOR} inference.estimates",
     "service": "service inference simulator.optics",
     "service/answers": "service inference",

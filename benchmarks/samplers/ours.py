@@ -8,11 +8,11 @@ import numpy as np
 
 from benchmarks.samplers.outcome import Outcome, enough, equal, judged
 from inference.posterior import fold
-from inference.posterior.job import chains
 from inference.posterior.sampling.importance import draw_weighted
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.shear import shear_of
 from inference.posterior.sampling.transport import fit_map
+from inference.posterior.stages.state import Walking
 
 
 def ours(job, cap):  # type: ignore[no-untyped-def]
@@ -23,15 +23,17 @@ def ours(job, cap):  # type: ignore[no-untyped-def]
         if not tasks:
             break
         checkpoint = fold.merge(job, checkpoint, [fold.run(task) for task in tasks])
-        if not earlier and enough(checkpoint.ess or 0.0, checkpoint.r_hat or math.inf):
+        reached = fold.progress(job, checkpoint)
+        if not earlier and enough(reached.ess or 0.0, reached.rhat or math.inf):
             earlier = f"ESS and R-hat after {time.process_time() - begin:.1f} s"
     posterior = fold.summarise(job, checkpoint, 0.0, 0.0)
     seconds = time.process_time() - begin
     note = "; ".join(filter(None, [earlier, *posterior.verdict.reasons]))
-    if not checkpoint.ensembles or checkpoint.ensembles[0].steps < 4:
+    stage = checkpoint.stage
+    if not isinstance(stage, Walking) or stage.steps < 4:
         empty = np.empty((0, len(job.density().parameters)))
         return Outcome(seconds, False, 0.0, math.inf, empty, np.empty(0), note), checkpoint
-    kept = chains(job, checkpoint).z
+    kept = stage.chains(job.density().parameters.names).z
     ess, r_hat = judged(kept)
     return Outcome(seconds, posterior.verdict.converged, ess, r_hat, *equal(kept), note), checkpoint
 

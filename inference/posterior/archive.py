@@ -18,6 +18,14 @@ from inference.posterior.sampling.transport import TriangularMap
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.selection.candidates import Candidate
 from inference.posterior.selection.selection import Decision, Selection
+from inference.posterior.stages.state import (
+    Known,
+    Selecting,
+    Starting,
+    Tempering,
+    Walking,
+    Weighted,
+)
 from simulator.frames import Frames
 
 __all__ = ["pack", "pack_parts", "unpack", "unpack_parts"]
@@ -62,13 +70,19 @@ _PARTS = {
         Decision,
         Ensemble,
         Frames,
+        Known,
         Mixture,
         Population,
         Proposal,
+        Selecting,
         Selection,
         Shear,
+        Starting,
+        Tempering,
         TriangularMap,
         Verdict,
+        Walking,
+        Weighted,
         WeightedDraws,
     )
 }

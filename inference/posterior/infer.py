@@ -48,20 +48,18 @@ def infer(
     RefusedError
         Where no honest answer exists.
     """
-    begin, cpu_s = time.perf_counter(), 0.0
+    begin = time.perf_counter()
     settings = SamplerSettings() if settings is None else settings
     job = prepare(sensor, scene, frames, settings)
-    checkpoint, spent = _timed(start, job)
-    cpu_s += spent
-    while time.perf_counter() - begin < settings.max_seconds:
-        chunk = tasks(job, checkpoint)
-        if not chunk:
-            break
+    checkpoint, cpu_s = _timed(start, job)
+    wall_s = time.perf_counter() - begin
+    while chunk := tasks(job, checkpoint, wall_s):
         timed_run = functools.partial(_timed, run)
         done = list(map(timed_run, chunk) if executor is None else executor.map(timed_run, chunk))
         checkpoint, spent = _timed(merge, job, checkpoint, [piece for piece, _ in done])
         cpu_s += spent + sum(seconds for _, seconds in done)
-    return summarise(job, checkpoint, time.perf_counter() - begin, cpu_s)
+        wall_s = time.perf_counter() - begin
+    return summarise(job, checkpoint, wall_s, cpu_s)
 
 
 def _timed(function: Callable[..., R], *arguments: Any) -> tuple[R, float]:

@@ -1,4 +1,4 @@
-"""What is to be inferred, and where the work stands."""
+"""What is to be inferred, checked before any time is spent on it."""
 
 import dataclasses
 from typing import Any
@@ -11,21 +11,14 @@ from inference.density.discrepant import with_discrepancy
 from inference.density.static import with_common_range
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.posterior.checks import check_scene_for_posterior
-from inference.posterior.sampling.ensemble import Ensemble
-from inference.posterior.sampling.importance import WeightedDraws
-from inference.posterior.sampling.population import Population
-from inference.posterior.sampling.proposal import Mixture, Proposal
-from inference.posterior.sampling.verdict import Chains, Verdict, chains_of
-from inference.posterior.selection.selection import Selection
 from inference.posterior.settings import SamplerSettings
 from simulator.errors import RefusedError
 from simulator.frames import Frames, check_frames
-from simulator.parameters import parameters_of
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor, parse_sensor
 from simulator.validated import parse
 
-__all__ = ["Checkpoint", "Job", "chains", "prepare"]
+__all__ = ["Job", "prepare"]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -94,72 +87,13 @@ class Job:
             return density
         return with_discrepancy(density, self.scene.discrepancy)
 
-    def stream(self, *purpose: int) -> np.random.Generator:
-        """Return the random stream of one purpose; streams of different purposes are distinct."""
-        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=purpose))
+    def seeds(self, purpose: int, *numbers: int) -> np.random.SeedSequence:
+        """Return the seed of one purpose; those of different purposes are independent."""
+        return np.random.SeedSequence(self.seed, spawn_key=(purpose, *numbers))
 
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Checkpoint:
-    """Where a job stands.
-
-    Attributes
-    ----------
-    method : "emcee" or "importance"
-        What is being done.
-    optima : Mixture or None
-        Laplace approximations at the optima; None where nothing is unknown.
-    proposal : Proposal or None
-        What the independent move proposes from; adapted to pilot draws that are then thrown away.
-    calls : int
-        Density evaluations so far.
-    verdict : Verdict
-        On the draws so far.
-    adaptations : int
-        How often the proposal was adapted.
-    populations : tuple of Population or None
-        On their way from the prior to the posterior, where the Laplace shapes do not fit; None
-        before they are drawn.
-    ensembles : tuple of Ensemble
-        Empty with importance sampling, and as long as populations are on their way.
-    weighted : WeightedDraws or None
-        With importance sampling.
-    ess, r_hat : float or None
-        Least effective sample size and largest R-hat so far.
-    finished : bool
-        Whether more steps would serve nothing.
-    selection : Selection or None
-        With optional terms in the scene: which of them stay.
-    """
-
-    method: str
-    optima: Mixture | None
-    proposal: Proposal | None
-    calls: int
-    verdict: Verdict
-    adaptations: int = 0
-    populations: tuple[Population | None, ...] = ()
-    ensembles: tuple[Ensemble, ...] = ()
-    weighted: WeightedDraws | None = None
-    ess: float | None = None
-    r_hat: float | None = None
-    finished: bool = False
-    selection: Selection | None = None
-
-    def to_bytes(self) -> bytes:
-        """Return the checkpoint for a store."""
-        arrays: dict[str, NDArray[Any]] = {}
-        meta = {
-            field.name: pack_parts(getattr(self, field.name), field.name, arrays)
-            for field in dataclasses.fields(self)
-        }
-        return pack(meta, arrays)
-
-    @classmethod
-    def from_bytes(cls, data: bytes) -> "Checkpoint":
-        """Read what `to_bytes` wrote."""
-        meta, arrays = unpack(data)
-        return cls(**{name: unpack_parts(item, arrays) for name, item in meta.items()})
+    def stream(self, purpose: int, *numbers: int) -> np.random.Generator:
+        """Return the random stream of one purpose, one of `Stream`."""
+        return np.random.default_rng(self.seeds(purpose, *numbers))
 
 
 def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSettings) -> Job:
@@ -198,11 +132,3 @@ def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSetti
         raise RefusedError("every frame is saturated: lower the gain or the exposure")
     check_scene_for_posterior(sensor, scene, frames.select(job.usable))
     return job
-
-
-def chains(job: Job, checkpoint: Checkpoint) -> Chains:
-    """Return the kept draws of an emcee checkpoint."""
-    if checkpoint.optima is None:
-        raise ValueError("nothing was sampled")
-    names = parameters_of(job.sensor, job.scene).names
-    return chains_of(checkpoint.ensembles, checkpoint.optima.nearest, names)

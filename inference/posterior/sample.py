@@ -1,4 +1,4 @@
-"""What a checkpoint has drawn, whichever way it drew."""
+"""What a job has drawn, whichever way it drew."""
 
 import dataclasses
 
@@ -6,15 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.posterior.job import Checkpoint, Job, chains
 from inference.posterior.sampling.importance import WeightedDraws
+from inference.posterior.sampling.proposal import Mixture
 from inference.posterior.sampling.verdict import Chains
+from inference.posterior.stages.state import Drawing, Known, Tempering, Walking, Weighted
 
 __all__ = ["Sample", "sample_of"]
 
 Array = NDArray[np.float64]
 
 _NOTHING_DRAWN = 1000
+_LEAST_STEPS = 4  # of which anything is said
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -59,17 +61,15 @@ class Sample:
         return self.z.reshape(self.log_density.size, self.z.shape[-1])
 
 
-def sample_of(
-    density: CollapsedDensity, job: Job, checkpoint: Checkpoint, rng: np.random.Generator
-) -> Sample:
-    """Line up the draws of a checkpoint.
+def sample_of(density: CollapsedDensity, stage: Drawing, rng: np.random.Generator) -> Sample:
+    """Line up the draws of a stage.
 
     Parameters
     ----------
     density : CollapsedDensity
         The density of the job.
-    job, checkpoint : Job, Checkpoint
-        The job and where it stands.
+    stage : Drawing
+        Where the job stands.
     rng : numpy.random.Generator
         For resampling by weight.
 
@@ -77,26 +77,36 @@ def sample_of(
     -------
     Sample
     """
-    if checkpoint.ensembles and checkpoint.ensembles[0].steps >= 4:
-        kept = chains(job, checkpoint)
-        done = checkpoint.ensembles[0].steps
-        step = np.arange(done - kept.z.shape[2], done)
-        every = np.array([e.chain[step[0] - 1 :].transpose(1, 0, 2) for e in checkpoint.ensembles])
-        moved = np.any(np.diff(every, axis=2) != 0, axis=-1)
-        return Sample(kept.z, kept.log_density, step, moved, kept.mode, kept, None)
-    if checkpoint.weighted is not None:
-        weighted = checkpoint.weighted
-        keep = rng.choice(len(weighted.z), size=len(weighted.z), p=weighted.weights)
-        z, log_density = weighted.z[keep], weighted.log_density[keep]
-    else:
-        # nothing unknown, or stopped before the first chunk: the starts are all there is
-        weighted = None
-        z = _starts(density, checkpoint, rng)
-        log_density = density(z)
+    match stage:
+        case Walking() if stage.steps >= _LEAST_STEPS:
+            return _walked(density, stage)
+        case Weighted():
+            weighted = stage.draws
+            keep = rng.choice(len(weighted.z), size=len(weighted.z), p=weighted.weights)
+            z, log_density = weighted.z[keep], weighted.log_density[keep]
+            return _lined_up(z, log_density, stage.optima, weighted)
+        case Known():
+            z, optima = np.empty((_NOTHING_DRAWN, 0)), None
+        case _:
+            # stopped before the first chunk: the starts are all there is
+            z, optima = _starts(density, stage, rng), stage.proposal.optima
+    return _lined_up(z, density(z), optima, None)
+
+
+def _walked(density: CollapsedDensity, stage: Walking) -> Sample:
+    kept = stage.chains(density.parameters.names)
+    step = np.arange(stage.steps - kept.z.shape[2], stage.steps)
+    every = np.array([e.chain[step[0] - 1 :].transpose(1, 0, 2) for e in stage.ensembles])
+    moved = np.any(np.diff(every, axis=2) != 0, axis=-1)
+    return Sample(kept.z, kept.log_density, step, moved, kept.mode, kept, None)
+
+
+def _lined_up(
+    z: Array, log_density: Array, optima: Mixture | None, weighted: WeightedDraws | None
+) -> Sample:
+    """Return points as the steps of one walker."""
     n = len(z)
-    mode = np.zeros(n, dtype=np.intp)
-    if checkpoint.optima is not None:
-        mode = checkpoint.optima.nearest(z)
+    mode = np.zeros(n, dtype=np.intp) if optima is None else optima.nearest(z)
     return Sample(
         z[None, None],
         log_density[None, None],
@@ -108,14 +118,14 @@ def sample_of(
     )
 
 
-def _starts(density: CollapsedDensity, checkpoint: Checkpoint, rng: np.random.Generator) -> Array:
+def _starts(
+    density: CollapsedDensity, stage: Tempering | Walking, rng: np.random.Generator
+) -> Array:
     """Return where the walkers, or else the populations on their way, stand."""
-    proposal = checkpoint.proposal
-    if proposal is None:
-        return np.empty((_NOTHING_DRAWN, 0))
-    if checkpoint.ensembles:
-        return np.concatenate([proposal.bend(e.coords)[0] for e in checkpoint.ensembles])
-    arrived = [p.z for p in checkpoint.populations if p is not None and len(p.z)]
+    proposal = stage.proposal
+    if isinstance(stage, Walking):
+        return np.concatenate([proposal.bend(e.coords)[0] for e in stage.ensembles])
+    arrived = [p.z for p in stage.populations if p is not None and len(p.z)]
     if arrived:
         return np.concatenate(arrived)
     around = proposal.optima.draw(rng, _NOTHING_DRAWN)

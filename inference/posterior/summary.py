@@ -1,4 +1,4 @@
-"""From a checkpoint to the answer."""
+"""From where a job stands to its draws and its answer."""
 
 import dataclasses
 import math
@@ -10,7 +10,7 @@ from inference.density.collapsed import CollapsedDensity
 from inference.density.discrepant import DiscrepantDensity
 from inference.identifiability.after_data import judge_draws
 from inference.identifiability.status import Identifiability
-from inference.posterior.answer.draws import draws_of
+from inference.posterior.answer.draws import Draws, draws_of
 from inference.posterior.answer.folds import near_fold
 from inference.posterior.answer.joint_modes import joint_modes
 from inference.posterior.answer.parameter_summary import summaries_of_chains, summaries_of_weights
@@ -31,14 +31,18 @@ from inference.posterior.criticism.discrepancy_check import (
 from inference.posterior.criticism.law_check import judge_law, law_shift
 from inference.posterior.criticism.predictive_check import predictive_check
 from inference.posterior.criticism.prior_conflict import prior_conflicts
-from inference.posterior.job import Checkpoint, Job
+from inference.posterior.job import Job
 from inference.posterior.sample import Sample, sample_of
 from inference.posterior.sampling.verdict import Verdict
-from inference.posterior.selecting import sampled
 from inference.posterior.selection.selection import Selection, selection_summary
+from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.selecting import sampled
+from inference.posterior.stages.starting import begin
+from inference.posterior.stages.state import Drawing, Selecting, Starting, Walking, Weighted
+from inference.posterior.streams import Stream
 from simulator.scene import Scene
 
-__all__ = ["summarise"]
+__all__ = ["draw", "summarise"]
 
 Array = NDArray[np.float64]
 
@@ -110,59 +114,105 @@ def _unknown_yet(names: tuple[str, ...]) -> tuple[Identifiability, ...]:
     )
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Drawn:
+    """What a job has drawn, and the stream that the rest of its answer goes on with."""
+
+    job: Job
+    density: CollapsedDensity
+    stage: Drawing
+    calls: int
+    sample: Sample
+    draws: Draws
+    rng: np.random.Generator
+
+
+def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
+    """Draw what the answer of a job is made of: the one place where its stream is begun."""
+    job, stage, calls = sampled(job, checkpoint), checkpoint.stage, checkpoint.calls
+    if isinstance(stage, Selecting | Starting):  # there was no time for more
+        stage, used = begin(job)
+        calls += used
+    density, rng = job.density(), job.stream(Stream.ANSWER)
+    sample = sample_of(density, stage, rng)
+    return _Drawn(job, density, stage, calls, sample, draws_of(density, job, sample, rng), rng)
+
+
+def draw(job: Job, checkpoint: Checkpoint) -> tuple[Job, Draws]:
+    """Return the draws behind the answer of a job, the same as `summarise` makes it from.
+
+    Parameters
+    ----------
+    job, checkpoint : Job, Checkpoint
+        The job and where it stands.
+
+    Returns
+    -------
+    (Job, Draws)
+        The job with the terms that were kept, and its draws.
+    """
+    drawn = _drawn(job, checkpoint)
+    return drawn.job, drawn.draws
+
+
+def _out_of_time(job: Job, checkpoint: Checkpoint, wall_s: float) -> tuple[str, ...]:
+    limit = job.settings.max_seconds
+    if wall_s < limit or checkpoint.stage.progress(job.settings.target_ess).finished:
+        return ()
+    return (f"stopped at the time limit of {limit:g} s",)
+
+
 def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> Posterior:
     """Make the answer of a job, finished or not.
 
     Parameters
     ----------
     job, checkpoint : Job, Checkpoint
-        The job and where it stands.
+        The job and where it stands; where it was stopped before its optional terms were decided,
+        all of them are kept.
     wall_s, cpu_s : float
-        What it has cost so far [s].
+        What it has cost so far [s]; the wall time as it was given to `tasks`.
 
     Returns
     -------
     Posterior
     """
-    stated, selection = job.scene, checkpoint.selection
-    job = sampled(job, checkpoint)
-    density = job.density()
+    drawn = _drawn(job, checkpoint)
+    stage, density, sample, draws = drawn.stage, drawn.density, drawn.sample, drawn.draws
     parameters = density.parameters
-    rng = job.stream(4)
-    sample = sample_of(density, job, checkpoint, rng)
-    z = sample.flat
-    verdict, k_hat = checkpoint.verdict, None
-    if sample.weighted is not None:
-        k_hat = sample.weighted.k_hat
-    elif sample.chains is not None:
-        verdict, k_hat = cross_check(verdict, job, checkpoint, sample.chains)
-    draws = draws_of(density, job, sample, rng)
+    reasons, k_hat = stage.verdict.reasons, None
+    if isinstance(stage, Weighted):
+        k_hat = stage.draws.k_hat
+    elif isinstance(stage, Walking) and sample.chains is not None:
+        rng = job.stream(Stream.CROSS_CHECK)
+        found, k_hat = cross_check(density, sample.chains, stage.proposal, rng)
+        reasons = (*reasons, *found)
     thinned = sample.z[:, :, draws.thinned]
     chosen = thinned.reshape(math.prod(thinned.shape[:3]), len(parameters))
-    log_r = np.log(draws.range_m[..., job.usable]).reshape(len(chosen), int(job.usable.sum()))
+    usable = job.usable
+    log_r = np.log(draws.range_m[..., usable]).reshape(len(chosen), int(usable.sum()))
     if sample.drawn:
-        conflicts = prior_conflicts(density, z, log_r)
-        verdict = Verdict(verdict.converged and not conflicts, (*verdict.reasons, *conflicts))
-        fit = predictive_check(job, density, chosen, rng)
-        judged = _judged(job, density, z, chosen, log_r)
+        reasons = (*reasons, *prior_conflicts(density, sample.flat, log_r))
+        fit = predictive_check(drawn.job, density, chosen, drawn.rng)
+        judged = _judged(drawn.job, density, sample.flat, chosen, log_r)
         if isinstance(density, DiscrepantDensity):
             larger = larger_discrepancy(density, chosen, log_r)
             fit, judged = judge_fit(fit, larger), judge_scale(judged, larger)
     else:
         fit, judged = _UNCHECKED, _unknown_yet(parameters.names)
-    folds = near_fold(job, density, chosen, log_r)
-    importance_ess = None if sample.weighted is None else sample.weighted.ess
+    reasons = (*_out_of_time(job, checkpoint, wall_s), *reasons)
+    folds = near_fold(drawn.job, density, chosen, log_r)
     return Posterior(
-        checkpoint.method,
+        Checkpoint(stage, drawn.calls).method,
         job.seed,
-        verdict,
+        Verdict(not reasons, reasons),
         _parameters(density, sample),
-        joint_modes(density, checkpoint.optima, sample),
-        range_summary(draws, folds, importance_ess),
+        joint_modes(density, stage, sample),
+        range_summary(draws, folds, None if sample.weighted is None else sample.weighted.ess),
         judged,
         fit,
-        _left_out(stated, selection),
-        Runtime(wall_s, cpu_s, checkpoint.calls, k_hat),
+        _left_out(job.scene, checkpoint.selection),
+        Runtime(wall_s, cpu_s, drawn.calls, k_hat),
         draws,
-        None if selection is None else selection_summary(stated, selection),
+        selection_summary(job.scene, checkpoint.selection),
     )

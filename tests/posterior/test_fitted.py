@@ -7,9 +7,10 @@ import pytest
 
 from inference.posterior import fold
 from inference.posterior.fitted import fitted_optima
-from inference.posterior.launch import start
 from inference.posterior.sampling.start import find_optima
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages.starting import begin
+from inference.posterior.stages.state import Tempering, Walking
 from simulator.scene import parse_scene
 from tests.posterior.scenes import OBJECT, data, sensor_of
 
@@ -38,9 +39,9 @@ def test_the_true_valley_is_found_where_a_screen_of_the_prior_sees_false_ones() 
     assert find_optima(density, np.random.default_rng(0))[0].log_density < density(z)[0] - 1000.0
     best = max(fitted_optima(job, density), key=lambda optimum: optimum.log_density)
     assert best.log_density > density(z)[0]
-    optima = start(job).optima
-    assert optima is not None
-    assert density(optima.centres).max() == pytest.approx(best.log_density, abs=1e-3)
+    stage, _ = begin(job)
+    assert isinstance(stage, Tempering | Walking)
+    assert density(stage.proposal.optima.centres).max() == pytest.approx(best.log_density, abs=1e-3)
 
 
 @pytest.mark.parametrize(

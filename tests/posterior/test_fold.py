@@ -1,18 +1,20 @@
 """The fold: the same answer in any number of pieces, in any place; refusals before any work."""
 
 import dataclasses
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 import pytest
 
-from inference.posterior import fold, launch
+from inference.posterior import fold
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.infer import infer
 from inference.posterior.sampling.importance import WeightedDraws, draw_weighted
+from inference.posterior.sampling.population import Population
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages import starting
+from inference.posterior.stages.state import Tempering, Walking, Weighted
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene, Stroke, parse_scene
@@ -26,21 +28,6 @@ QUICK = SamplerSettings(seed=7, target_ess=50, max_seconds=60)
 def same(a: Posterior, b: Posterior) -> bool:
     first, second = (p.to_json() | {"runtime": None} for p in (a, b))
     return first == second and np.array_equal(a.draws.parameters, b.draws.parameters)
-
-
-def run(job: fold.Job, through: Callable[[fold.Checkpoint], fold.Checkpoint]) -> Posterior:
-    checkpoint = through(fold.start(job))
-    while pieces := [fold.run(task) for task in fold.tasks(job, checkpoint)]:
-        checkpoint = through(fold.merge(job, checkpoint, pieces))
-    return fold.summarise(job, checkpoint, 0.0, 0.0)
-
-
-def test_stored_and_read_again_between_chunks_is_the_same_to_the_last_bit() -> None:
-    job = fold.prepare(*example("pulsed", crosstalk=True), QUICK)
-    again = fold.Job.from_bytes(job.to_bytes())
-    plain = run(job, lambda c: c)
-    stored = run(again, lambda c: fold.Checkpoint.from_bytes(c.to_bytes()))
-    assert same(plain, stored)
 
 
 def test_an_executor_changes_nothing() -> None:
@@ -230,13 +217,13 @@ def test_populations_that_die_are_not_called_for_again() -> None:
     frames = data(sensor, {"background": wall}, frames=6, span=(3.3, 4.2)).frames
     job = fold.prepare(sensor, parse_scene(scene), frames, SamplerSettings(seed=1, ensembles=2))
     checkpoint = fold.start(job)
-    for _ in range(2):
-        pieces = [fold.run(task) for task in fold.tasks(job, checkpoint)]
-        checkpoint = fold.merge(job, checkpoint, pieces)
-    assert [len(population.z) for population in checkpoint.populations if population] == [0, 0]
-    assert checkpoint.ensembles
-    assert checkpoint.proposal is not None
-    assert checkpoint.proposal.transport is not None
+    assert isinstance(checkpoint.stage, Tempering)
+    populations = [fold.run(task) for task in fold.tasks(job, checkpoint)]
+    assert all(isinstance(one, Population) and len(one.z) == 0 for one in populations)
+    checkpoint = fold.merge(job, checkpoint, populations)
+    checkpoint = fold.merge(job, checkpoint, [fold.run(t) for t in fold.tasks(job, checkpoint)])
+    assert isinstance(checkpoint.stage, Walking)
+    assert checkpoint.stage.proposal.transport is not None
 
 
 def test_a_scene_made_in_python_is_stored_whole() -> None:
@@ -256,15 +243,16 @@ def test_importance_sampling_is_bounded_whatever_is_asked_for(
         counts.append(arguments[-1])
         return draw_weighted(*arguments)
 
-    monkeypatch.setattr(launch, "draw_weighted", counting)
-    monkeypatch.setattr(launch, "_MOST_IMPORTANCE_FRAMES", 60_000)
+    monkeypatch.setattr(starting, "draw_weighted", counting)
+    monkeypatch.setattr(starting, "_MOST_IMPORTANCE_FRAMES", 60_000)
     job = fold.prepare(
         *example("pulsed", crosstalk=False),
         SamplerSettings(seed=1, method="importance", target_ess=1_000_000),
     )
-    checkpoint = fold.start(job)
+    stage = fold.start(job).stage
     assert counts == [3000] * len(counts)
-    assert not checkpoint.verdict.converged
+    assert isinstance(stage, Weighted)
+    assert not stage.verdict.converged
 
 
 def test_draws_of_a_job_that_was_stopped_before_its_terms_were_decided() -> None:

@@ -104,8 +104,8 @@ def start(job: Job) -> Checkpoint:
     return Checkpoint(0, (0.0,) * job.settings.ensembles)
 
 
-def tasks(job: Job, checkpoint: Checkpoint) -> tuple[Task, ...]:
-    if checkpoint.chunk == CHUNKS:
+def tasks(job: Job, checkpoint: Checkpoint, wall_s: float) -> tuple[Task, ...]:
+    if checkpoint.chunk == CHUNKS or wall_s >= job.settings.max_seconds:
         return ()
     assert job.settings.seed is not None
     return tuple(
@@ -156,6 +156,7 @@ def progress(_: Job, checkpoint: Checkpoint) -> Progress:
 
 def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> Posterior:
     finished = checkpoint.chunk == CHUNKS
+    reason = "too few steps" if wall_s < job.settings.max_seconds else "out of time"
     summary: dict[str, Any] = {
         "mean": checkpoint.sums[0],
         "sd": 1.0,
@@ -170,7 +171,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
             "seed": job.settings.seed,
             "verdict": {
                 "converged": finished,
-                "reasons": [] if finished else ["too few steps"],
+                "reasons": [] if finished else [reason],
             },
             "parameters": {"object.c0": summary},
             "modes": [],

@@ -4,22 +4,20 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.answer.posterior import JointMode
 from inference.posterior.answer.shares import share_error, weighted_share_error
 from inference.posterior.sample import Sample
-from inference.posterior.sampling.proposal import Mixture
+from inference.posterior.stages.state import Drawing, Known, Weighted
 
 __all__ = ["joint_modes"]
 
 
-def joint_modes(
-    density: CollapsedDensity, optima: Mixture | None, sample: Sample
-) -> tuple[JointMode, ...]:
+def joint_modes(density: CollapsedDensity, stage: Drawing, sample: Sample) -> tuple[JointMode, ...]:
     """Describe every optimum that was found.
 
     Parameters
     ----------
     density : CollapsedDensity
         The density.
-    optima : Mixture or None
-        Laplace approximations at the optima; None where nothing is unknown.
+    stage : Drawing
+        Where the job stands, with the optima that were found.
     sample : Sample
         Draws, each of which belongs to the optimum that it is nearest to.
 
@@ -28,8 +26,9 @@ def joint_modes(
     tuple of JointMode
         In the order of the optima; none where nothing is unknown.
     """
-    if optima is None:
+    if isinstance(stage, Known):
         return ()
+    optima = stage.optima if isinstance(stage, Weighted) else stage.proposal.optima
     natural = density.parameters.natural(optima.centres)
     heights = density(optima.centres)
     result = []

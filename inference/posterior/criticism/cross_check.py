@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from inference.posterior.job import Checkpoint, Job
+from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.diagnostics import effective_sample_size
 from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
-from inference.posterior.sampling.proposal import Mixture
+from inference.posterior.sampling.proposal import Mixture, Proposal
 from inference.posterior.sampling.quadrature import MOST_DIMENSIONS, Moments, lattice_moments
-from inference.posterior.sampling.verdict import Chains, Verdict
+from inference.posterior.sampling.verdict import Chains
 
 __all__ = ["cross_check", "false_branch", "moments_disagree"]
 
@@ -36,37 +36,35 @@ _ROUNDING = 1e-9
 
 
 def cross_check(
-    verdict: Verdict, job: Job, checkpoint: Checkpoint, chains: Chains
-) -> tuple[Verdict, float | None]:
+    density: CollapsedDensity, chains: Chains, proposal: Proposal, rng: np.random.Generator
+) -> tuple[tuple[str, ...], float]:
     """Hold draws to the optima that are known, to importance sampling and to quadrature.
 
     Parameters
     ----------
-    verdict : Verdict
-        So far.
-    job, checkpoint : Job, Checkpoint
-        The job and where it stands.
+    density : CollapsedDensity
+        The density.
     chains : Chains
-        Its kept draws.
+        Kept draws.
+    proposal : Proposal
+        What they were proposed from.
+    rng : numpy.random.Generator
+        For importance sampling.
 
     Returns
     -------
-    Verdict
-        With the reasons added, if any.
-    float or None
-        Pareto k-hat of the importance weights; None where there is no proposal.
+    tuple of str
+        The reasons to doubt them, if any.
+    float
+        Pareto k-hat of the importance weights.
     """
-    if checkpoint.optima is None or checkpoint.proposal is None:
-        return verdict, None
-    density = job.density()
-    weighted = draw_weighted(density, checkpoint.proposal, job.stream(5), _CHECK_DRAWS)
+    weighted = draw_weighted(density, proposal, rng, _CHECK_DRAWS)
     points = _EVALUATIONS // max(len(density.frames), 1)
     found = (
-        false_branch(density, chains, checkpoint.optima),
-        moments_disagree(density, chains, checkpoint.optima, weighted, points),
+        false_branch(density, chains, proposal.optima),
+        moments_disagree(density, chains, proposal.optima, weighted, points),
     )
-    reasons = (*verdict.reasons, *(reason for reason in found if reason is not None))
-    return Verdict(not reasons, reasons), weighted.k_hat
+    return tuple(reason for reason in found if reason is not None), weighted.k_hat
 
 
 def false_branch(density: LogDensity, chains: Chains, optima: Mixture) -> str | None:

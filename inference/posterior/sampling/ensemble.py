@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.proposal import Proposal
 
-__all__ = ["Ensemble", "advance", "new_ensemble", "restart"]
+__all__ = ["WALKERS", "Ensemble", "advance", "new_ensemble", "restart"]
 
 Array = NDArray[np.float64]
 
+WALKERS = 32
 _SHORT = 0.1  # times the step that suits a normal posterior (ter Braak 2006)
 
 Stream = tuple[NDArray[np.uint32], int, int, float]

@@ -83,6 +83,11 @@ class Population:
     steps: int
     calls: int
 
+    @property
+    def ended(self) -> bool:
+        """Whether it is at the posterior, or died on the way."""
+        return self.power == 1.0 or len(self.z) == 0
+
 
 def first_population(density: CollapsedDensity, rng: np.random.Generator) -> Population:
     """Draw a population from the prior.
@@ -250,6 +255,6 @@ def carried(density: CollapsedDensity, rng: np.random.Generator) -> Population:
         Empty where the likelihood is zero at nearly every draw of the prior.
     """
     population = first_population(density, rng)
-    while len(population.z) and population.power < 1.0:
+    while not population.ended:
         population = temper(density, population, rng)
     return population

@@ -55,18 +55,13 @@ class Selection:
     Attributes
     ----------
     candidates : tuple of Candidate
-        In the order of `candidate_terms`, as far as they have been assessed.
+        In the order of `candidate_terms`.
     decisions : tuple of Decision
-        One for each optional term; empty until all candidates have been assessed.
+        One for each optional term.
     """
 
     candidates: tuple[Candidate, ...]
     decisions: tuple[Decision, ...]
-
-    @property
-    def decided(self) -> bool:
-        """Whether there is a choice."""
-        return bool(self.decisions)
 
     @property
     def chosen(self) -> tuple[str, ...]:
@@ -176,22 +171,25 @@ def _undecided(scene: Scene) -> tuple[Decision, ...]:
     return tuple(Decision(term, True, False, reason) for term in scene.optional_terms)
 
 
-def selection_summary(scene: Scene, selection: Selection) -> SelectionSummary:
+def selection_summary(scene: Scene, selection: Selection | None) -> SelectionSummary | None:
     """Summarise a selection.
 
     Parameters
     ----------
     scene : Scene
-        With its optional terms.
-    selection : Selection
-        Decided or not.
+        As stated.
+    selection : Selection or None
+        None where there was no time to decide.
 
     Returns
     -------
-    SelectionSummary
+    SelectionSummary or None
+        None where the scene has no optional terms.
     """
-    decisions = selection.decisions or _undecided(scene)
-    chosen = tuple(decision.term for decision in decisions if decision.kept)
+    if not scene.optional_terms:
+        return None
+    if selection is None:
+        return SelectionSummary((), _undecided(scene))
     rows = []
     for candidate in selection.candidates:
         with np.errstate(invalid="ignore"):
@@ -199,7 +197,7 @@ def selection_summary(scene: Scene, selection: Selection) -> SelectionSummary:
         rows.append(
             CandidateSummary(
                 candidate.terms,
-                candidate.terms == chosen,
+                candidate.terms == selection.chosen,
                 candidate.log_evidence,
                 candidate.log_evidence_error,
                 candidate.evidence_k_hat,
@@ -208,4 +206,4 @@ def selection_summary(scene: Scene, selection: Selection) -> SelectionSummary:
                 candidate.predictive_k_hat,
             )
         )
-    return SelectionSummary(tuple(rows), decisions)
+    return SelectionSummary(tuple(rows), selection.decisions)

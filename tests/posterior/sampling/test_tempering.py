@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.launch import _thinned
 from inference.posterior.sampling.importance import MAX_K_HAT, draw_weighted
 from inference.posterior.sampling.proposal import mixture_of
 from inference.posterior.sampling.start import find_optima
 from inference.posterior.sampling.tempering import tempered_walkers
+from inference.posterior.stages.starting import _thinned
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import parse_scene
 from tests.posterior.scenes import KINDS, example, sensor_of

@@ -16,7 +16,6 @@ from simulator.frames import Frames
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor
 from tests.posterior.scenes import OBJECT, UNKNOWN_CROSSTALK, data, sensor_of
-from tests.posterior.test_fold import run, same
 
 QUICK = SamplerSettings(seed=7, target_ess=50, max_seconds=60)
 CROSSTALK = {"values": UNKNOWN_CROSSTALK, "optional": True}
@@ -192,14 +191,6 @@ def test_kept_the_answer_is_that_of_the_scene_with_the_term() -> None:
     assert {row.term for row in optional.left_out} == {"background", "discrepancy"}
     assert optional.selection is not None
     assert optional.selection.decisions[0].kept
-
-
-def test_stored_and_read_again_between_chunks_is_the_same_to_the_last_bit() -> None:
-    job = fold.prepare(*request({}, {"crosstalk": CROSSTALK}), QUICK)
-    again = fold.Job.from_bytes(job.to_bytes())
-    plain = run(job, lambda c: c)
-    stored = run(again, lambda c: fold.Checkpoint.from_bytes(c.to_bytes()))
-    assert same(plain, stored)
 
 
 def test_stopped_before_the_terms_are_decided_all_of_them_are_kept() -> None:

@@ -6,14 +6,15 @@ import numpy as np
 
 from inference.density.collapsed import collapsed_density
 from inference.posterior import fold
-from inference.posterior.adaptation import set_out
 from inference.posterior.infer import infer
-from inference.posterior.launch import WALKERS
+from inference.posterior.sampling.ensemble import WALKERS
 from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.start import find_optima
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages.state import Tempering, Walking
+from inference.posterior.stages.tempering import merge
 from simulator.frames import frames_from_columns
 from simulator.scene import parse_scene
 from tests.posterior.scenes import UNKNOWN_CROSSTALK, example, sensor_of
@@ -30,16 +31,9 @@ def test_ensembles_begin_in_different_members_from_all_over_a_population() -> No
         Population(z, density(z), np.zeros(len(z)), 1.0, 0.0, 1, 1)
         for z in np.array_split(members[np.argsort(members[:, 0])], 2)
     )
-    before = fold.Checkpoint(
-        "emcee",
-        optima,
-        Proposal(optima, None, 0.5),
-        populations=populations,
-        calls=0,
-        verdict=Verdict(False, ()),
-    )
-    after = set_out(job, before)
-    assert after.proposal is not None
+    before = Tempering(Proposal(optima, None, 0.5), populations, Verdict(False, ()))
+    after, _ = merge(job, before, ())
+    assert isinstance(after, Walking)
     starts = [after.proposal.bend(ensemble.coords)[0] for ensemble in after.ensembles[:-1]]
     for k, start in enumerate(starts):
         population = populations[k % 2].z

@@ -1,0 +1,1 @@
+"""Where a posterior may stand, one type a stage, and what each stage does next."""

@@ -1,0 +1,51 @@
+"""Where a job stands, for a store."""
+
+import dataclasses
+from typing import Any
+
+from numpy.typing import NDArray
+
+from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
+from inference.posterior.selection.selection import Selection
+from inference.posterior.stages.state import Known, Stage, Weighted
+
+__all__ = ["Checkpoint"]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """Where a job stands.
+
+    Attributes
+    ----------
+    stage : Stage
+        What is being done, and what it has come to.
+    calls : int
+        Density evaluations so far.
+    selection : Selection or None
+        Which optional terms of the scene stay; None where it has none, or nothing is decided.
+    """
+
+    stage: Stage
+    calls: int
+    selection: Selection | None = None
+
+    @property
+    def method(self) -> str:
+        """Whether draws are weighted ("importance") or walked ("emcee")."""
+        return "importance" if isinstance(self.stage, Weighted | Known) else "emcee"
+
+    def to_bytes(self) -> bytes:
+        """Return the checkpoint for a store."""
+        arrays: dict[str, NDArray[Any]] = {}
+        meta = {
+            field.name: pack_parts(getattr(self, field.name), field.name, arrays)
+            for field in dataclasses.fields(self)
+        }
+        return pack(meta, arrays)
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> "Checkpoint":
+        """Read what `to_bytes` wrote."""
+        meta, arrays = unpack(data)
+        return cls(**{name: unpack_parts(item, arrays) for name, item in meta.items()})

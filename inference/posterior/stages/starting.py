@@ -1,0 +1,167 @@
+"""How sampling starts: optima, a first trial of their shape, and ensembles around them."""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.density.collapsed import CollapsedDensity
+from inference.posterior.checks import check_best_fit
+from inference.posterior.fitted import fitted_optima
+from inference.posterior.job import Job
+from inference.posterior.sampling.ensemble import WALKERS
+from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
+from inference.posterior.sampling.proposal import Proposal, mixture_of
+from inference.posterior.sampling.start import Optimum, climb, find_optima, refine
+from inference.posterior.sampling.tempering import tempered_walkers
+from inference.posterior.sampling.verdict import Verdict
+from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.ensembles import POPULATIONS, new_ensembles
+from inference.posterior.stages.state import Drawing, Known, Tempering, Walking, Weighted
+from inference.posterior.streams import Stream
+from simulator.errors import RefusedError
+
+__all__ = ["StartTask", "begin"]
+
+Array = NDArray[np.float64]
+
+_TEMPERED_FRAMES = 200  # at most; the walkers then start the wider, the more frames there are
+_IMPORTANCE_DRAWS = 2000
+_MOST_IMPORTANCE_DRAWS = 200_000
+_MOST_IMPORTANCE_FRAMES = 8_000_000  # draws times frames: ten seconds that nothing interrupts
+_TRIAL_DRAWS = 400
+_SHARE = 0.5  # of an ensemble's steps that are independent jumps
+_FITTING = 0.5  # effective share of the trial above which jumps are mostly accepted
+_FITTING_SHARE = 0.8  # jumps that are mostly accepted forget fastest
+_MISFITTING = 0.1  # effective share below which the Laplace shapes are given up
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class StartTask:
+    """The start of sampling in the scene that was chosen."""
+
+    job: Job
+
+    def run(self) -> Checkpoint:
+        """Find starting points."""
+        stage, calls = begin(self.job)
+        return Checkpoint(stage, calls)
+
+
+def begin(job: Job) -> tuple[Drawing, int]:
+    """Find the optima, and set up ensembles or draw weighted samples.
+
+    Parameters
+    ----------
+    job : Job
+        Without optional terms.
+
+    Returns
+    -------
+    (Drawing, int)
+        The first stage, and the density evaluations that it took.
+
+    Raises
+    ------
+    RefusedError
+        Where no parameters explain the frames at all, or importance sampling alone was asked for
+        and cannot be trusted.
+    """
+    density = job.density()
+    if len(density.parameters) == 0:
+        if not np.isfinite(density(np.empty((1, 0)))[0]):
+            raise RefusedError("no range allowed by the scene explains every frame")
+        return Known(), 1
+    optima, tempered, calls = _optima(job, density)
+    if not optima:
+        raise RefusedError(
+            "no parameters within their priors explain the frames; widen the priors, or check the "
+            "noise's `read` against the readings"
+        )
+    check_best_fit(density, optima[0].z)
+    proposal = Proposal(mixture_of(optima), None, _SHARE)
+    if job.settings.method in ("importance", "auto"):
+        weighted, used = _importance(density, proposal, job)
+        calls += used
+        if weighted is not None:
+            return weighted, calls
+    trial = draw_weighted(density, proposal, job.stream(Stream.TRIAL), _TRIAL_DRAWS)
+    calls += _TRIAL_DRAWS
+    pending = Verdict(False, ("no steps were made",))
+    if not trial.ess > _MISFITTING * _TRIAL_DRAWS:
+        return Tempering(proposal, (None,) * POPULATIONS, pending), calls
+    if trial.ess > _FITTING * _TRIAL_DRAWS:
+        proposal = dataclasses.replace(proposal, share=_FITTING_SHARE)
+    starts = (np.empty((0, len(density.parameters))),) * (job.settings.ensembles - 1)
+    seeds = job.seeds(Stream.ENSEMBLES)
+    ensembles = new_ensembles(density, proposal, (*starts, tempered), seeds)
+    return Walking(proposal, ensembles, pending, adaptations=0), calls + WALKERS * len(ensembles)
+
+
+def _optima(job: Job, density: CollapsedDensity) -> tuple[list[Optimum], Array, int]:
+    """Find optima in three ways, and points that no optimum was told to; with the evaluations."""
+    optima = find_optima(density, job.stream(Stream.SCREEN))
+    for fitted in fitted_optima(job, density):
+        optima = _with(optima, fitted)
+    tempered, calls = tempered_walkers(_thinned(density), job.stream(Stream.SCOUTS), WALKERS)
+    if len(tempered):
+        optima = _with(optima, refine(density, climb(density, tempered[0])[0]))
+        optima = _with(optima, refine(density, tempered[0]))
+    return optima, tempered, calls
+
+
+def _thinned(density: CollapsedDensity) -> CollapsedDensity:
+    """Return the density of some of the frames, spread over all: enough to show every branch."""
+    n = len(density.frames)
+    if n <= _TEMPERED_FRAMES:
+        return density
+    chosen = np.linspace(0, n - 1, _TEMPERED_FRAMES).round().astype(int)
+    present = None if density.present is None else density.present[chosen]
+    frames = np.ascontiguousarray(density.frames[chosen])
+    return dataclasses.replace(density, frames=frames, present=present)
+
+
+def _with(optima: list[Optimum], found: Optimum | None) -> list[Optimum]:
+    """Add an optimum that is not among those found before, and drop what it makes negligible."""
+    if found is None:
+        return optima
+    if any(other.is_near(found.z) for other in optima):
+        return optima
+    every = sorted([*optima, found], key=lambda optimum: -optimum.log_density)
+    return [o for o in every if o.log_density > every[0].log_density - 20.0]
+
+
+def _importance(
+    density: CollapsedDensity, proposal: Proposal, job: Job
+) -> tuple[Weighted | None, int]:
+    """Sample by importance; None where ensembles are to do it instead."""
+    target, forced = job.settings.target_ess, job.settings.method == "importance"
+    weighted, calls = _weighted_draws(density, proposal, job)
+    trusted = weighted.k_hat < MAX_K_HAT
+    if forced and not trusted:
+        raise RefusedError(
+            f"importance sampling cannot be trusted here: Pareto k-hat is {weighted.k_hat:.2f}, "
+            f"above {MAX_K_HAT}; use the method emcee"
+        )
+    enough = trusted and weighted.ess >= target
+    if not (enough or forced):
+        return None, calls
+    reason = f"the effective sample size is {weighted.ess:.0f}, below the target"
+    verdict = Verdict(enough, () if enough else (reason,))
+    return Weighted(proposal.optima, weighted, verdict), calls
+
+
+def _weighted_draws(
+    density: CollapsedDensity, proposal: Proposal, job: Job
+) -> tuple[WeightedDraws, int]:
+    """Draw until the effective sample size is reached, if that is in sight."""
+    target = job.settings.target_ess
+    most = min(_MOST_IMPORTANCE_DRAWS, _MOST_IMPORTANCE_FRAMES // len(density.frames))
+    count = min(max(_IMPORTANCE_DRAWS, 2 * target), most)
+    weighted = draw_weighted(density, proposal, job.stream(Stream.IMPORTANCE), count)
+    used = count
+    if weighted.k_hat < MAX_K_HAT and weighted.ess < target:
+        count = min(int(1.5 * count * target / max(weighted.ess, 1.0)), most)
+        weighted = draw_weighted(density, proposal, job.stream(Stream.IMPORTANCE), count)
+        used += count
+    return weighted, used

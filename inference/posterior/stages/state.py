@@ -1,0 +1,191 @@
+"""The stages of a posterior: what is known in each, and nothing else.
+
+::
+
+    Selecting -> Starting -+-> Weighted
+                           +-> Known
+                           +-> Tempering -> Walking
+                           +-> Walking -> (Tempering -> Walking)
+
+A job without optional terms begins behind `Starting`. Ensembles that hardly move call for
+populations, once.
+"""
+
+import dataclasses
+
+from inference.posterior.sampling.ensemble import Ensemble
+from inference.posterior.sampling.importance import WeightedDraws
+from inference.posterior.sampling.population import Population
+from inference.posterior.sampling.proposal import Mixture, Proposal
+from inference.posterior.sampling.verdict import Chains, Verdict, chains_of
+
+__all__ = [
+    "MOST_STEPS",
+    "Drawing",
+    "Known",
+    "Progress",
+    "Selecting",
+    "Stage",
+    "Starting",
+    "Tempering",
+    "Walking",
+    "Weighted",
+]
+
+MOST_STEPS = 20_000
+
+
+@dataclasses.dataclass(frozen=True)
+class Progress:
+    """How far a job is.
+
+    Attributes
+    ----------
+    steps, target : int
+        Steps of each ensemble, and how many may be needed as far as can be told.
+    ess, rhat : float or None
+        Least effective sample size and largest R-hat.
+    finished : bool
+        Whether only the summary is left.
+    """
+
+    steps: int
+    target: int
+    ess: float | None
+    rhat: float | None
+    finished: bool
+
+
+_NOT_BEGUN = Progress(0, MOST_STEPS, None, None, False)
+
+
+@dataclasses.dataclass(frozen=True)
+class Selecting:
+    """It is being decided which optional terms stay."""
+
+    def progress(self, _: int) -> Progress:
+        """Tell how far this is."""
+        return _NOT_BEGUN
+
+
+@dataclasses.dataclass(frozen=True)
+class Starting:
+    """It is decided which optional terms stay; starting points come next."""
+
+    def progress(self, _: int) -> Progress:
+        """Tell how far this is."""
+        return _NOT_BEGUN
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Tempering:
+    """Populations are on their way from the prior to the posterior: the Laplace shapes misfit.
+
+    Attributes
+    ----------
+    proposal : Proposal
+        Laplace approximations at the optima.
+    populations : tuple of Population or None
+        None before they are drawn.
+    verdict : Verdict
+        On what was drawn so far, which is nothing.
+    """
+
+    proposal: Proposal
+    populations: tuple[Population | None, ...]
+    verdict: Verdict
+
+    def progress(self, _: int) -> Progress:
+        """Tell how far this is."""
+        return _NOT_BEGUN
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Walking:
+    """Ensembles walk.
+
+    Attributes
+    ----------
+    proposal : Proposal
+        What the independent move proposes from; adapted to pilot draws that are then thrown away.
+    ensembles : tuple of Ensemble
+        With all their steps since the proposal was adapted.
+    verdict : Verdict
+        On the draws so far.
+    adaptations : int
+        How often the proposal was adapted; 0 where no populations were called for.
+    ess, r_hat : float or None
+        Least effective sample size and largest R-hat so far.
+    """
+
+    proposal: Proposal
+    ensembles: tuple[Ensemble, ...]
+    verdict: Verdict
+    adaptations: int
+    ess: float | None = None
+    r_hat: float | None = None
+
+    @property
+    def steps(self) -> int:
+        """Steps of each ensemble."""
+        return self.ensembles[0].steps
+
+    @property
+    def finished(self) -> bool:
+        """Whether more steps would serve nothing."""
+        return self.verdict.converged or self.steps >= MOST_STEPS
+
+    def chains(self, names: tuple[str, ...]) -> Chains:
+        """Return the kept draws of all ensembles; `names` are those of the parameters."""
+        return chains_of(self.ensembles, self.proposal.optima.nearest, names)
+
+    def progress(self, target_ess: int) -> Progress:
+        """Tell how far this is."""
+        target = self.steps
+        if not self.finished:
+            share = (self.ess or 1.0) / target_ess
+            wanted = max(target / share, target + 1) if target else MOST_STEPS
+            target = int(min(wanted, MOST_STEPS))
+        return Progress(self.steps, target, self.ess, self.r_hat, self.finished)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Weighted:
+    """Importance sampling was done.
+
+    Attributes
+    ----------
+    optima : Mixture
+        Laplace approximations at the optima.
+    draws : WeightedDraws
+        Draws with their weights.
+    verdict : Verdict
+        On them.
+    """
+
+    optima: Mixture
+    draws: WeightedDraws
+    verdict: Verdict
+
+    def progress(self, _: int) -> Progress:
+        """Tell how far this is."""
+        count = len(self.draws.z)
+        return Progress(count, count, self.draws.ess, None, True)
+
+
+@dataclasses.dataclass(frozen=True)
+class Known:
+    """Nothing is unknown but the ranges."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """There is nothing that could fail."""
+        return Verdict(True, ())
+
+    def progress(self, _: int) -> Progress:
+        """Tell how far this is."""
+        return Progress(0, 0, None, None, True)
+
+
+Drawing = Tempering | Walking | Weighted | Known
+Stage = Selecting | Starting | Drawing

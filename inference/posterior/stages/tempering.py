@@ -1,0 +1,119 @@
+"""The stage in which populations are carried from the prior to the posterior."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from inference.posterior.job import Job
+from inference.posterior.sampling.ensemble import WALKERS
+from inference.posterior.sampling.population import Population, first_population, temper
+from inference.posterior.sampling.shear import shear_of
+from inference.posterior.sampling.transport import fit_map
+from inference.posterior.stages.chunk import evaluations
+from inference.posterior.stages.ensembles import MAP_SHARE, new_ensembles
+from inference.posterior.stages.state import Tempering, Walking
+from inference.posterior.streams import Stream
+
+__all__ = ["TemperTask", "merge", "tasks"]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class TemperTask:
+    """Some temperatures of a population.
+
+    Attributes
+    ----------
+    job : Job
+        The job.
+    population : Population or None
+        None before it is drawn from the prior.
+    index : int
+        Of the population.
+    calls : int
+        Density evaluations after which to stop.
+    """
+
+    job: Job
+    population: Population | None
+    index: int
+    calls: int
+
+    def run(self) -> Population:
+        """Carry the population on."""
+        density, population = self.job.density(), self.population
+        before = 0 if population is None else population.calls
+        if population is None:
+            population = first_population(density, self._stream(0))
+        while not population.ended and population.calls - before < self.calls:
+            population = temper(density, population, self._stream(1 + population.steps))
+        return population
+
+    def _stream(self, temperature: int) -> np.random.Generator:
+        return self.job.stream(Stream.POPULATIONS, self.index, temperature)
+
+
+def tasks(job: Job, stage: Tempering) -> tuple[TemperTask, ...]:
+    """Return the populations that are still on their way."""
+    return tuple(
+        TemperTask(job, population, k, evaluations(job))
+        for k, population in enumerate(stage.populations)
+        if population is None or not population.ended
+    )
+
+
+def merge(
+    job: Job, stage: Tempering, carried: Sequence[Population]
+) -> tuple[Tempering | Walking, int]:
+    """Take in populations; set up ensembles where all have arrived, or died on the way.
+
+    Parameters
+    ----------
+    job : Job
+        The job.
+    stage : Tempering
+        Where it stands.
+    carried : sequence of Population
+        In the order of `tasks`.
+
+    Returns
+    -------
+    (Tempering or Walking, int)
+        The next stage, and the density evaluations on the way to it.
+    """
+    calls, found, rest = 0, [], iter(carried)
+    for old in stage.populations:
+        if old is not None and old.ended:
+            found.append(old)
+            continue
+        new = next(rest)
+        calls += new.calls - (0 if old is None else old.calls)
+        found.append(new)
+    if not all(population.ended for population in found):
+        return dataclasses.replace(stage, populations=tuple(found)), calls
+    walking = _set_out(job, stage, [population for population in found if len(population.z)])
+    return walking, calls + WALKERS * len(walking.ensembles)
+
+
+def _set_out(job: Job, stage: Tempering, arrived: list[Population]) -> Walking:
+    """Fit a map to the populations that arrived, and set up ensembles in its coordinates.
+
+    The last ensemble starts around the optima of the multistart, the others from populations that
+    came from the prior and know nothing of them: they can contradict one another.
+    """
+    proposal, density = stage.proposal, job.density()
+    count = job.settings.ensembles
+    starts = [np.empty((0, len(density.parameters)))] * count
+    if arrived:
+        members = [population.z for population in arrived]
+        transport = fit_map(np.concatenate(members), shear_of(density))
+        proposal = dataclasses.replace(proposal, transport=transport, share=MAP_SHARE)
+        orders = [job.stream(Stream.MEMBERS, k).permutation(len(z)) for k, z in enumerate(members)]
+        sharing = -(-(count - 1) // len(members))
+        for k in range(count - 1):
+            # ensembles that share a population begin in parts of their own
+            turn, which = divmod(k, len(members))
+            order = np.roll(orders[which], -(turn * len(members[which]) // sharing))
+            starts[k] = members[which][order]
+    ensembles = new_ensembles(density, proposal, tuple(starts), job.seeds(Stream.ENSEMBLES))
+    return Walking(proposal, ensembles, stage.verdict, adaptations=1)

@@ -1,0 +1,129 @@
+"""The stage in which ensembles walk; what they propose from is fitted anew where they are slow."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from inference.posterior.job import Job
+from inference.posterior.sampling.diagnostics import (
+    autocorrelation_time,
+    effective_sample_size,
+    split_r_hat,
+)
+from inference.posterior.sampling.ensemble import WALKERS, Ensemble, advance, restart
+from inference.posterior.sampling.proposal import Proposal
+from inference.posterior.sampling.shear import shear_of
+from inference.posterior.sampling.transport import fit_map
+from inference.posterior.sampling.verdict import Chains, Verdict, judge
+from inference.posterior.stages.chunk import steps_from
+from inference.posterior.stages.ensembles import MAP_SHARE, POPULATIONS
+from inference.posterior.stages.state import Tempering, Walking
+from simulator.parameters import parameters_of
+
+__all__ = ["WalkTask", "merge", "tasks"]
+
+# steps of autocorrelation above which the proposal is adapted: as often as there are entries
+_SLOW = (10.0, 10.0, 40.0)
+_PILOT_DRAWS = 10_000
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class WalkTask:
+    """Some steps of an ensemble.
+
+    Attributes
+    ----------
+    job : Job
+        The job.
+    proposal : Proposal
+        Of the ensemble.
+    ensemble : Ensemble
+        Where it stands.
+    steps : int
+        How many.
+    """
+
+    job: Job
+    proposal: Proposal
+    ensemble: Ensemble
+    steps: int
+
+    def run(self) -> Ensemble:
+        """Carry the ensemble on."""
+        return advance(self.job.density(), self.proposal, self.ensemble, self.steps)
+
+
+def tasks(job: Job, stage: Walking) -> tuple[WalkTask, ...]:
+    """Return the steps of every ensemble; none where more would serve nothing."""
+    if stage.finished:
+        return ()
+    steps = steps_from(job, stage.steps)
+    return tuple(WalkTask(job, stage.proposal, ensemble, steps) for ensemble in stage.ensembles)
+
+
+def merge(
+    job: Job, stage: Walking, ensembles: Sequence[Ensemble]
+) -> tuple[Tempering | Walking, int]:
+    """Take in ensembles, and judge the draws so far or adapt the proposal to them.
+
+    Parameters
+    ----------
+    job : Job
+        The job.
+    stage : Walking
+        Where it stands.
+    ensembles : sequence of Ensemble
+        In the order of `tasks`.
+
+    Returns
+    -------
+    (Tempering or Walking, int)
+        The next stage, and the density evaluations on the way to it.
+    """
+    made = sum(ensemble.steps for ensemble in ensembles) - stage.steps * len(ensembles)
+    stage = dataclasses.replace(stage, ensembles=tuple(ensembles))
+    kept = stage.chains(parameters_of(job.sensor, job.scene).names)
+    return _judged(job, stage, kept), made * WALKERS
+
+
+def _judged(job: Job, stage: Walking, kept: Chains) -> Tempering | Walking:
+    if _is_slow(kept, stage.adaptations):
+        return _adapted(job, stage, kept)
+    columns = np.moveaxis(kept.z, -1, 0)
+    least = min(effective_sample_size(draws) for draws in columns)
+    worst = max(split_r_hat(draws) for draws in columns)
+    return dataclasses.replace(
+        stage,
+        verdict=judge(kept, job.settings.target_ess),
+        ess=least if math.isfinite(least) else None,
+        r_hat=worst if math.isfinite(worst) else None,
+    )
+
+
+def _is_slow(kept: Chains, adaptations: int) -> bool:
+    """Tell whether the ensembles should propose from something else."""
+    if adaptations >= len(_SLOW):
+        return False
+    steps = kept.z.shape[2]
+    times = [autocorrelation_time(x.reshape(-1, steps).T) for x in np.moveaxis(kept.z, -1, 0)]
+    # a parameter that does not move has no finite time
+    return not max(times) < _SLOW[adaptations]
+
+
+def _adapted(job: Job, stage: Walking, kept: Chains) -> Tempering | Walking:
+    """Fit the map to what was drawn so far, and forget the draws; or call for populations.
+
+    Populations are called for once: those that died on the way would die again.
+    """
+    pending = Verdict(False, ("the proposal was still being adapted",))
+    old = stage.proposal
+    if stage.adaptations == 0:
+        return Tempering(old, (None,) * POPULATIONS, pending)
+    flat = kept.z.reshape(-1, kept.z.shape[-1])
+    pilot = flat[np.linspace(0, len(flat) - 1, min(len(flat), _PILOT_DRAWS)).astype(int)]
+    transport = fit_map(pilot, shear_of(job.density()))
+    new = dataclasses.replace(old, transport=transport, share=MAP_SHARE)
+    restarted = tuple(restart(ensemble, old, new) for ensemble in stage.ensembles)
+    return Walking(new, restarted, pending, stage.adaptations + 1)

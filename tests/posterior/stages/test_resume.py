@@ -1,0 +1,95 @@
+"""A job that is stored and read again between any two chunks is the same to the last bit."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from inference.posterior import fold
+from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages import chunk
+from inference.posterior.stages.state import (
+    Known,
+    Selecting,
+    Starting,
+    Tempering,
+    Walking,
+    Weighted,
+)
+from simulator.scene import parse_scene
+from tests.posterior.scenes import OBJECT, UNKNOWN_CROSSTALK, data, sensor_of
+from tests.posterior.test_archive import same
+
+WALL = {"strength": 0.017, "distance_m": 3.0, "shadow": {"c0": 0.056, "c1": 0.02}}
+UNKNOWN_WALL = {
+    "strength": {"prior": "lognormal", "median": 0.02, "sigma": 1.0},
+    "distance_m": {"prior": "lognormal", "median": 3.0, "sigma": 0.5},
+}
+# truth beside the object, scene, method, frames, most chunks, stages
+CASES: dict[str, tuple[dict[str, Any], dict[str, Any], str, int, int, tuple[type, ...]]] = {
+    "optional term": (
+        {},
+        {"crosstalk": {"values": UNKNOWN_CROSSTALK, "optional": True}},
+        "emcee",
+        10,
+        5,
+        (Selecting, Starting, Walking),
+    ),
+    "curved": (
+        {"background": WALL},
+        {"background": UNKNOWN_WALL},
+        "emcee",
+        3,
+        5,
+        (Tempering, Walking),
+    ),
+    "weighted": (
+        {"crosstalk": [0.002, 0.01]},
+        {"crosstalk": UNKNOWN_CROSSTALK},
+        "importance",
+        20,
+        1,
+        (Weighted,),
+    ),
+    "known": ({}, {"object": OBJECT}, "emcee", 20, 1, (Known,)),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_in_every_stage(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chunk, "_CHUNK_S", 0.02)  # small chunks: many places to stop at
+    truth, scene, method, frames, most, stages = CASES[name]
+    sensor = sensor_of("pulsed")
+    simulated = data(sensor, truth, frames)
+    settings = SamplerSettings.model_validate({"seed": 7, "target_ess": 50, "method": method})
+    job = fold.prepare(sensor, parse_scene(scene), simulated.frames, settings)
+    stored_job = job.to_bytes()
+    checkpoint, seen = fold.start(job), []
+    for _ in range(most):
+        seen.append(type(checkpoint.stage))
+        stored = fold.Checkpoint.from_bytes(checkpoint.to_bytes())
+        assert same(stored, checkpoint)
+        again = fold.Job.from_bytes(stored_job)
+        pieces = [fold.run(task) for task in fold.tasks(job, checkpoint)]
+        others = [fold.run(task) for task in fold.tasks(again, stored)]
+        assert same(tuple(pieces), tuple(others))
+        if not pieces:
+            break
+        assert same(fold.merge(again, stored, others), fold.merge(job, checkpoint, pieces))
+        checkpoint = fold.merge(job, checkpoint, pieces)
+    stored = fold.Checkpoint.from_bytes(checkpoint.to_bytes())
+    assert tuple(dict.fromkeys(seen)) == stages
+    assert any(seen.count(stage) > 1 for stage in stages) or len(stages) == 1
+    direct = fold.summarise(job, checkpoint, 0.0, 0.0)
+    resumed = fold.summarise(again, stored, 0.0, 0.0)
+    assert direct.to_json() == resumed.to_json()
+    assert np.array_equal(direct.draws.range_m, resumed.draws.range_m, equal_nan=True)
+
+
+def test_pieces_of_another_stage_are_a_mistake() -> None:
+    sensor = sensor_of("pulsed")
+    settings = SamplerSettings(seed=7, target_ess=50)
+    job = fold.prepare(sensor, parse_scene({}), data(sensor).frames, settings)
+    checkpoint = fold.start(job)
+    with pytest.raises(TypeError, match="another stage"):
+        fold.merge(job, checkpoint, [checkpoint])

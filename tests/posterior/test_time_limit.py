@@ -1,0 +1,81 @@
+"""A time limit belongs to the computation: whoever drives it, the answer is the same."""
+
+import asyncio
+import itertools
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+
+import inference.posterior.infer
+import service.job_runner
+from inference.posterior import fold
+from inference.posterior.settings import SamplerSettings
+from service.job_store import MemoryJobStore
+from service.jobs import Jobs
+from simulator.scene import parse_scene
+from tests.posterior.scenes import UNKNOWN_CROSSTALK, data, example, sensor_of
+
+OUT_OF_TIME = "stopped at the time limit of {} s"
+
+
+class _Clock:
+    """A module `time` whose every reading is a second after the one before."""
+
+    def __init__(self) -> None:
+        seconds = itertools.count().__next__
+        self.perf_counter: Callable[[], float] = seconds
+        self.monotonic: Callable[[], float] = seconds
+        self.process_time: Callable[[], float] = lambda: 0.0
+
+
+async def _by_jobs(request: Any, settings: SamplerSettings) -> dict[str, Any]:
+    jobs = Jobs(fold, MemoryJobStore(1), ThreadPoolExecutor(2), running=1)
+    await jobs.start()
+    try:
+        sensor, scene, frames = request
+        record = await jobs.submit(sensor, scene, frames, settings)
+        assert await jobs.wait(record.id, timeout_s=600)
+        result = (await jobs.get(record.id)).result
+    finally:
+        await jobs.close()
+    assert result is not None
+    return result
+
+
+# one reading at the beginning, one after the start and one after every chunk
+@pytest.mark.parametrize("max_seconds", [1.0, 2.5, 1000.0])
+@pytest.mark.parametrize("optional", [False, True])
+def test_the_same_answer_from_a_call_and_from_the_service(
+    max_seconds: float, optional: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    crosstalk = {"values": UNKNOWN_CROSSTALK, "optional": True} if optional else UNKNOWN_CROSSTALK
+    sensor = sensor_of("pulsed")
+    frames = data(sensor, {"crosstalk": [0.002, 0.01]}).frames
+    request = sensor, parse_scene({"crosstalk": crosstalk}), frames
+    target = 1_000_000 if max_seconds < 100 else 50
+    settings = SamplerSettings(seed=7, target_ess=target, max_seconds=max_seconds)
+    monkeypatch.setattr(inference.posterior.infer, "time", _Clock())
+    called = inference.posterior.infer.infer(*request, settings).to_json()
+    monkeypatch.setattr(service.job_runner, "time", _Clock())
+    served = asyncio.run(_by_jobs(request, settings))
+    assert called.pop("runtime")["wall_s"] == served.pop("runtime")["wall_s"]
+    assert called == served
+    stopped = OUT_OF_TIME.format(f"{max_seconds:g}") in called["verdict"]["reasons"]
+    assert stopped == (max_seconds < 100)
+    assert called["verdict"]["converged"] != stopped
+
+
+def test_a_finished_job_was_not_stopped() -> None:
+    """The limit may pass while the answer is made: nothing was cut short then."""
+    settings = SamplerSettings(seed=7, target_ess=50, max_seconds=60)
+    job = fold.prepare(*example("pulsed", crosstalk=False), settings)
+    checkpoint = fold.start(job)
+    assert fold.tasks(job, checkpoint, 59.9)
+    assert fold.tasks(job, checkpoint, 60.0) == ()
+    while pieces := [fold.run(task) for task in fold.tasks(job, checkpoint)]:
+        checkpoint = fold.merge(job, checkpoint, pieces)
+    late = fold.summarise(job, checkpoint, 61.0, 61.0).verdict
+    assert late == fold.summarise(job, checkpoint, 0.0, 0.0).verdict
+    assert late.converged
