@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report readme api picture notebook-data calibrate coverage test check lint format types fast lock clean
+.PHONY: help setup demo report readme api picture notebook notebook-data calibrate coverage test check lint format types fast lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -33,6 +33,9 @@ api: $(READY) ## Write docs/api.md from the docstrings anew
 
 picture: $(READY) ## Make the README's picture anew
 	$(BIN)/hybridtof demo --out docs
+
+notebook: $(READY) ## Run the notebook and store its outputs
+	$(BIN)/jupyter-execute --inplace notebooks/posterior_diagnostics.ipynb
 
 notebook-data: $(READY) ## Make the notebook's frames anew
 	$(BIN)/hybridtof simulate --scene notebooks/simulated.json --from-m 0.15 --to-m 1.2 --frames 30 --spacing log --seed 7 --output notebooks/frames.csv > /dev/null

@@ -1,5 +1,6 @@
-"""Notebooks run, are stored without outputs, and their data can be made anew."""
+"""Notebooks run, hold their truth, keep their outputs, and their data can be made anew."""
 
+import re
 from pathlib import Path
 
 import nbformat
@@ -11,6 +12,8 @@ from service.frame_files import read_frames
 
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
 NAMES = sorted(path.name for path in NOTEBOOKS.glob("*.ipynb"))
+# what a notebook needs besides the standard library
+ALLOWED = {"hybridtof", "numpy", "matplotlib", "arviz", "json", "pathlib"}
 
 
 def read(name: str) -> nbformat.NotebookNode:
@@ -19,17 +22,62 @@ def read(name: str) -> nbformat.NotebookNode:
     return notebook
 
 
+def printed(notebook: nbformat.NotebookNode) -> str:
+    """What its cells print."""
+    return "".join(
+        output.text
+        for cell in notebook.cells
+        if cell.cell_type == "code"
+        for output in cell.outputs
+        if output.output_type == "stream" and output.name == "stdout"
+    )
+
+
+def check_truth(text: str) -> None:
+    """Converged, no misfit, and the truth where the posterior says.
+
+    The frames' errors go together, so that their common error is what has a known law: beyond 3.29
+    standard deviations once in a thousand data sets, and the seeds are fixed.
+    """
+    assert "converged: True" in text
+    assert "misfit:    False" in text
+    found = re.search(r"common error: ([-+][\d.]+) standard deviations", text)
+    assert found is not None
+    assert abs(float(found[1])) < 3.29
+    counted = re.search(r"truth inside 90 % intervals: (\d+) of (\d+) frames", text)
+    assert counted is not None
+    assert int(counted[1]) > int(counted[2]) / 2
+
+
+def quantiles(text: str) -> dict[str, tuple[float, float, float]]:
+    """The table of parameters: 5 %, median, 95 %."""
+    rows = re.findall(r"^([a-z]+\.[\w.]+) +([-\d.e]+) +([-\d.e]+) +([-\d.e]+) ", text, re.MULTILINE)
+    return {name: (float(low), float(middle), float(high)) for name, low, middle, high in rows}
+
+
 def test_there_are_notebooks() -> None:
     assert NAMES
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_stored_without_outputs(name: str) -> None:
+def test_stored_with_outputs(name: str) -> None:
     notebook = read(name)
-    for cell in notebook.cells:
-        if cell.cell_type == "code":
-            assert cell.outputs == []
-            assert cell.execution_count is None
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    assert [cell.execution_count for cell in cells] == list(range(1, len(cells) + 1))
+    for cell in cells:
+        assert cell.outputs
+        assert {output.output_type for output in cell.outputs} <= {"stream", "display_data"}
+        assert all(output.get("name") != "stderr" for output in cell.outputs)
+    check_truth(printed(notebook))
+    assert (NOTEBOOKS / name).stat().st_size < 600_000
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_goes_in_by_the_front_door(name: str) -> None:
+    code = "\n".join(cell.source for cell in read(name).cells if cell.cell_type == "code")
+    used = re.findall(r"^\s*(?:import|from) (\w+)", code, re.MULTILINE)
+    assert "hybridtof" in used
+    assert set(used) <= ALLOWED
 
 
 @pytest.mark.slow
@@ -40,16 +88,16 @@ def test_runs(name: str) -> None:
     from nbclient import NotebookClient
 
     notebook = read(name)
+    stored = quantiles(printed(notebook))
     resources = {"metadata": {"path": str(NOTEBOOKS)}}
-    NotebookClient(notebook, timeout=None, kernel_name="python3", resources=resources).execute()
-    text = "".join(
-        output.text
-        for cell in notebook.cells
-        if cell.cell_type == "code"
-        for output in cell.outputs
-        if output.output_type == "stream"
-    )
-    assert "converged: True" in text
+    NotebookClient(notebook, timeout=300, kernel_name="python3", resources=resources).execute()
+    check_truth(printed(notebook))
+    anew = quantiles(printed(notebook))
+    assert stored
+    assert stored.keys() == anew.keys()
+    for parameter, (low, middle, high) in anew.items():
+        # a third of a standard deviation: five standard errors of a median of 400 draws
+        assert abs(middle - stored[parameter][1]) < 0.1 * (high - low), parameter
 
 
 def test_frames_are_made_by_the_committed_command(
