@@ -11,9 +11,9 @@ import pytest
 
 from service.demo.answers import Answer, Episode, Point, of_estimates, of_posterior
 from service.demo.table import table
-from service.report.command import table as report_table
 from service.report.measure import Effort, measure
 from service.report.scenes import SCENES
+from service.report.table import table as report_table
 
 ROOT = Path(__file__).parents[1]
 SIGNATURE = b"\x89PNG\r\n\x1a\n"

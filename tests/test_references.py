@@ -139,6 +139,16 @@ def test_links_of_the_pages(page: Path) -> None:
     assert lost == []
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_paths_in_the_pages(page: Path) -> None:
+    """A file or folder that a page names is there."""
+    if page.name == "CHANGELOG.md":  # it speaks of what was
+        return
+    places = "|".join(PACKAGES)
+    named = re.findall(rf"`((?:{places})/[\w./-]*)`", page.read_text(encoding="utf-8"))
+    assert [name for name in named if not (ROOT / name).exists()] == []
+
+
 def test_the_grammar_finds_what_is_written() -> None:
     """Planted references are seen: a test of references that finds none would always pass."""
     found = dict(references("zeta (4.19 with its cubic), Table 3.1, App. A, 25-27, (2.6-2.10)"))
