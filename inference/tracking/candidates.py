@@ -26,25 +26,15 @@ NEW = 0
 
 
 class Candidate(NamedTuple):
-    """One mode of a frame's density under one hypothesis.
+    """One mode of a frame's density under one hypothesis."""
 
-    Attributes
-    ----------
-    log_mass : float
-        Log of what the density integrates to.
-    mean, sd : float
-        Of u = log r; a standard deviation of 0 was not integrated.
-    mode : float
-        Where the density is largest, log range.
-    parent : int
-        Row of the hypothesis, `NEW`, or less than 0: the frame is an outlier and leaves hypothesis
-        ``-parent`` as it was.
-    """
-
-    log_mass: float
+    log_mass: float  # log of what the density integrates to
+    # of u = log r; a standard deviation of 0 was not integrated
     mean: float
     sd: float
-    mode: float
+    mode: float  # where the density is largest, log range
+    # row of the hypothesis, `NEW`, or less than 0: the frame is an outlier and leaves hypothesis
+    # ``-parent`` as it was
     parent: int
 
 

@@ -25,25 +25,14 @@ Array = NDArray[np.float64]
 
 
 class Expected(NamedTuple):
-    """What the empty scene expects of a frame.
+    """What the empty scene expects of a frame."""
 
-    Attributes
-    ----------
-    log_density : float
-        Of the frame, without the log of 2 pi.
-    surprise : float
-        Normalised innovation squared.
-    mean1, mean2 : float
-        Expected readings.
-    noise : Root
-        Of their noise's covariance.
-    """
-
-    log_density: float
-    surprise: float
+    log_density: float  # of the frame, without the log of 2 pi
+    surprise: float  # normalised innovation squared
+    # expected readings
     mean1: float
     mean2: float
-    noise: Root
+    noise: Root  # of their noise's covariance
 
 
 @compiled

@@ -35,43 +35,27 @@ class Frame(NamedTuple):
 
 
 class Position(NamedTuple):
-    """The prior density of u.
+    """The prior density of u."""
 
-    Attributes
-    ----------
-    born : bool
-        Whether u has the prior density of the ranges instead of a normal one.
-    centre, precision, log_scale : float
-        Of a normal u; the log of sqrt(precision / 2 pi), for a born u the log of its weight.
-    """
-
-    born: bool
+    born: bool  # whether u has the prior density of the ranges instead of a normal one
+    # of a normal u; the log of sqrt(precision / 2 pi), for a born u the log of its weight
     centre: float
     precision: float
     log_scale: float
 
 
 class Added(NamedTuple):
-    """What crosstalk and nuisance parameters add to the readings, normal given u.
+    """What crosstalk and nuisance parameters add to the readings, normal given u."""
 
-    Attributes
-    ----------
-    offset1, offset2 : float
-        What the crosstalk adds at the centre.
-    slope1, slope2 : float
-        Change with u of what crosstalk and nuisance parameters add.
-    root : Root
-        Of the covariance that they add.
-    spread : ndarray, shape (2, n + p)
-        Root of the crosstalk's covariance in the empty scene; read where the prior is born, because
-        what nuisance parameters add then depends on u.
-    """
-
+    # what the crosstalk adds at the centre
     offset1: float
     offset2: float
+    # change with u of what crosstalk and nuisance parameters add
     slope1: float
     slope2: float
-    root: Root
+    root: Root  # of the covariance that they add
+    # (2, n + p): root of the crosstalk's covariance in the empty scene; read where the prior is
+    # born, because what nuisance parameters add then depends on u
     spread: Array
 
 
@@ -84,24 +68,13 @@ class Rate(NamedTuple):
 
 
 class Prior(NamedTuple):
-    """What is known of a frame before it is read, as a density of u and what is normal given u.
+    """What is known of a frame before it is read, as a density of u and what is normal given u."""
 
-    Attributes
-    ----------
-    position : Position
-        Of u.
-    added : Added
-        To the readings.
-    rate : Rate
-        Of u.
-    share : float
-        Part of the variance of u that comes from crosstalk that is not known: along it the curve
-        counts as straight (`inference.tracking.shared_error`).
-    """
-
-    position: Position
-    added: Added
-    rate: Rate
+    position: Position  # of u
+    added: Added  # to the readings
+    rate: Rate  # of u
+    # part of the variance of u that comes from crosstalk that is not known: along it the curve
+    # counts as straight (`inference.tracking.shared_error`)
     share: float
 
 

@@ -41,45 +41,26 @@ TIME, PENDING, RUNNING, COUNT = range(4)
 
 
 class Hypotheses(NamedTuple):
-    """What the filter knows after a frame.
+    """What the filter knows after a frame."""
 
-    Attributes
-    ----------
-    x : ndarray, shape (rows, n), or (rows, n + 1) where crosstalk is learnt
-        Means of log r, its rate [1/s] and, if learnt, the crosstalk [units of the noise] and the
-        log r at which tangents are taken; row 0 is the empty scene, rows that are not in use are
-        arbitrary.
-    X : ndarray, shape (rows, n, n + p)
-        Roots of the covariances.
-    weight : ndarray, shape (rows,)
-        Probabilities.
-    numbers : ndarray, shape (4,)
-        Time of the last frame [s] (nan: none yet), probability of an object of which nothing is
-        known yet, running surprise, number of hypotheses.
-    """
-
+    # (rows, n), a column more where crosstalk is learnt: means of log r, its rate [1/s] and, if
+    # learnt, the crosstalk [units of the noise] and the log r at which tangents are taken; row 0 is
+    # the empty scene, rows that are not in use are arbitrary
     x: Array
-    X: Array
-    weight: Array
+    X: Array  # (rows, n, n + p): roots of the covariances
+    weight: Array  # (rows,): probabilities
+    # (4,): time of the last frame [s] (nan: none yet), probability of an object of which nothing is
+    # known yet, running surprise, number of hypotheses
     numbers: Array
 
 
 class Scratch(NamedTuple):
-    """Arrays that are overwritten.
+    """Arrays that are overwritten."""
 
-    Attributes
-    ----------
-    nuisance : ndarray, shape (2, p)
-        Change of the readings with the nuisance parameters.
-    work : ndarray, shape (n, at least 4 n + p + 4)
-        To be made triangular.
-    factors, pulls : ndarray, shape (2, n + p)
-        Root of the covariance that a hypothesis expects of the readings, and the inverse of the
-        whole covariance times it.
-    """
-
-    nuisance: Array
-    work: Array
+    nuisance: Array  # (2, p): change of the readings with the nuisance parameters
+    work: Array  # (n, at least 4 n + p + 4): to be made triangular
+    # (2, n + p): root of the covariance that a hypothesis expects of the readings, and the inverse
+    # of the whole covariance times it
     factors: Array
     pulls: Array
 

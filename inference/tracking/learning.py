@@ -40,20 +40,11 @@ _BROAD = 10.0  # standard deviation of log r before the first frame: vague, but 
 
 
 class Tangent(NamedTuple):
-    """The curve of readings at one mode.
+    """The curve of readings at one mode."""
 
-    Attributes
-    ----------
-    u : float
-        The mode, log range.
-    at : float
-        Where the curve is taken, log range.
-    value1, value2, slope1, slope2 : float
-        Mean readings without crosstalk, and their derivatives along u.
-    """
-
-    u: float
-    at: float
+    u: float  # the mode, log range
+    at: float  # where the curve is taken, log range
+    # mean readings without crosstalk, and their derivatives along u
     value1: float
     value2: float
     slope1: float

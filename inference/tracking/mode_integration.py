@@ -25,18 +25,12 @@ _LOG_ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
 
 
 class Mode(NamedTuple):
-    """One mode of a density along the range.
+    """One mode of a density along the range."""
 
-    Attributes
-    ----------
-    u, scale : float
-        Its place and its scale, log range.
-    low, high : float
-        The valleys on either side, log range.
-    """
-
+    # its place and its scale, log range
     u: float
     scale: float
+    # the valleys on either side, log range
     low: float
     high: float
 

@@ -14,87 +14,49 @@ __all__ = ["Motion", "Presence", "Rules", "motion_over", "presence_over"]
 
 
 class Rules(NamedTuple):
-    """Numbers that the filter's kernels need besides the curve.
+    """Numbers that the filter's kernels need besides the curve."""
 
-    Attributes
-    ----------
-    leave, arrive : float
-        Rates at which an object leaves and comes [1/s].
-    rate_sd, rate_time : float
-        Standard deviation [1/s] and correlation time [s] of d log r / dt.
-    drift1, drift2 : float
-        Drift of the crosstalk, in units of the read noise per square root of a second.
-    outlier : float
-        Probability that a frame's readings have nothing to do with the scene.
-    breadth : float
-        Width of the Cauchy law that such readings follow around what was expected, in units of the
-        noise.
-    log_negligible : float
-        Log weight below which a hypothesis is dropped.
-    same : float
-        Information lost, in nats per weight of the lighter one, below which two hypotheses merge.
-    memory : float
-        Share of the running surprise that a frame leaves as it was.
-    most_surprise : float
-        Surprise at which a single frame is cut.
-    unique_above : float
-        Weight, given that an object is there, above which one range is the answer.
-    """
-
+    # rates at which an object leaves and comes [1/s]
     leave: float
     arrive: float
+    # standard deviation [1/s] and correlation time [s] of d log r / dt
     rate_sd: float
     rate_time: float
+    # drift of the crosstalk, in units of the read noise per square root of a second
     drift1: float
     drift2: float
-    outlier: float
+    outlier: float  # probability that a frame's readings have nothing to do with the scene
+    # width of the Cauchy law that such readings follow around what was expected, in units of the
+    # noise
     breadth: float
-    log_negligible: float
+    log_negligible: float  # log weight below which a hypothesis is dropped
+    # information lost, in nats per weight of the lighter one, below which two hypotheses merge
     same: float
-    memory: float
-    most_surprise: float
+    memory: float  # share of the running surprise that a frame leaves as it was
+    most_surprise: float  # surprise at which a single frame is cut
+    # weight, given that an object is there, above which one range is the answer
     unique_above: float
 
 
 class Motion(NamedTuple):
-    """How states move over one time step.
+    """How states move over one time step."""
 
-    Attributes
-    ----------
-    carry, decay : float
-        u grows by carry du/dt, and du/dt shrinks by the factor decay.
-    noise : Root
-        Of the noise of (u, du/dt) that enters.
-    drift1, drift2 : float
-        Standard deviations by which the crosstalk drifts.
-    """
-
+    # u grows by carry du/dt, and du/dt shrinks by the factor decay
     carry: float
     decay: float
-    noise: Root
+    noise: Root  # of the noise of (u, du/dt) that enters
+    # standard deviations by which the crosstalk drifts
     drift1: float
     drift2: float
 
 
 class Presence(NamedTuple):
-    """Probabilities over one time step.
+    """Probabilities over one time step."""
 
-    Attributes
-    ----------
-    arrived : float
-        From absent to present.
-    left : float
-        From present to absent.
-    stayed : float
-        The same object stayed.
-    replaced : float
-        Present before and after, but left in between.
-    """
-
-    arrived: float
-    left: float
-    stayed: float
-    replaced: float
+    arrived: float  # from absent to present
+    left: float  # from present to absent
+    stayed: float  # the same object stayed
+    replaced: float  # present before and after, but left in between
 
 
 @compiled

@@ -18,18 +18,11 @@ _FEWEST_DRAWS = 20  # a direction
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Nuisance:
-    """What is known of the unknowns: a normal in the coordinates in which their prior is normal.
+    """What is known of the unknowns: a normal in the coordinates in which their prior is normal."""
 
-    Attributes
-    ----------
-    centre : Terms
-        Physical values at its mean.
-    plus, minus : tuple of Terms
-        One standard deviation away on either side along each principal direction. The readings'
-        change with a direction is taken as a secant between the two, which feels the curvature.
-    """
-
-    centre: Terms
+    centre: Terms  # physical values at its mean
+    # one standard deviation away on either side along each principal direction. The readings'
+    # change with a direction is taken as a secant between the two, which feels the curvature
     plus: tuple[Terms, ...]
     minus: tuple[Terms, ...]
 

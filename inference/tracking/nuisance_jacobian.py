@@ -21,18 +21,10 @@ _FELT = 1e-3  # standard deviations of a reading that a direction must change to
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class NuisanceJacobian:
-    """Change of the readings with p independent standard normal nuisance parameters.
+    """Change of the readings with p independent standard normal nuisance parameters."""
 
-    Attributes
-    ----------
-    along : ndarray, shape (knots, 2 p)
-        Of the readings along the range, in units of the noise.
-    empty : ndarray, shape (2, p)
-        Of those of an empty scene.
-    """
-
-    along: Array
-    empty: Array
+    along: Array  # (knots, 2 p): of the readings along the range, in units of the noise
+    empty: Array  # (2, p): of those of an empty scene
 
 
 def nuisance_jacobian(

@@ -16,24 +16,13 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True)
 class Observed:
-    """What is read of every frame.
+    """What is read of every frame."""
 
-    Attributes
-    ----------
-    by_rate : bool
-        Whether derivatives in time are read, not the readings themselves.
-    units : (float, float)
-        Noise of the two observables, in which the kernels count [reading units, or a second].
-    used : (bool, bool)
-        Which of the two are used.
-    noise : ReadingsNoise
-        In those units.
-    """
-
-    by_rate: bool
+    by_rate: bool  # whether derivatives in time are read, not the readings themselves
+    # noise of the two observables, in which the kernels count [reading units, or a second]
     units: tuple[float, float]
-    used: tuple[bool, bool]
-    noise: ReadingsNoise
+    used: tuple[bool, bool]  # which of the two are used
+    noise: ReadingsNoise  # in those units
 
     @property
     def scale(self) -> Array:

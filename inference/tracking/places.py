@@ -23,41 +23,23 @@ _LOW1, _HIGH1, _LOW2, _HIGH2, _PROBABILITY, _MOST = range(6)
 
 
 class Scan(NamedTuple):
-    """Places along the curve between which it is near straight.
+    """Places along the curve between which it is near straight."""
 
-    Attributes
-    ----------
-    positions : ndarray, shape (s,)
-        Their log ranges, ascending, both ends of the table among them.
-    next_one : ndarray of int, shape (knots,)
-        Index of the first of them at or after each knot.
-    """
-
-    positions: Array
-    next_one: NDArray[np.int64]
+    positions: Array  # (s,): their log ranges, ascending, both ends of the table among them
+    next_one: NDArray[np.int64]  # (knots,): index of the first of them at or after each knot
 
 
 class Places(NamedTuple):
-    """What goes with a table of readings, and is needed once a frame.
+    """What goes with a table of readings, and is needed once a frame."""
 
-    Attributes
-    ----------
-    scan : Scan
-        Where to look from.
-    empty : ndarray, shape (2, 1 + p)
-        Readings of the empty scene without crosstalk, and their change with the nuisance
-        parameters.
-    boxes : ndarray, shape (s - 1, 6)
-        Of every stretch between two places: least and greatest first and second reading, its prior
-        probability, and a bound of what it holds of any frame's density.
-    groups : ndarray, shape (g, 4)
-        Boxes around every 16 boxes.
-    """
-
-    scan: Scan
+    scan: Scan  # where to look from
+    # (2, 1 + p): readings of the empty scene without crosstalk, and their change with the nuisance
+    # parameters
     empty: Array
+    # (s - 1, 6): of every stretch between two places: least and greatest first and second reading,
+    # its prior probability, and a bound of what it holds of any frame's density
     boxes: Array
-    groups: Array
+    groups: Array  # (g, 4): boxes around every 16 boxes
 
 
 @compiled

@@ -36,62 +36,35 @@ MEAN, SIGNAL, LOG_PRIOR, NUISANCE = 0, 4, 8, 9
 
 
 class ReadingsNoise(NamedTuple):
-    """Noise of the two readings, in units of their read noise.
+    """Noise of the two readings, in units of their read noise."""
 
-    Attributes
-    ----------
-    plain : bool
-        Whether it does not depend on the range.
-    shot1, shot2 : float
-        Shot noise variance per mean reading, both in units of the read noise.
-    ratio : float
-        Read noise of the first reading over that of the second.
-    relative : float
-        Common relative error of the object's signal.
-    pulsed : bool
-        Whether shot noise is shared by both readings.
-    """
-
-    plain: bool
+    plain: bool  # whether it does not depend on the range
+    # shot noise variance per mean reading, both in units of the read noise
     shot1: float
     shot2: float
-    ratio: float
-    relative: float
-    pulsed: bool
+    ratio: float  # read noise of the first reading over that of the second
+    relative: float  # common relative error of the object's signal
+    pulsed: bool  # whether shot noise is shared by both readings
 
 
 class ReadingsTable(NamedTuple):
-    """What a frame's readings are expected to be, as a function of u = log r.
+    """What a frame's readings are expected to be, as a function of u = log r."""
 
-    Attributes
-    ----------
-    knots : ndarray, shape (knots, 9 + 2 p)
-        Mean readings in units of the read noise and their derivatives along u times ``step``, the
-        object's part of both, log prior density of u, and the change of either reading with each of
-        p independent standard normal nuisance parameters. By rate the means are factors of du/dt.
-    start, step : float
-        First knot and spacing of u.
-    end : float
-        Last knot.
-    crosstalk1, crosstalk2 : float
-        Known crosstalk.
-    by_rate : bool
-        Whether the readings are derivatives in time.
-    noise : ReadingsNoise
-        Of the readings.
-    channels : int
-        How many of the two readings are used.
-    """
-
+    # (knots, 9 + 2 p): mean readings in units of the read noise and their derivatives along u times
+    # ``step``, the object's part of both, log prior density of u, and the change of either reading
+    # with each of p independent standard normal nuisance parameters. By rate the means are factors
+    # of du/dt
     knots: Array
+    # first knot and spacing of u
     start: float
     step: float
-    end: float
+    end: float  # last knot
+    # known crosstalk
     crosstalk1: float
     crosstalk2: float
-    by_rate: bool
-    noise: ReadingsNoise
-    channels: int
+    by_rate: bool  # whether the readings are derivatives in time
+    noise: ReadingsNoise  # of the readings
+    channels: int  # how many of the two readings are used
 
 
 @compiled

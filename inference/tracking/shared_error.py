@@ -33,22 +33,15 @@ _SINGULAR = 1e-14  # of a determinant against the product of its diagonal
 
 
 class Shared(NamedTuple):
-    """What u errs with the crosstalk, and what was known before an update.
+    """What u errs with the crosstalk, and what was known before an update."""
 
-    Attributes
-    ----------
-    back1, back2 : float
-        Regression of u on the two crosstalk readings.
-    turn1, turn2 : float
-        Derivatives of the readings along u at the anchor, less those that are taken.
-    crosstalk1, crosstalk2 : float
-        Means before the update.
-    """
-
+    # regression of u on the two crosstalk readings
     back1: float
     back2: float
+    # derivatives of the readings along u at the anchor, less those that are taken
     turn1: float
     turn2: float
+    # means before the update
     crosstalk1: float
     crosstalk2: float
 

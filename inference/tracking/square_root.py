@@ -23,27 +23,18 @@ Array = NDArray[np.float64]
 
 
 class Linear(NamedTuple):
-    """Two readings that are linear in a hypothesis.
+    """Two readings that are linear in a hypothesis."""
 
-    Attributes
-    ----------
-    residual1, residual2 : float
-        Readings less their prediction.
-    by_u1, by_u2 : float
-        Their derivatives along u.
-    by_v1, by_v2 : float
-        Along du/dt.
-    noise : Root
-        Of the noise's covariance.
-    """
-
+    # readings less their prediction
     residual1: float
     residual2: float
+    # their derivatives along u
     by_u1: float
     by_u2: float
+    # along du/dt
     by_v1: float
     by_v2: float
-    noise: Root
+    noise: Root  # of the noise's covariance
 
 
 @compiled

@@ -130,21 +130,11 @@ def _bounds(sensor: Sensor, law: Law) -> tuple[float, float]:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Knots:
-    """Evenly spaced knots of u, dense enough for a table of mean readings.
+    """Evenly spaced knots of u, dense enough for a table of mean readings."""
 
-    Attributes
-    ----------
-    positions : ndarray, shape (n,)
-        u = log r, ascending.
-    means : ndarray, shape (n, 8)
-        As `means_over`, in units of the noise.
-    log_prior : ndarray, shape (n,)
-        Log prior density of u.
-    """
-
-    positions: Array
-    means: Array
-    log_prior: Array
+    positions: Array  # (n,): u = log r, ascending
+    means: Array  # (n, 8): as `means_over`, in units of the noise
+    log_prior: Array  # (n,): log prior density of u
 
     @property
     def step(self) -> float:

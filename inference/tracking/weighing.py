@@ -24,13 +24,9 @@ from inference.tracking.empty_scene import expect_empty, learn_empty
 from inference.tracking.frame_density import Frame
 from inference.tracking.hypotheses import (
     COUNT,
-    CROSSTALK1,
-    CROSSTALK2,
     PENDING,
     Hypotheses,
     Scratch,
-    U,
-    V,
     copy,
     learns_crosstalk,
     scratch_for,
@@ -39,9 +35,10 @@ from inference.tracking.learning import learn
 from inference.tracking.merging import prune
 from inference.tracking.modes import Scanned, find_modes, scanned_for
 from inference.tracking.motion import Rules
+from inference.tracking.outliers import expected_readings, log_outlier
 from inference.tracking.places import Places, mass_bound
 from inference.tracking.prediction import born_prior, prior_of
-from inference.tracking.readings_table import ReadingsTable, mean_at
+from inference.tracking.readings_table import ReadingsTable
 from simulator.compiled import compiled
 
 __all__ = ["Model", "Room", "room_for", "weigh"]
@@ -62,65 +59,33 @@ class Model(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Arrays that are overwritten, made once for many frames.
+    """Arrays that are overwritten, made once for many frames."""
 
-    Attributes
-    ----------
-    after : Hypotheses
-        Those after the frame.
-    candidates : Candidates
-        Modes that were found.
-    scanned : Scanned
-        Where they were looked for.
-    scratch : Scratch
-        For learning.
-    """
-
-    after: Hypotheses
-    candidates: Candidates
-    scanned: Scanned
-    scratch: Scratch
+    after: Hypotheses  # those after the frame
+    candidates: Candidates  # modes that were found
+    scanned: Scanned  # where they were looked for
+    scratch: Scratch  # for learning
 
 
 class Empty(NamedTuple):
-    """What the empty scene says of a frame.
+    """What the empty scene says of a frame."""
 
-    Attributes
-    ----------
-    usual, odd : float
-        Log masses of no object: with readings as expected, and with an outlier.
-    odd_born : float
-        Log mass of an object that has come and an outlier.
-    surprise : float
-        Normalised innovation squared.
-    """
-
+    # log masses of no object: with readings as expected, and with an outlier
     usual: float
     odd: float
-    odd_born: float
-    surprise: float
+    odd_born: float  # log mass of an object that has come and an outlier
+    surprise: float  # normalised innovation squared
 
 
 class Kept(NamedTuple):
-    """What was kept of the candidates.
+    """What was kept of the candidates."""
 
-    Attributes
-    ----------
-    hypotheses : int
-        How many.
-    empty, total : float
-        Mass of the empty scene, and of it and all hypotheses.
-    outlying : float
-        Mass of outliers.
-    surprise : float
-        Normalised innovation squared under the heaviest explanation.
-    """
-
-    hypotheses: int
+    hypotheses: int  # how many
+    # mass of the empty scene, and of it and all hypotheses
     empty: float
     total: float
-    outlying: float
-    surprise: float
+    outlying: float  # mass of outliers
+    surprise: float  # normalised innovation squared under the heaviest explanation
 
 
 @compiled
@@ -143,35 +108,6 @@ def _log(weight: float) -> float:
 
 
 @compiled
-def _log_outlier(frame: Frame, mean1: float, mean2: float, model: Model) -> float:
-    """Return the log density of readings that have nothing to do with the scene.
-
-    A Cauchy law around what was expected: its tails forgive any reading, in whatever unit.
-    """
-    breadth = model.rules.breadth
-    e1, e2 = (frame.first - mean1) / breadth, (frame.second - mean2) / breadth
-    square = 1.0 + e1 * e1 + e2 * e2
-    if model.table.channels == 1:
-        return 0.5 * math.log(2.0 / math.pi) - math.log(breadth * square)
-    return -2.0 * math.log(breadth) - 1.5 * math.log(square)
-
-
-@compiled
-def _expected_readings(
-    of: Hypotheses, row: int, gain: float, table: ReadingsTable
-) -> tuple[float, float]:
-    """Return the readings at the mean of a hypothesis."""
-    x = of.x
-    value1, value2, _, _ = mean_at(x[row, U], table)
-    if table.by_rate:
-        return gain * value1 * x[row, V], gain * value2 * x[row, V]
-    m1, m2 = gain * value1 + table.crosstalk1, gain * value2 + table.crosstalk2
-    if learns_crosstalk(of):
-        m1, m2 = m1 + x[row, CROSSTALK1], m2 + x[row, CROSSTALK2]
-    return m1, m2
-
-
-@compiled
 def _of_followed(frame: Frame, of: Hypotheses, model: Model, room: Room) -> int:
     """List the modes of the frame under every hypothesis; their number."""
     log_usual = math.log1p(-model.rules.outlier)
@@ -186,9 +122,10 @@ def _of_followed(frame: Frame, of: Hypotheses, model: Model, room: Room) -> int:
 @compiled
 def _of_empty(frame: Frame, of: Hypotheses, model: Model, room: Room) -> Empty:
     """Weigh the empty scene, and an object that has come and is not seen."""
-    log_usual, log_odd = math.log1p(-model.rules.outlier), math.log(model.rules.outlier)
+    rules = model.rules
+    log_usual, log_odd = math.log1p(-rules.outlier), math.log(rules.outlier)
     expected = expect_empty(of, frame, model.table, model.places.empty, room.scratch.nuisance)
-    strange = _log_outlier(frame, expected.mean1, expected.mean2, model)
+    strange = log_outlier(frame, expected.mean1, expected.mean2, model.table, rules)
     log_empty = _log(of.weight[0])
     return Empty(
         log_empty + log_usual + expected.log_density,
@@ -221,8 +158,8 @@ def _of_outliers(
         log_weight = _log(of.weight[h]) + log_odd
         if log_weight - math.log(rules.breadth) < best + _ODD:
             continue
-        mean1, mean2 = _expected_readings(of, h, frame.gain, model.table)
-        odd = log_weight + _log_outlier(frame, mean1, mean2, model)
+        mean1, mean2 = expected_readings(of, h, frame.gain, model.table)
+        odd = log_weight + log_outlier(frame, mean1, mean2, model.table, rules)
         if odd > best + _ODD and found < candidates.log_mass.size:
             found = add_candidate(candidates, found, Candidate(odd, 0.0, 0.0, 0.0, -h))
             best = max(best, odd)
