@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy import special
 
 from benchmarks.resumable import Row
+from inference.identifiability.expected_posterior import expected_posterior
 from inference.identifiability.experiment import Experiment, information
-from inference.identifiability.prediction import predict
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
 from simulator.parameters import parameters_of
@@ -112,7 +112,7 @@ class Cell:
 
     def foreseen(self) -> Foreseen:
         experiment = self.experiment(self.sensor, np.log(self.ranges))
-        bounds, prediction = information(experiment), predict(experiment)
+        bounds, prediction = information(experiment), expected_posterior(experiment)
         j = bounds.names.index(R_NAME)
         step = 1e-5 * np.eye(experiment.z.size)[j]
         ends = experiment.parameters.natural(experiment.z + np.outer([1, -1], step))[:, j]

@@ -3,14 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.identifiability.expected_posterior import expected_posterior
 from inference.identifiability.experiment import Experiment
-from inference.identifiability.judge import Spread, judge
-from inference.identifiability.prediction import predict
 from inference.identifiability.status import Identifiability
+from inference.identifiability.statuses import Spread, statuses_of
 from simulator.parameters import Parameters
 from simulator.sensor import Sensor
 
-__all__ = ["judge_draws"]
+__all__ = ["statuses_of_draws"]
 
 Array = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 _STILL = 4.0
 
 
-def judge_draws(
+def statuses_of_draws(
     sensor: Sensor,
     parameters: Parameters,
     z: Array,
@@ -30,7 +30,7 @@ def judge_draws(
     discrepancy: float | None = None,
     common_range: bool = False,
 ) -> tuple[Identifiability, ...]:
-    """Judge every unknown by its spread in the posterior, and say why.
+    """Say whether every unknown is identified, by its spread in the posterior, and why.
 
     Parameters
     ----------
@@ -82,8 +82,8 @@ def judge_draws(
         discrepancy=discrepancy,
         common_range=common_range,
     )
-    prediction = predict(experiment) if experiment.finite else None
-    return judge(experiment, Spread(sd, scale), prediction, still)
+    expected = expected_posterior(experiment) if experiment.finite else None
+    return statuses_of(experiment, Spread(sd, scale), expected, still)
 
 
 def _is_still(drawn: Array) -> bool:

@@ -7,12 +7,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.identifiability.experiment import STEP, Experiment
+from inference.identifiability.expected_posterior import (
+    STEP,
+    ExpectedPosterior,
+    expected_posterior,
+)
+from inference.identifiability.experiment import Experiment
 from inference.identifiability.information import Information
-from inference.identifiability.judge import Spread, judge
-from inference.identifiability.prediction import Prediction, predict
 from inference.identifiability.reasons import Diagnosis
 from inference.identifiability.status import Identifiability
+from inference.identifiability.statuses import Spread, statuses_of
 from simulator.errors import InvalidInputError, Problem, RefusedError, escape
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import Scene
@@ -38,8 +42,8 @@ class Foresight:
         Sensor, unknowns, their reference values and the ranges.
     information : Information
         Of the readings alone: rank, singular values, Cramer-Rao bounds.
-    prediction : Prediction
-        Posterior spread, priors included.
+    posterior : ExpectedPosterior
+        Spread to be expected, priors included.
     needed : int
         Number of distinct ranges that the unknowns need at least.
     distinct : int
@@ -50,7 +54,7 @@ class Foresight:
 
     experiment: Experiment
     information: Information
-    prediction: Prediction
+    posterior: ExpectedPosterior
     needed: int
     distinct: int
     identifiability: tuple[Identifiability, ...]
@@ -73,13 +77,13 @@ class Foresight:
 
     @property
     def posterior_sd(self) -> dict[str, float]:
-        """Predicted posterior standard deviations of all unknowns, in SI units."""
+        """Expected posterior standard deviations of all unknowns, in SI units."""
         e = self.experiment
         steps = STEP * np.eye(e.z.size)
         with np.errstate(over="ignore", invalid="ignore"):
             change = e.parameters.natural(e.z + steps) - e.parameters.natural(e.z - steps)
             slopes = change.T / (2 * STEP)  # the unknowns along z
-            sd = np.linalg.norm(slopes @ self.prediction.factor, axis=1).tolist()
+            sd = np.linalg.norm(slopes @ self.posterior.factor, axis=1).tolist()
         return dict(zip(e.parameters.names, sd, strict=True))
 
     @property
@@ -153,7 +157,8 @@ def check_discrepancy(scene: Scene) -> None:
 def _check_ranges(experiment: Experiment, scene: Scene) -> None:
     present = np.isfinite(experiment.log_r)
     ranges = np.exp(experiment.log_r)
-    low, high = experiment.terms.ranges[0, 6:8]
+    prior, background = experiment.range_prior, experiment.background
+    low, high = prior.low, prior.high
     outside = np.flatnonzero(
         present & ~((ranges >= low * (1 - 1e-12)) & (ranges <= high * (1 + 1e-12)))
     )
@@ -161,7 +166,7 @@ def _check_ranges(experiment: Experiment, scene: Scene) -> None:
         message = (
             f"{ranges[outside[0]]:g} m lies outside the support of range_m, {low:g} to {high:g} m"
         )
-        if experiment.terms.background is not None and low == -experiment.terms.background[0, 3]:
+        if background is not None and low == -background.c1:
             message += " (nearer, a shadow with a negative c1 would be negative)"
         raise InvalidInputError.at(f"/ranges_m/{outside[0]}", message)
     moves = present.any() and np.ptp(experiment.log_r[present]) > 1e-9
@@ -231,18 +236,18 @@ def identifiability(
             "a reading, its noise or one of their derivatives is beyond what a number can hold; "
             "state the quantities in other units of reading"
         )
-    prediction = predict(experiment)
+    posterior = expected_posterior(experiment)
     present = np.isfinite(log_r)
     still = bool(present.any()) and float(np.ptp(log_r[present])) < 1e-9
-    spread = Spread(prediction.sd, prediction.scale_sd)
+    spread = Spread(posterior.sd, posterior.scale_sd)
     diagnosis = Diagnosis(experiment, still)
-    rows = judge(experiment, spread, prediction, still)
+    rows = statuses_of(experiment, spread, posterior, still)
     if 0 < diagnosis.distinct == diagnosis.needed:
         rows = tuple(dataclasses.replace(row, reason=row.reason + _JUST_ENOUGH) for row in rows)
     return Foresight(
         experiment,
         diagnosis.information,
-        prediction,
+        posterior,
         diagnosis.needed,
         diagnosis.distinct,
         rows,

@@ -7,20 +7,18 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.frame.coordinates import COORDINATES, term_changes
-from inference.frame.sensitivity import Sensitivity, sensitivity, whiteners
-from inference.identifiability.information import Information, eliminate
+from inference.frame.arguments import Background, RangePrior
+from inference.frame.coordinates import COORDINATES, coordinate_slopes
+from inference.frame.sensitivity import Sensitivity, Value, sensitivity, whiteners
+from inference.identifiability.elimination import eliminate
+from inference.identifiability.information import Information
 from simulator.discrepancy import discrepancy_basis
 from simulator.parameters import Parameters, Terms
 from simulator.sensor import Sensor
 
-__all__ = ["STEP", "Experiment", "information"]
+__all__ = ["Experiment", "information"]
 
 Array = NDArray[np.float64]
-
-# the maps from z are smooth: a central difference errs by 1e-10 of itself, and an error of the map
-# from the left multiplies the information, it is not added to it
-STEP = 1e-5
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -61,6 +59,23 @@ class Experiment:
         """Physical values at z."""
         return self.parameters.terms(self.z[None])
 
+    @property
+    def shape(self) -> tuple[float, float]:
+        """c0 [m^2] and c1 [m] of the object at z."""
+        c0, c1, _ = self.terms.object[0].tolist()
+        return c0, c1
+
+    @property
+    def background(self) -> Background | None:
+        """The background at z."""
+        rows = self.terms.background
+        return None if rows is None else Background(*rows[0].tolist())
+
+    @property
+    def range_prior(self) -> RangePrior:
+        """The prior of a range at z."""
+        return RangePrior._make((*self.terms.ranges[0].tolist(), None))
+
     @functools.cached_property
     def readings(self) -> Sensitivity:
         """Mean readings and their derivatives."""
@@ -86,9 +101,11 @@ class Experiment:
         if self.terms.crosstalk is not None:
             light = np.abs(self.readings.mean - self.terms.crosstalk[0])
             if self.sensor.kind != "pulsed":
-                light = np.repeat(np.hypot(light[:, 0], light[:, 1])[:, None], 2, axis=1)
+                light[:] = np.hypot(*light.T)[:, None]
             typical = np.median(light, axis=0)
-            units[3:5] = np.where(typical > 0, typical, self.sensor.noise.read)
+            units[Value.CROSSTALK_1 : Value.STRENGTH] = np.where(
+                typical > 0, typical, self.sensor.noise.read
+            )
         return units
 
     @functools.cached_property
@@ -99,28 +116,33 @@ class Experiment:
         c1' / sqrt(c0'), as in the tables of Cramer-Rao bounds: c0 moves with c1 / sqrt(c0) held
         where c1 is unknown.
         """
-        p = self.parameters
         columns = dict(zip(self._paths, np.diag(self.units), strict=True))
-        shapes = [("object", self.terms.object[0, :2], 0)]
-        if self.terms.background is not None:
-            shapes.append(("background.shadow", self.terms.background[0, 2:], 7))
-        for path, (c0, c1), row in shapes:
-            if path == "object" or not p.shadow_is_object:
-                if f"{path}.c1" in self.names:
-                    columns[f"{path}.c0"][row + 1] = 0.5 * c1 / math.sqrt(c0)
-                continue
+        for path, (c0, c1) in self._shapes.items():
+            if f"{path}.c1" in self.names:
+                row = COORDINATES.index(f"{path}.c1")
+                columns[f"{path}.c0"][row] = 0.5 * c1 / math.sqrt(c0)
+        if self.background is not None and self.parameters.shadow_is_object:
             # the shadow has the object's parameters and moves with them
-            for name in ("c0", "c1"):
-                columns[f"object.{name}"][7:9] = columns[f"object.{name}"][:2]
+            for name in ("object.c0", "object.c1"):
+                columns[name][Value.SHADOW_C0 :] = columns[name][: Value.C2]
         if not self.names:
             return np.empty((len(COORDINATES), 0))
         return np.stack([columns[name] for name in self.names], axis=1)
 
     @property
+    def _shapes(self) -> dict[str, tuple[float, float]]:
+        """c0 and c1 of the object, and of a shadow that is not the object's."""
+        shapes = {"object": self.shape}
+        if self.background is not None and not self.parameters.shadow_is_object:
+            shapes["background.shadow"] = (self.background.c0, self.background.c1)
+        return shapes
+
+    @property
     def _paths(self) -> tuple[str, ...]:
         """Scene paths of the coordinates."""
         first, second = self.parameters.crosstalk or ("crosstalk.0", "crosstalk.1")
-        return (*COORDINATES[:3], first, second, *COORDINATES[5:])
+        before, after = COORDINATES[: Value.CROSSTALK_1], COORDINATES[Value.STRENGTH :]
+        return (*before, first, second, *after)
 
     @functools.cached_property
     def in_si_units(self) -> Array:
@@ -133,21 +155,15 @@ class Experiment:
         for j, name in enumerate(self.names):
             if name.endswith(".c1"):
                 path = name.removesuffix(".c1")
-                shape = self.terms.object[0] if path == "object" else self._shadow
-                result[j, j] = math.sqrt(shape[0])
+                c0, c1 = self._shapes[path]
+                result[j, j] = math.sqrt(c0)
                 if f"{path}.c0" in self.names:
-                    result[j, self.names.index(f"{path}.c0")] = 0.5 * shape[1]
+                    result[j, self.names.index(f"{path}.c0")] = 0.5 * c1
             elif name in (self.parameters.crosstalk or ()):
                 result[j, j] = self.units[self._paths.index(name)]
             else:
                 result[j, j] = values[name]
         return result
-
-    @property
-    def _shadow(self) -> Array:
-        if self.terms.background is None:
-            raise ValueError("a scene without background has no shadow")
-        return self.terms.background[0, 2:]
 
     @functools.cached_property
     def finite(self) -> bool:
@@ -162,16 +178,10 @@ class Experiment:
         return bool(np.isfinite(sizes).all() and np.isfinite(self.z).all())
 
     @functools.cached_property
-    def neighbours(self) -> tuple[Terms, Terms]:
-        """Physical values a step of `STEP` above and below z along each unknown."""
-        steps = STEP * np.eye(self.z.size)
-        return self.parameters.terms(self.z + steps), self.parameters.terms(self.z - steps)
-
-    @functools.cached_property
     def change(self) -> Array:
         """Derivatives of the coordinates of `COORDINATES` along z, shape (9, d)."""
         with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
-            return term_changes(self.terms, *self.neighbours) / (2 * STEP)
+            return coordinate_slopes(self.parameters, self.z)[1]
 
     @functools.cached_property
     def by_error(self) -> Array:
@@ -189,8 +199,8 @@ class Experiment:
         derivatives[present] = self.readings.signal[present][:, :, None] * functions[:, None, :]
         return derivatives
 
-    def whitened(self, whitener: Array | None = None) -> tuple[Array, Array, Array]:
-        """Return whitened derivatives of the readings.
+    def whitened_terms(self, whitener: Array | None = None) -> tuple[Array, Array, Array]:
+        """Return whitened derivatives of the readings along all that they depend on.
 
         Parameters
         ----------
@@ -199,8 +209,8 @@ class Experiment:
 
         Returns
         -------
-        ndarray, shape (n, 2, d)
-            Along ``names``.
+        ndarray, shape (n, 2, 9)
+            Along `COORDINATES`.
         ndarray, shape (n, 2)
             Along log r; nan for a frame without object.
         ndarray, shape (n, 2, k)
@@ -214,24 +224,26 @@ class Experiment:
             along = np.einsum("nij,nj->ni", whitener, of.by_range)
             along[np.isnan(self.log_r)] = np.nan
             by_error = np.einsum("nij,njk->nik", whitener, self.by_error)
+        return by_term, along, by_error
+
+    def whitened(self, whitener: Array | None = None) -> tuple[Array, Array, Array]:
+        """Return the same with the first along ``names``, shape (n, 2, d)."""
+        by_term, along, by_error = self.whitened_terms(whitener)
+        with np.errstate(over="ignore", invalid="ignore"):
             return by_term @ self.directions, along, by_error
 
 
-def information(experiment: Experiment, whitener: Array | None = None) -> Information:
+def information(experiment: Experiment) -> Information:
     """Return what the readings alone tell of the unknowns, without any prior.
 
     Parameters
     ----------
     experiment : Experiment
         Sensor, unknowns, their values, ranges.
-    whitener : ndarray, shape (n, 2, 2), optional
-        W with W^T W the inverse covariance of a frame's readings; left out: the sensor's.
 
     Returns
     -------
     Information
         In the dimensionless coordinates of `Experiment.directions`.
     """
-    return eliminate(
-        experiment.names, *experiment.whitened(whitener), common_range=experiment.common_range
-    )
+    return eliminate(experiment.names, *experiment.whitened(), common_range=experiment.common_range)

@@ -11,6 +11,7 @@ from inference.identifiability.experiment import Experiment, information
 from inference.identifiability.information import Information
 from inference.identifiability.remedies import Remedy, remedies, span
 from simulator.errors import listed
+from simulator.object_model import log_slope
 
 __all__ = ["Diagnosis"]
 
@@ -164,8 +165,8 @@ class Diagnosis:
                 )
         name, value = self._look_alike(parameter)
         if self._is_background(parameter, name if abs(value) > _ALIKE else ""):
-            assert self.experiment.terms.background is not None  # noqa: S101  # it is unknown
-            away = float(self.experiment.terms.background[0, 1])
+            assert self.experiment.background is not None  # noqa: S101  # it is unknown
+            away = self.experiment.background.distance
             return f"{text}: crosstalk and a background at {away:.2g} m look alike"
         if abs(value) > _ALIKE:
             size = f"is {value:.4f}" if abs(value) < 0.9999 else "exceeds 0.9999 in size"
@@ -191,12 +192,11 @@ class Diagnosis:
 
     def _power_law(self) -> int | None:
         """Return the power of r at which the flux falls at all ranges, where it is one power."""
-        c0, c1 = self.experiment.terms.object[0, :2]
-        r = np.exp(self.experiment.log_r[np.isfinite(self.experiment.log_r)])
-        # -d log Phi / d log r (4.13 with errata 4.18)
-        power = 2 + r * (2 * r + c1) / (r * (r + c1) + c0)
+        (c0, c1), log_r = self.experiment.shape, self.experiment.log_r
+        ranges = np.exp(log_r[np.isfinite(log_r)])
+        power = np.array([-log_slope(r, c0, c1) for r in ranges])
         for whole in (2, 4):
-            if r.size and np.abs(power - whole).max() < _POWER_LAW:
+            if power.size and np.abs(power - whole).max() < _POWER_LAW:
                 return whole
         return None
 

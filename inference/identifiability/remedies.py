@@ -90,9 +90,9 @@ def _emptied(experiment: Experiment) -> Experiment:
 
 def _room(experiment: Experiment) -> tuple[float, float]:
     """Return the bounds of log r: those of its prior, and before the background."""
-    low, high = (float(bound) for bound in experiment.terms.ranges[0, 6:8])
-    if experiment.terms.background is not None:
-        high = min(high, float(experiment.terms.background[0, 1]))
+    low, high = experiment.range_prior.low, experiment.range_prior.high
+    if experiment.background is not None:
+        high = min(high, experiment.background.distance)
     present = experiment.log_r[np.isfinite(experiment.log_r)]
     low, high = math.log(max(low, 1e-300)), math.log(max(high, 1e-300))
     return min(low, float(present.min())), max(high, float(present.max()))
@@ -119,7 +119,8 @@ def _at_the_bend(experiment: Experiment) -> tuple[str, Experiment] | None:
     if present.size == 0 or not any(name.startswith("object.c") for name in experiment.names):
         return None
     low, high = _room(experiment)
-    bend = 0.5 * math.log(float(experiment.terms.object[0, 0]))
+    c0, _ = experiment.shape
+    bend = 0.5 * math.log(c0)
     near, far = max(low, bend - math.log(2.0)), min(high, bend + math.log(4.0))
     if far - near < math.log(2.0):
         return None

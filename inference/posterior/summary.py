@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.density.discrepant import DiscrepantDensity
-from inference.identifiability.after_data import judge_draws
+from inference.identifiability.after_data import statuses_of_draws
 from inference.identifiability.status import Identifiability
 from inference.posterior.answer.draws import Draws, draws_of
 from inference.posterior.answer.folds import near_fold
@@ -93,7 +93,7 @@ def _judged(
     job: Job, density: CollapsedDensity, z: Array, chosen: Array, log_r: Array
 ) -> tuple[Identifiability, ...]:
     """Judge every unknown by its draws, and by what it owes to the law of the ranges."""
-    rows = judge_draws(
+    rows = statuses_of_draws(
         job.sensor,
         density.parameters,
         z,

@@ -143,9 +143,9 @@ def identifiability_of(request: IdentifiabilityRequest) -> ForeseenIdentifiabili
         range_m=RangeBounds(
             value=_numbers(ranges),
             cramer_rao_sd=_numbers(found.range_sd),
-            posterior_sd=_numbers(ranges * found.prediction.range_sd),
+            posterior_sd=_numbers(ranges * found.posterior.range_sd),
             scale_cramer_rao_sd=_number(information.scale_sd),
-            scale_posterior_sd=_number(found.prediction.scale_sd),
+            scale_posterior_sd=_number(found.posterior.scale_sd),
         ),
         identifiability=tuple(found.identifiability),
     )

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.constants import speed_of_light
 
-from inference.identifiability.experiment import Experiment, information
+from inference.identifiability.elimination import eliminate
+from inference.identifiability.experiment import Experiment
 from inference.identifiability.information import Information
 from simulator.parameters import parameters_of
 from simulator.scene import parse_scene
@@ -104,7 +105,8 @@ class System:
 
     def information(self) -> Information:
         whitener = np.einsum("ni,ij->nij", 1 / self.sds(), np.eye(2))
-        return information(self.experiment(), whitener)
+        experiment = self.experiment()
+        return eliminate(experiment.names, *experiment.whitened(whitener))
 
 
 def range_bounds(of: Information) -> tuple[float, float, float]:

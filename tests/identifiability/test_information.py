@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import stats
 
+from inference.identifiability.elimination import eliminate
 from inference.identifiability.experiment import Experiment, information
-from inference.identifiability.information import eliminate
 from tests.identifiability.precise import DIGITS, precise_jacobian, projected
 from tests.identifiability.published import (
     BARE,

@@ -123,4 +123,4 @@ def test_a_fit_and_a_plan_agree() -> None:
     assert 0.2 < found < 0.9
     # the plan also knows that all ranges lie within nine e-folds: (1 / 2.6)^2 of information, at
     # most, beside that of the prior
-    assert found == pytest.approx(foresight.prediction.sd[0], rel=0.5 / 2.6**2)
+    assert found == pytest.approx(foresight.posterior.sd[0], rel=0.5 / 2.6**2)

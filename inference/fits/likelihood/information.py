@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from inference.fits.likelihood.linearisation import whitened_slopes
 from inference.fits.likelihood.problem import FitProblem
-from inference.identifiability.information import Information, eliminate
+from inference.identifiability.elimination import eliminate
+from inference.identifiability.information import Information
 
 __all__ = ["residuals_and_information"]
 

@@ -5,13 +5,17 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.identifiability.expected_posterior import (
+    ExpectedPosterior,
+    expected_posterior,
+    log_range_spread,
+)
 from inference.identifiability.experiment import Experiment
-from inference.identifiability.prediction import Prediction, log_range_spread, predict
 from inference.identifiability.reasons import Diagnosis
 from inference.identifiability.status import Identifiability, contraction_of, status_of
 from simulator.scene import Reference
 
-__all__ = ["Spread", "judge"]
+__all__ = ["Spread", "statuses_of"]
 
 Array = NDArray[np.float64]
 
@@ -61,10 +65,10 @@ def _headline(parameter: str, status: str, spread: float) -> str:
     }[status]
 
 
-def judge(
-    experiment: Experiment, spread: Spread, prediction: Prediction | None, still: bool
+def statuses_of(
+    experiment: Experiment, spread: Spread, expected: ExpectedPosterior | None, still: bool
 ) -> tuple[Identifiability, ...]:
-    """Judge every unknown and the common scale of the ranges.
+    """Say of every unknown and of the common scale of the ranges whether it is identified.
 
     Parameters
     ----------
@@ -72,7 +76,7 @@ def judge(
         Where the reasons are computed.
     spread : Spread
         Of the posterior, or as it is predicted.
-    prediction : Prediction or None
+    expected : ExpectedPosterior or None
         At the experiment, to tell a curved or divided posterior by; None where its derivatives
         are beyond what a number can hold, and no cause can be computed.
     still : bool
@@ -86,41 +90,43 @@ def judge(
     diagnosis = Diagnosis(experiment, still)
     names = experiment.parameters.names
     wide = log_range_spread(experiment.parameters)
-    foreseen = np.full(len(names) + 1, np.nan)
-    if prediction is not None:
-        foreseen = np.append(prediction.sd, prediction.scale_sd)
+    linear_sd = np.full(len(names) + 1, np.nan)
+    if expected is not None:
+        linear_sd = np.append(expected.sd, expected.scale_sd)
     independent = not isinstance(experiment.parameters.range_prior, Reference)
     rows = []
-    for (name, value, unit), expected in zip(
+    for (name, value, unit), linear in zip(
         [
             *((name, float(sd), 1.0) for name, sd in zip(names, spread.parameters, strict=True)),
             ("range_m", spread.scale, wide),
         ],
-        foreseen.tolist(),
+        linear_sd.tolist(),
         strict=True,
     ):
         status = status_of(name, value)
         alike = None
         if name == "range_m" and status == "weak":
-            alike = _left_open(experiment, spread, prediction)
+            alike = _left_open(experiment, spread, expected)
             status = "weak" if alike is None else "not_identified"
         text = _headline(name, status, value)
         if alike is not None:
             text += alike
-        elif independent and expected > _NARROWER * value and not name.startswith("range_m."):
+        elif independent and linear > _NARROWER * value and not name.startswith("range_m."):
             # the law is an assumption: what it alone tells is not identified by the data
-            alone = status_of(name, expected)
+            alone = status_of(name, linear)
             status = "weak" if alone == "identified" else alone
-            text += _LEANING.format(expected)
-        elif status != "identified" and prediction is not None:
-            text += ": " + _cause(diagnosis, name, value, expected)
+            text += _LEANING.format(linear)
+        elif status != "identified" and expected is not None:
+            text += ": " + _cause(diagnosis, name, value, linear)
         # a law so narrow that it has no width leaves nothing to contract
         contraction = contraction_of(value / unit) if unit > 0 else 0.0
         rows.append(Identifiability(name, status, contraction, text))
     return tuple(rows)
 
 
-def _left_open(experiment: Experiment, spread: Spread, prediction: Prediction | None) -> str | None:
+def _left_open(
+    experiment: Experiment, spread: Spread, expected: ExpectedPosterior | None
+) -> str | None:
     """Say so where an error of the flux and light that stands still leave the ranges' scale open.
 
     Unknown crosstalk takes up what a smooth error of the flux bends: all ranges then stretch
@@ -128,26 +134,26 @@ def _left_open(experiment: Experiment, spread: Spread, prediction: Prediction | 
     to be, not by the readings.
     """
     error = experiment.discrepancy
-    if error is None or prediction is None or not spread.scale > error:
+    if error is None or expected is None or not spread.scale > error:
         return None
     for term, how in _STATIC.items():
         group = tuple(name for name in experiment.parameters.names if name.startswith(term))
         if not group:
             continue
-        known = predict(dataclasses.replace(experiment, known=group)).scale_sd
-        if _HELP * known < prediction.scale_sd:
+        known = expected_posterior(dataclasses.replace(experiment, known=group)).scale_sd
+        if _HELP * known < expected.scale_sd:
             return _ALIKE.format(term=term, how=how, error=error, spread=spread.scale, known=known)
     return None
 
 
-def _cause(diagnosis: Diagnosis, name: str, spread: float, foreseen: float) -> str:
+def _cause(diagnosis: Diagnosis, name: str, spread: float, linear: float) -> str:
     if name.startswith("range_m."):
         few = "one range says" if diagnosis.distinct == 1 else f"{diagnosis.distinct} ranges say"
         return f"{few} no more of the law that they were drawn from"
     text = diagnosis.explain(name)
-    if spread > _WIDER * foreseen:
+    if spread > _WIDER * linear:
         text += (
-            f"; it spreads {spread / foreseen:.2g} times wider than the curvature at one draw "
+            f"; it spreads {spread / linear:.2g} times wider than the curvature at one draw "
             "says: there are several solutions, or one valley that bends"
         )
     return text

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import collapsed_density
 from inference.identifiability.before_data import identifiability
+from inference.identifiability.expected_posterior import expected_posterior, log_range_spread
 from inference.identifiability.experiment import Experiment, information
-from inference.identifiability.prediction import log_range_spread, predict
 from inference.posterior.sampling.start import refine
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
@@ -44,7 +44,7 @@ def experiment_of(scene: dict[str, Any], kind: str = "pulsed", snr: float = 1000
 
 @pytest.mark.parametrize("name", list(SCENES))
 def test_noise_without_bound_leaves_the_prior(name: str) -> None:
-    found = predict(experiment_of(SCENES[name], snr=1e-9))
+    found = expected_posterior(experiment_of(SCENES[name], snr=1e-9))
     assert found.sd == pytest.approx(np.ones(found.sd.size), abs=1e-6)
     wide = log_range_spread(experiment_of(SCENES[name]).parameters)
     assert (found.range_sd <= wide).all()
@@ -54,7 +54,7 @@ def test_noise_without_bound_leaves_the_prior(name: str) -> None:
 def test_readings_without_noise_leave_the_bound(name: str) -> None:
     """The prior adds its unit information to 1 / variance: a relative part of variance / 2."""
     experiment = experiment_of(SCENES[name], snr=1e7)
-    bounds, found = information(experiment), predict(experiment)
+    bounds, found = information(experiment), expected_posterior(experiment)
     foreseen = identifiability(experiment.sensor, parse_scene(SCENES[name]), np.exp(LOG_R).tolist())
     worst = float(found.sd.max())
     assert worst < 1e-2
@@ -78,7 +78,7 @@ def test_curvature_of_the_collapsed_density(name: str, kind: str) -> None:
     optimum = refine(density, np.zeros(len(experiment.parameters)))
     assert optimum is not None
     there = Experiment(experiment.sensor, experiment.parameters, optimum.z, LOG_R)
-    found = predict(there)
+    found = expected_posterior(there)
     wanted = np.linalg.norm(optimum.factor, axis=1)
     of_stroke = np.array(
         [n.startswith("range_m.") for n in experiment.parameters.names], dtype=bool
@@ -90,7 +90,7 @@ def test_curvature_of_the_collapsed_density(name: str, kind: str) -> None:
 def test_spread_of_a_stroke_known_exactly() -> None:
     """n ranges without noise tell the spread w to w / sqrt(2 n), the centre to w / sqrt(n)."""
     experiment = experiment_of(SCENES["stroke"], snr=1e9)
-    found = predict(experiment)
+    found = expected_posterior(experiment)
     names = experiment.parameters.names
     law, n = experiment.terms.ranges[0], LOG_R.size
     w = 1 / law[5]
@@ -118,7 +118,7 @@ def test_one_range_read_often_tells_no_more_of_a_stroke_than_one_range(frames: i
     }
     sensor = sensor_of("pulsed", 1e6)
     one, many = (
-        identifiability(sensor, parse_scene(scene), [0.7] * n).prediction.sd for n in (1, frames)
+        identifiability(sensor, parse_scene(scene), [0.7] * n).posterior.sd for n in (1, frames)
     )
     assert many == pytest.approx(one, rel=1e-6)
 
@@ -138,7 +138,7 @@ def test_error_of_the_flux() -> None:
         assert np.median(wider) > max(least, 0.999 * last)
         last = float(np.median(wider))
         assert found.information.rank == exact.information.rank
-        assert found.prediction.range_sd == pytest.approx(found.information.range_sd, rel=0.2)
+        assert found.posterior.range_sd == pytest.approx(found.information.range_sd, rel=0.2)
         before_now = found.information.scale_sd
         if size == 1e-9:
             assert wider == pytest.approx(np.ones(24), rel=1e-6)
@@ -163,13 +163,13 @@ def test_an_error_of_the_flux_where_ranges_have_no_end(law: dict[str, Any]) -> N
     """A sine wave sets no end of its own; the error reaches as far as their prior does."""
     scene = parse_scene({"range_m": law, "discrepancy": 0.05})
     found = identifiability(sensor_of("sine_wave"), scene, [0.4, 0.8, 1.2])
-    assert np.isfinite(found.prediction.range_sd).all()
+    assert np.isfinite(found.posterior.range_sd).all()
 
 
 def test_a_range_that_is_as_good_as_known() -> None:
     law = {"prior": "normal", "mean": 1.0, "sd": 1e-30}
     found = identifiability(sensor_of("pulsed"), parse_scene({"range_m": law}), [1.0])
-    assert found.prediction.range_sd.tolist() == [0.0]
+    assert found.posterior.range_sd.tolist() == [0.0]
 
 
 def test_what_cannot_be_foreseen_is_refused() -> None:

@@ -7,18 +7,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from inference.frame.sensitivity import whiteners
-from inference.identifiability.experiment import STEP, Experiment
+from inference.identifiability.experiment import Experiment
 from simulator.parameters import Parameters
 from simulator.scene import Reference, Stroke
 
-__all__ = ["Prediction", "log_range_spread", "predict"]
+__all__ = ["STEP", "ExpectedPosterior", "expected_posterior", "log_range_spread"]
 
 Array = NDArray[np.float64]
 
+# the maps from z are smooth: a central difference errs by 1e-10 of itself, and an error of the map
+# from the left multiplies the information, it is not added to it
+STEP = 1e-5
+_LOG_MEAN, _LOG_INVERSE_SD = 4, 5  # columns of `simulator.parameters.Terms.ranges`
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Prediction:
+class ExpectedPosterior:
     """Posterior standard deviations of a normal approximation.
 
     Attributes
@@ -58,87 +62,105 @@ def _limited(sd: Array, limit: float) -> Array:
         return np.asarray(1 / np.sqrt(1 / sd**2 + 1 / limit**2))
 
 
-def predict(experiment: Experiment, whitener: Array | None = None) -> Prediction:
-    """Predict the spread of the posterior.
+def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
+    """Return the spread that the posterior is expected to have.
 
     Parameters
     ----------
     experiment : Experiment
         Sensor, unknowns, their values, ranges. What is ``known`` after all keeps its place: the
         readings are taken not to depend on it.
-    whitener : ndarray, shape (n, 2, 2), optional
-        W with W^T W the inverse covariance of a frame's readings; left out: the sensor's.
 
     Returns
     -------
-    Prediction
+    ExpectedPosterior
         The joint truncations of the prior and the bounds of the ranges' prior are not in it,
         except that no range is known worse than by its prior.
     """
-    p = experiment.parameters
-    d, n = len(p), experiment.log_r.size
-    plus, minus = experiment.neighbours
-    of = experiment.readings
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
-        if whitener is None:
-            whitener = whiteners(experiment.sensor, of)
-        k = experiment.by_error.shape[2]
-        jacobian = np.zeros((n, 3, d + k))
-        jacobian[:, :2, :d] = np.einsum("nij,njk->nik", whitener, of.by_term) @ experiment.change
-        jacobian[:, :2, [p.names.index(name) for name in experiment.known]] = 0.0
-        jacobian[:, :2, d:] = np.einsum("nij,njk->nik", whitener, experiment.by_error)
-        along = np.zeros((n, 3))
-        along[:, :2] = np.einsum("nij,nj->ni", whitener, of.by_range)
-    present = np.isfinite(experiment.log_r)
-    law = experiment.terms.ranges[0]
-    r = np.exp(experiment.log_r[present])
-    along[present, 2] = np.sqrt(law[5] ** 2 + (r * law[3]) ** 2)
-    extra = [np.eye(d + k)]
-    if isinstance(p.range_prior, Stroke):
-        centre = (plus.ranges[:, 4] - minus.ranges[:, 4]) / (2 * STEP)
-        jacobian[present, 2, :d] = -centre * law[5]
-        told = np.square(along[present, :2]).sum(axis=1)
-        if experiment.common_range:
-            told = told.sum(keepdims=True)  # one range, however often it was read
-        spread = _spread_row(told, plus.ranges, minus.ranges, law[5])
-        extra.append(np.append(spread, np.zeros(k))[None])
-    if experiment.common_range and present.any():
-        # one range, one prior of it
-        along[np.flatnonzero(present)[1:], 2] = 0.0
-        jacobian[np.flatnonzero(present)[1:], 2] = 0.0
-    along[~present] = 0.0
-    length = np.linalg.norm(along, axis=1)
-    if experiment.common_range:
-        length = np.full(n, np.linalg.norm(length))
-    moves = present & (length > 0)
-    unit = along / np.where(length > 0, length, 1.0)[:, None]
-    shift = np.einsum("ni,nid->nd", unit, jacobian)
-    if experiment.common_range:
-        shift = np.broadcast_to(shift.sum(axis=0), shift.shape)
-    across = jacobian - unit[:, :, None] * shift[:, None, :]
-    variance, response = np.full(n, np.inf), np.zeros((n, d + k))
-    variance[moves] = 1 / length[moves] ** 2
-    response[moves] = -shift[moves] / length[moves, None]
+    p, present = experiment.parameters, np.isfinite(experiment.log_r)
+    jacobian, along, extra = _rows(experiment)
+    across, response, variance = _without_ranges(experiment, jacobian, along)
     independent = 1 if experiment.common_range else int(present.sum())
     room = _room(experiment)
     if math.isfinite(room):
         # a scale that is known to the room which the support leaves tells of what moves with it
         own = math.sqrt(variance[present].mean() / independent)
         extra.append(response[present].mean(axis=0)[None] / math.hypot(room, own))
+    d, unknowns = len(p), jacobian.shape[2]
     factor = np.empty((0, 0))
-    if d + k > 0:
-        rows = np.concatenate([across.reshape(-1, d + k), *extra])
-        triangle = linalg.qr(rows, mode="r")[0][: d + k]
-        factor = np.asarray(linalg.solve_triangular(triangle, np.eye(d + k)))
+    if unknowns > 0:
+        rows = np.concatenate([across.reshape(-1, unknowns), *extra])
+        triangle = linalg.qr(rows, mode="r")[0][:unknowns]
+        factor = np.asarray(linalg.solve_triangular(triangle, np.eye(unknowns)))
     range_sd = np.sqrt(variance + np.linalg.norm(response @ factor, axis=1) ** 2)
     range_sd = np.where(present, _limited(range_sd, log_range_spread(p)), np.nan)
     if not present.any():
-        return Prediction(factor[:d], range_sd, math.nan)
+        return ExpectedPosterior(factor[:d], range_sd, math.nan)
     own = float(variance[present].mean()) / independent
     shared = np.linalg.norm(response[present].mean(axis=0) @ factor)
     scale = np.array([math.sqrt(own + shared**2)])
     limit = min(room, log_range_spread(p))
-    return Prediction(factor[:d], range_sd, float(_limited(scale, limit)[0]))
+    return ExpectedPosterior(factor[:d], range_sd, float(_limited(scale, limit)[0]))
+
+
+def _rows(experiment: Experiment) -> tuple[Array, Array, list[Array]]:
+    """Return what readings and priors tell.
+
+    Of every frame two whitened readings and the prior of its range: derivatives along z and the
+    coefficients of the flux's error, shape (n, 3, d + k), and along its log r, shape (n, 3).
+    Further rows tell of z alone.
+    """
+    p, log_r = experiment.parameters, experiment.log_r
+    by_term, by_range, by_error = experiment.whitened_terms()
+    d, n, k = len(p), log_r.size, by_error.shape[2]
+    jacobian, along = np.zeros((n, 3, d + k)), np.zeros((n, 3))
+    with np.errstate(over="ignore", invalid="ignore"):
+        jacobian[:, :2, :d] = by_term @ experiment.change
+    jacobian[:, :2, [p.names.index(name) for name in experiment.known]] = 0.0
+    jacobian[:, :2, d:] = by_error
+    along[:, :2] = by_range
+    present = np.isfinite(log_r)
+    law = experiment.range_prior
+    along[present, 2] = np.sqrt(
+        law.log_inverse_sd**2 + (np.exp(log_r[present]) * law.inverse_sd) ** 2
+    )
+    extra = [np.eye(d + k)]
+    if isinstance(p.range_prior, Stroke):
+        steps = STEP * np.eye(d)
+        plus, minus = p.terms(experiment.z + steps).ranges, p.terms(experiment.z - steps).ranges
+        centre = (plus[:, _LOG_MEAN] - minus[:, _LOG_MEAN]) / (2 * STEP)
+        jacobian[present, 2, :d] = -centre * law.log_inverse_sd
+        told = np.square(along[present, :2]).sum(axis=1)
+        if experiment.common_range:
+            told = told.sum(keepdims=True)  # one range, however often it was read
+        spread = _spread_row(told, plus, minus, law.log_inverse_sd)
+        extra.append(np.append(spread, np.zeros(k))[None])
+    if experiment.common_range and present.any():
+        # one range, one prior of it
+        along[np.flatnonzero(present)[1:], 2] = 0.0
+        jacobian[np.flatnonzero(present)[1:], 2] = 0.0
+    along[~present] = 0.0
+    return jacobian, along, extra
+
+
+def _without_ranges(
+    experiment: Experiment, jacobian: Array, along: Array
+) -> tuple[Array, Array, Array]:
+    """Eliminate the ranges: what is across them, how log r responds, and its own variance."""
+    n, _, unknowns = jacobian.shape
+    length = np.linalg.norm(along, axis=1)
+    if experiment.common_range:
+        length = np.full(n, np.linalg.norm(length))
+    moves = np.isfinite(experiment.log_r) & (length > 0)
+    unit = along / np.where(length > 0, length, 1.0)[:, None]
+    shift = np.einsum("ni,nid->nd", unit, jacobian)
+    if experiment.common_range:
+        shift = np.broadcast_to(shift.sum(axis=0), shift.shape)
+    across = jacobian - unit[:, :, None] * shift[:, None, :]
+    variance, response = np.full(n, np.inf), np.zeros((n, unknowns))
+    variance[moves] = 1 / length[moves] ** 2
+    response[moves] = -shift[moves] / length[moves, None]
+    return across, response, variance
 
 
 def _room(experiment: Experiment) -> float:
@@ -148,13 +170,10 @@ def _room(experiment: Experiment) -> float:
     whose curvature says more, and where no frame has an object.
     """
     present = np.isfinite(experiment.log_r)
-    law = experiment.terms.ranges[0]
-    if not present.any() or law[3] > 0 or law[5] > 0:
+    law = experiment.range_prior
+    if not present.any() or law.inverse_sd > 0 or law.log_inverse_sd > 0 or not law.low > 0:
         return math.inf
-    low, high = float(law[6]), float(law[7])
-    if not low > 0:
-        return math.inf
-    room = math.log(high / low) - float(np.ptp(experiment.log_r[present]))
+    room = math.log(law.high / law.low) - float(np.ptp(experiment.log_r[present]))
     return room / math.sqrt(12) if room > 0 else math.inf
 
 
@@ -165,7 +184,7 @@ def _spread_row(told: Array, plus: Array, minus: Array, inverse: float) -> Array
     normal with variance v = w^2 + s^2, whose information on w is (dv/dw)^2 / (2 v^2) =
     2 w^2 / v^2.
     """
-    rate = (1 / plus[:, 5] - 1 / minus[:, 5]) / (2 * STEP)  # dw / dz
+    rate = (1 / plus[:, _LOG_INVERSE_SD] - 1 / minus[:, _LOG_INVERSE_SD]) / (2 * STEP)  # dw / dz
     w = 1 / inverse
     with np.errstate(divide="ignore"):
         own = 1 / told

@@ -1,0 +1,82 @@
+"""Whitened readings of many frames with every frame's range eliminated."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.identifiability.information import Information
+
+__all__ = ["eliminate"]
+
+Array = NDArray[np.float64]
+
+
+def eliminate(
+    names: tuple[str, ...],
+    jacobian: Array,
+    along_range: Array,
+    errors: Array | None = None,
+    *,
+    common_range: bool = False,
+) -> Information:
+    """Eliminate the range of every frame.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The unknowns.
+    jacobian : ndarray, shape (n, 2, d)
+        Whitened derivatives of the readings.
+    along_range : ndarray, shape (n, 2)
+        Whitened derivative along log r; zero where the readings do not depend on it, nan for a
+        frame without object.
+    errors : ndarray, shape (n, 2, k), optional
+        Whitened derivatives along independent standard normal errors that all frames share.
+    common_range : bool
+        Whether all frames with an object have one range.
+
+    Returns
+    -------
+    Information
+    """
+    n, _, d = jacobian.shape
+    errors = np.empty((n, 2, 0)) if errors is None else errors
+    k = errors.shape[2]
+    both = np.concatenate([jacobian, errors], axis=2)
+    empty = np.asarray(np.isnan(along_range).any(axis=1))
+    along = np.where(empty[:, None], 0.0, along_range)
+    length = np.linalg.norm(along, axis=1)
+    moves = length > 0
+    sizes = np.linalg.norm(jacobian, axis=1)
+    whole = both[~moves]
+    response, variance = np.zeros((n, d + k)), np.full(n, np.inf)
+    if common_range and moves.any():
+        direction = along / np.linalg.norm(along)
+        shift = np.einsum("ni,nid->d", direction, both)
+        across = (both - direction[:, :, None] * shift)[moves]
+        across = across.reshape(2 * len(across), d + k)  # nothing may be unknown
+        # the difference of two vectors: rounding is that of the larger, over all frames
+        largest = np.linalg.norm(sizes[moves], axis=0) / np.sqrt(2 * moves.sum())
+        before = np.maximum(np.repeat(sizes[moves], 2, axis=0), largest)
+        response[:], variance[:] = -shift / np.linalg.norm(along), 1 / np.square(length).sum()
+    else:
+        unit = along / np.where(moves, length, 1.0)[:, None]
+        # both components of the projection are one number along the normal: no difference is left
+        # of two vectors, only that of two products
+        normal = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+        across = np.einsum("ni,nid->nd", normal[moves], both[moves])
+        before = sizes[moves]
+        response[moves] = -np.einsum("ni,nid->nd", unit, both)[moves] / length[moves, None]
+        variance[moves] = 1 / length[moves] ** 2
+    rows = np.concatenate([across, whole.reshape(2 * len(whole), d + k)])
+    before = np.concatenate([before, np.repeat(sizes[~moves], 2, axis=0)])
+    response[empty], variance[empty] = np.nan, np.nan
+    return Information(
+        names,
+        rows[:, :d],
+        before,
+        response[:, :d],
+        variance,
+        rows[:, d:],
+        response[:, d:],
+        common_range,
+    )
