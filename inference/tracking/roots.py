@@ -5,7 +5,11 @@ from typing import NamedTuple
 
 from simulator.compiled import compiled
 
-__all__ = ["UNIT", "Root", "add_factor", "add_root", "solve"]
+__all__ = ["UNIT", "Root", "add_factor", "add_root", "rotation", "solve"]
+
+
+_LEAST_LENGTH = 1e-150  # below it squares come near the least number that has all its digits
+_SCALE = 2.0**600  # by which the least number of all is far from it
 
 
 class Root(NamedTuple):
@@ -21,6 +25,20 @@ UNIT = Root(1.0, 0.0, 1.0)
 
 
 @compiled
+def rotation(first: float, second: float) -> tuple[float, float, float]:
+    """Return the length of a vector, and cosine and sine of its angle; right also where it is tiny.
+
+    The vector must not be zero.
+    """
+    length = math.sqrt(first * first + second * second)
+    if length > _LEAST_LENGTH:
+        return length, first / length, second / length
+    first, second = first * _SCALE, second * _SCALE
+    length = math.sqrt(first * first + second * second)
+    return length / _SCALE, first / length, second / length
+
+
+@compiled
 def add_factor(root: Root, first: float, second: float) -> Root:
     """Return the triangular root of root root^T + f f^T, by one rotation: nothing cancels.
 
@@ -31,10 +49,9 @@ def add_factor(root: Root, first: float, second: float) -> Root:
     first, second : float
         The vector f.
     """
-    length = math.sqrt(root.r11 * root.r11 + first * first)
-    if first == 0.0 or length == 0.0:  # nothing, or squares that underflow
+    if first == 0.0:
         return Root(root.r11, root.r21, math.sqrt(root.r22 * root.r22 + second * second))
-    cosine, sine = root.r11 / length, first / length
+    length, cosine, sine = rotation(root.r11, first)
     rest = cosine * second - sine * root.r21
     return Root(
         length, cosine * root.r21 + sine * second, math.sqrt(root.r22 * root.r22 + rest * rest)

@@ -5,7 +5,6 @@ known, so that what they do to the range never averages down; the state learns f
 as it can beside them.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from inference.tracking.hypotheses import CROSSTALK1, CROSSTALK2, Hypotheses, Scratch, U, V
 from inference.tracking.motion import Motion
 from inference.tracking.readings_table import FIRST, SECOND
-from inference.tracking.roots import Root, add_factor, solve
+from inference.tracking.roots import Root, add_factor, rotation, solve
 from simulator.compiled import compiled
 
 __all__ = ["Linear", "move", "triangularise", "update"]
@@ -45,12 +44,7 @@ def triangularise(work: Array, first: int, rows: int, columns: int) -> None:
             b = work[i, j]
             if b == 0.0:
                 continue
-            a = work[i, i]
-            length = math.sqrt(a * a + b * b)
-            if length == 0.0:  # squares underflow
-                work[i, j] = 0.0
-                continue
-            cosine, sine = a / length, b / length
+            length, cosine, sine = rotation(work[i, i], b)
             work[i, i], work[i, j] = length, 0.0
             for k in range(i + 1, rows):
                 left, right = work[k, i], work[k, j]

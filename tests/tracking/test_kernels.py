@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy import integrate, linalg
 
@@ -26,6 +26,8 @@ finite = st.floats(-1e6, 1e6)
 
 @settings(deadline=None)  # the first call compiles
 @given(st.tuples(finite, finite, finite), finite, finite)
+@example((0.0, 0.0, 0.0), 1.7e-156, 1.0)  # whose square has lost most of its digits
+@example((2e-313, 0.0, 0.0), 2e-313, 1.0)  # which itself has
 def test_add_factor_is_a_root_of_the_sum(
     root: tuple[float, float, float], first: float, second: float
 ) -> None:
