@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulator.errors import RefusedError
-from simulator.range_law import RangePrior, range_laws, range_prior, stroke_unknowns
+from simulator.range_prior import RangePrior, range_prior, range_prior_rows, stroke_unknowns
 from simulator.scene import Reference, Scene, Stroke, check_scene
 from simulator.sensor import PulsedSensor, Sensor
 from simulator.unknowns import Unknown, Values, add_quantity, add_reflectance, add_shape
@@ -134,7 +134,7 @@ class Parameters:
             np.column_stack([values[f"object.{c}"] for c in ("c0", "c1", "c2")]),
             crosstalk,
             background,
-            range_laws(self.range_prior, values, background, z.shape[0]),
+            range_prior_rows(self.range_prior, values, background, z.shape[0]),
         )
 
     def sample(self, rng: np.random.Generator, n: int) -> Array:

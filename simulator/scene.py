@@ -357,5 +357,9 @@ def check_scene(sensor: Sensor, scene: Scene) -> None:
             problems.append(Problem("/range_m/low", f"lies beyond {of_limit} {limit:g} m"))
     elif scene.range_m is not None:
         problems += _check_support(scene.range_m, 0.0, limit, "/range_m")
+        if scene.range_m.distribution().range_form is None:
+            problems.append(
+                Problem("/range_m/prior", f"{scene.range_m.prior!r} cannot be the prior of ranges")
+            )
     if problems:
         raise InvalidInputError(*dict.fromkeys(problems))

@@ -20,6 +20,7 @@ _FITS = f"inference.fits inference.realtime inference.density inference.frame {_
 # folder: what its files may import besides one another
 ALLOWED: dict[str, str] = {
     "simulator": "simulator.optics",
+    "simulator/priors": "",
     "simulator/optics": "simulator.optics",
     "simulator/optics/figures": "simulator.optics",
     "inference": "inference.realtime inference.fits",
@@ -79,7 +80,7 @@ def folder_of(name: str) -> str:
 def may(folder: str, name: str) -> bool:
     """Tell whether the files of a folder may import a name."""
     there = folder_of(name)
-    if there in (folder, "simulator"):
+    if there in (folder, "simulator", "simulator/priors"):
         return True
     return any(name == row or name.startswith(row + ".") for row in ALLOWED[folder].split())
 

@@ -1,14 +1,14 @@
 """A truth drawn from the priors of a scene, ranges included, and the readings it makes."""
 
 import dataclasses
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
-from simulator.priors import Distribution
+from simulator.priors import Distribution, NormalDistribution, UniformDistribution
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor
 from simulator.simulate import simulate
@@ -62,10 +62,11 @@ def _draw_ranges(law: Array, n: int, rng: np.random.Generator) -> Array:
     """Draw n ranges from the law of `Terms.ranges`, one row."""
     in_log = bool(law[1] == -1.0)
     inverse = float(law[5] if in_log else law[3])
-    base: Literal["uniform", "normal"] = "normal" if inverse > 0 else "uniform"
     loc = float(law[4] if in_log else law[2])
-    scale = 1.0 / inverse if inverse > 0 else 1.0
-    prior = Distribution(base, in_log, loc, scale, float(law[6]), float(law[7]))
+    low, high = float(law[6]), float(law[7])
+    prior: Distribution = UniformDistribution(log=in_log, low=low, high=high)
+    if inverse > 0:
+        prior = NormalDistribution(log=in_log, loc=loc, scale=1.0 / inverse, low=low, high=high)
     return prior.from_normal(rng.standard_normal(n))
 
 

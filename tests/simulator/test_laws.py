@@ -17,6 +17,7 @@ from simulator.priors import (
     LogNormal,
     LogUniform,
     Normal,
+    NormalDistribution,
     Prior,
     TruncatedNormal,
     Uniform,
@@ -31,7 +32,7 @@ LAWS: dict[str, Prior] = {
     "lognormal": LogNormal(median=0.1, sigma=2.0),
     "truncated_normal": TruncatedNormal(mean=0.0, sd=1.0, low=3.0, high=5.0),
 }
-STANDARD = Distribution("normal", False, 0.0, 1.0, -math.inf, math.inf)
+STANDARD = NormalDistribution(log=False, loc=0.0, scale=1.0, low=-math.inf, high=math.inf)
 LOWS = [-math.inf, -40.0, -8.0, -1.0, 0.0, 1.0, 8.0, 40.0, 1e4]
 CUTS = [(a, a + w) for a in LOWS[1:] for w in (1e-3, 1.0, 10.0, math.inf)]
 CUTS += [(-math.inf, b) for b in LOWS[1:]]
@@ -142,7 +143,9 @@ def test_coordinates_are_inverse_under_any_cut(
     slope = (
         float(law.from_normal(z + 1e-4, low, high) - law.from_normal(z - 1e-4, low, high)) / 2e-4
     )
-    reach = max(abs(low), abs(high)) * (1 + abs(law.loc) + law.scale)
+    reach = max(abs(low), abs(high)) * (
+        1 + abs(getattr(law, "loc", 0.0)) + getattr(law, "scale", 1.0)
+    )
     # a probability near 1/2 is known to an eps of 1 from either side, over the density at z
     other = 1e-12 * (1 + abs(z))
     assert abs(again - z) <= 64 * EPS * reach / max(slope, 1e-300) + other
@@ -172,10 +175,10 @@ def test_a_law_of_the_logarithm_below_zero() -> None:
 
 def test_extreme_laws_overflow_without_a_warning() -> None:
     z = np.array([-3.0, 0.0, 3.0])
-    wide = Distribution("normal", True, math.log(1e300), 1e3, 0.0, math.inf)
+    wide = NormalDistribution(log=True, loc=math.log(1e300), scale=1e3, low=0.0, high=math.inf)
     assert wide.from_normal(z).tolist() == [0.0, pytest.approx(1e300, rel=1e-12), math.inf]
-    far = Distribution("normal", False, 1.7e308, 1e308, -math.inf, math.inf)
+    far = NormalDistribution(log=False, loc=1.7e308, scale=1e308, low=-math.inf, high=math.inf)
     assert far.from_normal(3.0) == math.inf
-    narrow = Distribution("normal", False, 0.0, 1e-320, -1.0, 1.0)
+    narrow = NormalDistribution(log=False, loc=0.0, scale=1e-320, low=-1.0, high=1.0)
     assert np.all(np.isfinite(narrow.from_normal(z)))
     assert float(narrow.log_density(0.5)) == -math.inf

@@ -15,6 +15,7 @@ from scipy import special
 from inference.density.collapsed import CollapsedDensity
 from inference.density.static import StaticDensity
 from inference.identifiability.status import Identifiability
+from simulator.priors import UniformDistribution
 from simulator.scene import Reference, Stroke
 
 __all__ = ["LawShift", "judge_law", "law_shift"]
@@ -67,7 +68,7 @@ def law_shift(density: CollapsedDensity, z: Array, log_r: Array) -> LawShift | N
     law = parameters.range_prior
     if len(parameters) == 0 or isinstance(density, StaticDensity) or isinstance(law, Reference):
         return None
-    if not isinstance(law, Stroke) and law.base != "uniform":
+    if not isinstance(law, Stroke | UniformDistribution):
         return None
     count = int(np.clip(_EVALUATIONS // max(len(density.frames), 1), _LEAST_DRAWS, _DRAWS))
     chosen = np.linspace(0, len(z) - 1, min(count, len(z))).astype(int)

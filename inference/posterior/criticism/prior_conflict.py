@@ -23,7 +23,7 @@ from scipy import linalg, special
 from inference.density.collapsed import CollapsedDensity
 from inference.density.profile import best_ranges, linearise
 from inference.density.static import StaticDensity
-from simulator.priors import Distribution
+from simulator.priors import Distribution, NormalDistribution, UniformDistribution
 from simulator.scene import Reference, Stroke
 
 __all__ = ["parameter_conflicts", "prior_conflicts", "range_conflicts", "scores"]
@@ -217,7 +217,7 @@ def _deviations(law: Distribution, r: Array) -> Array:
 
     Ends are no tails: an object may well stand where its prior begins.
     """
-    if law.base != "normal":
+    if not isinstance(law, NormalDistribution):
         return np.zeros(r.shape)
     with np.errstate(invalid="ignore", divide="ignore"):
         place = np.abs(((np.log(r) if law.log else r) - law.loc) / law.scale)
@@ -243,4 +243,4 @@ def _best_fit(density: CollapsedDensity, z: Array) -> Array:
 
 def _uniform(low: float, high: float) -> Distribution:
     """Return a law uniform in log r; of computed ends, of which no size is asked."""
-    return Distribution("uniform", True, 0.0, 1.0, low, high)
+    return UniformDistribution(log=True, low=low, high=high)

@@ -1,21 +1,30 @@
-"""The law of the ranges: stated or by default, cut by sensor and background, normalised."""
+"""The prior of the ranges: stated or by default, cut by sensor and background, normalised."""
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.priors import Distribution, LogNormal, Uniform
+from simulator.errors import RefusedError
+from simulator.priors import (
+    Distribution,
+    LogNormal,
+    NormalDistribution,
+    RangeForm,
+    Uniform,
+    UniformDistribution,
+)
 from simulator.scene import Reference, Scene, Stroke
 from simulator.sensor import PulsedSensor, Sensor
 from simulator.unknowns import Unknown, Values
 
-__all__ = ["RangePrior", "range_laws", "range_prior", "stroke_unknowns"]
+__all__ = ["RangePrior", "range_prior", "range_prior_rows", "stroke_unknowns"]
 
 Array = NDArray[np.float64]
 RangePrior = Distribution | Stroke | Reference
 
 _DEFAULT_RANGE = (0.02, 20.0)
+_UNIT = NormalDistribution(log=False, loc=0.0, scale=1.0, low=-math.inf, high=math.inf)
 _STROKE_SPREAD = LogNormal(median=0.5, sigma=1.0).distribution()
 
 
@@ -29,7 +38,7 @@ def range_prior(sensor: Sensor, scene: Scene) -> RangePrior:
         # a sensor that sees less than 2 cm still has ranges
         low = _DEFAULT_RANGE[0] if high > _DEFAULT_RANGE[0] else high / 100
         # not a `LogUniform`: sizes are asked of what is stated, not of what follows from it
-        return Distribution("uniform", True, 0.0, 1.0, low, high)
+        return UniformDistribution(log=True, low=low, high=high)
     if isinstance(scene.range_m, Stroke | Reference):
         return type(scene.range_m)(low=scene.range_m.low, high=min(scene.range_m.high, limit))
     return scene.range_m.distribution().truncated(0.0, limit)
@@ -52,8 +61,8 @@ def stroke_unknowns(prior: Stroke) -> tuple[Unknown, Unknown]:
     )
 
 
-def range_laws(prior: RangePrior, values: Values, background: Array | None, n: int) -> Array:
-    """Return the laws of the ranges given n parameter vectors.
+def range_prior_rows(prior: RangePrior, values: Values, background: Array | None, n: int) -> Array:
+    """Return the prior densities of a range given n parameter vectors.
 
     Parameters
     ----------
@@ -70,48 +79,50 @@ def range_laws(prior: RangePrior, values: Values, background: Array | None, n: i
     -------
     ndarray, shape (n, 8)
         As in `simulator.parameters.Terms`.
+
+    Raises
+    ------
+    RefusedError
+        For a law that is no prior of ranges.
     """
-    law = np.zeros((n, 8))
+    rows = np.zeros((n, 8))
+    form = _form_of(prior)
+    rows[:, 1:6] = form
+    rows[:, 6], rows[:, 7] = prior.low, prior.high
     if isinstance(prior, Stroke):
-        law[:, 1] = -1.0
-        law[:, 4] = np.log(values["range_m.centre"])
+        rows[:, 4] = np.log(values["range_m.centre"])
         with np.errstate(divide="ignore", over="ignore"):  # far out in z a spread underflows
-            law[:, 5] = 1.0 / values["range_m.spread"]
-        law[:, 6], law[:, 7] = prior.low, prior.high
-    elif isinstance(prior, Reference):
-        law[:, 1] = -1.0
-        law[:, 6], law[:, 7] = prior.low, prior.high
-    else:
-        law[:, 1] = -1.0 if prior.log else 0.0
-        if prior.base == "normal":
-            law[:, 4 if prior.log else 2] = prior.loc
-            law[:, 5 if prior.log else 3] = 1.0 / prior.scale
-        law[:, 6], law[:, 7] = prior.low, prior.high
+            rows[:, 5] = 1.0 / values["range_m.spread"]
     if background is not None:
         # a shadow with c1' < 0 is negative below r = -c1': such ranges are not physical
-        law[:, 6] = np.maximum(law[:, 6], -background[:, 3])
+        rows[:, 6] = np.maximum(rows[:, 6], -background[:, 3])
         # and an object stands before its background: else a frame whose object is dark could
         # lie anywhere behind it, where nothing contradicts, and draw the other unknowns along
-        law[:, 7] = np.minimum(law[:, 7], background[:, 1])
-    law[:, 0] = -_log_normaliser(prior, law)
-    return law
-
-
-def _log_normaliser(prior: RangePrior, law: Array) -> Array:
-    """Log integral of the unnormalised law over its support, shape (n,)."""
-    low, high = law[:, 6], law[:, 7]
-    if isinstance(prior, Reference):  # a density per distinguishable range
-        return np.where(high > low, 0.0, np.inf)
+        rows[:, 7] = np.minimum(rows[:, 7], background[:, 1])
+    low, high = rows[:, 6], rows[:, 7]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        if isinstance(prior, Stroke) or prior.base == "normal":
-            in_log = isinstance(prior, Stroke) or prior.log
-            loc, inverse = (law[:, 4], law[:, 5]) if in_log else (law[:, 2], law[:, 3])
-            unit = Distribution("normal", False, 0.0, 1.0, -math.inf, math.inf)
-            a, b = (np.log(low), np.log(high)) if in_log else (low, high)
-            mass = unit.log_mass((a - loc) * inverse, (b - loc) * inverse)
-            total = mass + 0.5 * math.log(2 * math.pi) - np.log(inverse)
-        elif prior.log:
-            total = np.log(np.log(high) - np.log(low))
+        if isinstance(prior, Reference):  # a density per distinguishable range: no integral
+            total = np.zeros(n)
+        elif isinstance(prior, Stroke) or form.inverse_log_sd > 0.0:
+            total = _log_normal_integral(np.log(low), np.log(high), rows[:, 4], rows[:, 5])
+        elif form.inverse_sd > 0.0:
+            total = _log_normal_integral(low, high, rows[:, 2], rows[:, 3])
         else:
-            total = np.log(high - low)
-    return np.where(high > low, total, np.inf)
+            total = np.log(np.log(high) - np.log(low)) if form.power else np.log(high - low)
+    rows[:, 0] = -np.where(high > low, total, np.inf)
+    return rows
+
+
+def _form_of(prior: RangePrior) -> RangeForm:
+    """Return what does not depend on the unknowns of a prior of the ranges."""
+    if isinstance(prior, Stroke | Reference):
+        return RangeForm(-1.0)
+    if prior.range_form is None:
+        raise RefusedError(f"{type(prior).__name__} is no prior of ranges")
+    return prior.range_form
+
+
+def _log_normal_integral(a: Array, b: Array, loc: Array, inverse: Array) -> Array:
+    """Log integral of exp(-((x - loc) inverse)^2 / 2) between a and b."""
+    mass = _UNIT.log_mass((a - loc) * inverse, (b - loc) * inverse)
+    return np.asarray(mass + 0.5 * math.log(2 * math.pi) - np.log(inverse))

@@ -1,0 +1,165 @@
+"""Laws that are normal in x or in log x, whole or cut."""
+
+import dataclasses
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+import pydantic
+from numpy.typing import NDArray
+from scipy import special
+
+from simulator.priors.distribution import LEAST_LOG_MASS, Distribution, RangeForm
+from simulator.validated import Number, Positive, Validated
+
+__all__ = [
+    "HalfNormal",
+    "LogNormal",
+    "Normal",
+    "NormalDistribution",
+    "TruncatedNormal",
+]
+
+Array = NDArray[np.float64]
+
+_HALF_LOG_2PI = 0.5 * math.log(2 * math.pi)
+
+
+def _log_difference(larger: Array, smaller: Array) -> Array:
+    """Return log(exp(larger) - exp(smaller)) without cancellation, -inf where they are equal."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gap = np.minimum(smaller - larger, 0.0)
+        result = np.where(gap > -math.log(2), np.log(-np.expm1(gap)), np.log1p(-np.exp(gap)))
+    return np.asarray(np.where(np.isneginf(larger), -np.inf, larger + result))
+
+
+def _log_normal_mass(low: Array, high: Array) -> Array:
+    """Return log(Phi(high) - Phi(low)), accurate in both tails."""
+    # reflected so that the interval lies mostly in the lower tail, where Phi has full precision
+    flip = low + high > 0
+    below = np.where(flip, -high, low)
+    above = np.where(flip, -low, high)
+    return _log_difference(special.log_ndtr(above), special.log_ndtr(below))
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class NormalDistribution(Distribution):
+    """Normal in x or log x.
+
+    Attributes
+    ----------
+    loc, scale : float
+        Mean and standard deviation before the cut, of x or log x.
+    """
+
+    loc: float
+    scale: float
+
+    def _standard(self, position: Array) -> Array:
+        # far bounds are infinite
+        with np.errstate(over="ignore"):
+            return np.asarray((position - self.loc) / self.scale)
+
+    def _log_share(self, a: Array, b: Array) -> Array:
+        return _log_normal_mass(self._standard(a), self._standard(b))
+
+    def _position(self, z: Array, a: Array, b: Array) -> Array:
+        a, b = self._standard(a), self._standard(b)
+        if not _is_whole(a, b):
+            mass = _log_normal_mass(a, b)
+            lower = np.logaddexp(special.log_ndtr(a), special.log_ndtr(z) + mass)
+            upper = np.logaddexp(special.log_ndtr(-b), special.log_ndtr(-z) + mass)
+            z = np.where(lower < upper, special.ndtri_exp(lower), -special.ndtri_exp(upper))
+            z = np.clip(z, a, b)
+        return np.asarray(self.loc + self.scale * z)
+
+    def _variate(self, position: Array, a: Array, b: Array) -> Array:
+        a, b, standard = self._standard(a), self._standard(b), self._standard(position)
+        if _is_whole(a, b):
+            return standard
+        mass = _log_normal_mass(a, b)
+        lower = np.minimum(_log_normal_mass(a, standard) - mass, 0.0)
+        upper = np.minimum(_log_normal_mass(standard, b) - mass, 0.0)
+        return np.where(lower < upper, special.ndtri_exp(lower), -special.ndtri_exp(upper))
+
+    def _log_density(self, position: Array, a: Array, b: Array) -> Array:
+        standard = self._standard(position)
+        density = -0.5 * standard**2 - _HALF_LOG_2PI - math.log(self.scale)
+        return density - _log_normal_mass(self._standard(a), self._standard(b))
+
+    @property
+    def range_form(self) -> RangeForm:
+        """Normal in r, or in log r."""
+        if self.log:
+            return RangeForm(-1.0, log_mean=self.loc, inverse_log_sd=1.0 / self.scale)
+        return RangeForm(0.0, mean=self.loc, inverse_sd=1.0 / self.scale)
+
+
+def _is_whole(a: Array, b: Array) -> bool:
+    return bool(np.all(np.isneginf(a)) and np.all(np.isposinf(b)))
+
+
+class Normal(Validated):
+    """Normal law of given mean and standard deviation."""
+
+    prior: Literal["normal"] = "normal"
+    mean: Number
+    sd: Positive
+
+    def distribution(self) -> NormalDistribution:
+        """Return the distribution."""
+        return NormalDistribution(
+            log=False, loc=self.mean, scale=self.sd, low=-math.inf, high=math.inf
+        )
+
+
+class HalfNormal(Validated):
+    """Absolute value of a normal variate of mean 0; sd is that of the whole normal."""
+
+    prior: Literal["halfnormal"] = "halfnormal"
+    sd: Positive
+
+    def distribution(self) -> NormalDistribution:
+        """Return the distribution."""
+        return NormalDistribution(log=False, loc=0.0, scale=self.sd, low=0.0, high=math.inf)
+
+
+class LogNormal(Validated):
+    """Law whose logarithm is normal with mean log(median) and standard deviation sigma."""
+
+    prior: Literal["lognormal"] = "lognormal"
+    median: Positive
+    sigma: Annotated[Positive, pydantic.Field(le=100)]
+
+    def distribution(self) -> NormalDistribution:
+        """Return the distribution."""
+        return NormalDistribution(
+            log=True, loc=math.log(self.median), scale=self.sigma, low=0.0, high=math.inf
+        )
+
+
+class TruncatedNormal(Validated):
+    """Normal law cut to [low, high] and renormalised."""
+
+    prior: Literal["truncated_normal"] = "truncated_normal"
+    mean: Number
+    sd: Positive
+    low: Number
+    high: Number
+
+    @pydantic.model_validator(mode="after")
+    def _ordered(self) -> "TruncatedNormal":
+        if not self.low < self.high:
+            raise ValueError("low must be below high")
+        whole = NormalDistribution(
+            log=False, loc=self.mean, scale=self.sd, low=-math.inf, high=math.inf
+        )
+        if not whole.log_mass(self.low, self.high) > LEAST_LOG_MASS:
+            raise ValueError("the law has no mass between low and high that a number can hold")
+        return self
+
+    def distribution(self) -> NormalDistribution:
+        """Return the distribution."""
+        return NormalDistribution(
+            log=False, loc=self.mean, scale=self.sd, low=self.low, high=self.high
+        )
