@@ -9,12 +9,14 @@ from typing import Any
 import httpx
 import pytest
 
+import hybridtof
 from inference.realtime.registry import TECHNIQUES
 from service.app import create_app
 from service.cli import main
 from service.commands import COMMANDS
 from service.settings import Settings
 from service.technique_table import END, START, technique_table
+from simulator.scene import check_scene
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -118,6 +120,20 @@ def test_command_line_example(
                 assert float(value) == pytest.approx(float(short), abs=0.51e-4)
             else:
                 assert value == short
+
+
+def test_forms_of_sensors_scenes_and_frames() -> None:
+    """What docs/scenes.md shows is taken as it stands."""
+    text = (ROOT / "docs" / "scenes.md").read_text(encoding="utf-8")
+    shown = [json.loads(found) for found in re.findall(r"```json\n(.*?)\n```", text, re.DOTALL)]
+    sensors = {form["kind"]: hybridtof.parse_sensor(form) for form in shown if "kind" in form}
+    assert sorted(sensors) == ["pulsed", "sine_wave"]
+    (columns,) = (form for form in shown if "w1" in form)
+    assert len(hybridtof.frames_from_columns(sensors["pulsed"], columns)) == 2
+    (scene,) = (form for form in shown if "object" in form)
+    for sensor in sensors.values():
+        check_scene(sensor, hybridtof.parse_scene(scene))
+    assert len(shown) == 4
 
 
 def test_front_page_is_short() -> None:
