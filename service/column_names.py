@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from simulator.errors import InvalidInputError, Problem, escape
 from simulator.frames import FrameColumns
 
-__all__ = ["NAMES", "check_names", "ignored_names"]
+__all__ = ["NAMES", "check_names", "ignored_names", "meant"]
 
 NAMES = tuple(FrameColumns.model_fields)
 
@@ -21,8 +21,18 @@ def _plain(name: str) -> str:
     return re.sub(r"\(.*\)|\[.*\]|[^a-z0-9]", "", name.lower())
 
 
-def _meant(name: str) -> list[str]:
-    """Return the columns that a name may stand for; none where it cannot be meant."""
+def meant(name: str) -> list[str]:
+    """Return the columns that a name may stand for, itself first; none where none is meant.
+
+    Parameters
+    ----------
+    name : str
+        As it stands in a file.
+
+    Returns
+    -------
+    list of str
+    """
     plain = _plain(name)
     same = [known for known in NAMES if _plain(known) == plain]
     if same:
@@ -57,8 +67,8 @@ def check_names(names: Sequence[str]) -> None:
     ]
     for name in ignored_names(names):
         hint = ""
-        if meant := _meant(name):
-            hint = f"did you mean {' or '.join(meant)}?"
+        if likely := meant(name):
+            hint = f"did you mean {' or '.join(likely)}?"
         elif re.fullmatch(r"[-+.\d]+(e[-+]?\d+)?|", name, re.IGNORECASE):
             hint = "the first line must name the columns"
         if hint:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from service.column_names import check_names, ignored_names
+from service.column_names import check_names, ignored_names, meant
 from service.errors import MalformedError
 from service.frame_table import FrameTable, Row, table_of, value_of_json, value_of_text
 from service.strict_json import check_bulk, decode
@@ -24,7 +24,7 @@ __all__ = [
     "write_frames",
 ]
 
-_SEPARATORS = ";\t|"
+_SEPARATORS = ";\t| "
 
 
 def read_frames(path: Path) -> FrameColumns:
@@ -185,7 +185,8 @@ def check_separator(header: Sequence[str]) -> None:
         With a hint.
     """
     for separator in _SEPARATORS:
-        if any(separator in name for name in header):
+        # a unit in brackets, or a comment in words, is no second column
+        if any(sum(map(bool, map(meant, name.split(separator)))) > 1 for name in header):
             raise MalformedError(
                 f"columns must be separated by commas: is the file separated by {separator!r}?"
             )

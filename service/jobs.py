@@ -156,7 +156,7 @@ class Jobs(Generic[J, C, T, P]):
         job_id : str
             Which job.
         media_type : str
-            Of one of `service.exports.registry.EXPORTS`.
+            Of one of `service.exports.EXPORTS`.
 
         Returns
         -------

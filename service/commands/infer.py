@@ -74,7 +74,7 @@ def _run(args: argparse.Namespace) -> int:
 def _format_of(path: Path) -> str:
     """Return the media type of a file, before any time is spent on what goes into it."""
     from service.commands.files import check_folder
-    from service.exports.registry import EXPORTS
+    from service.exports import EXPORTS
     from simulator.errors import InvalidInputError, Problem
 
     check_folder("--draws", path)

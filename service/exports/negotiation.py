@@ -1,7 +1,7 @@
 """Which form of draws a client accepts (RFC 9110, 12.5.1)."""
 
+from service.exports import EXPORTS
 from service.exports.export import Export
-from service.exports.registry import EXPORTS
 
 __all__ = ["accepted_export"]
 

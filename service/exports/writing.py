@@ -5,8 +5,8 @@ from typing import TypeVar
 
 from inference.posterior.answer.draws import Draws
 from inference.posterior.job import Job
+from service.exports import export_by
 from service.exports.described import describe_draws
-from service.exports.registry import export_by
 from service.fold import StoredCheckpoint
 
 __all__ = ["write_draws"]

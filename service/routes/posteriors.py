@@ -12,8 +12,8 @@ from service.answers.posteriors import PosteriorPage, PosteriorResponse, brief, 
 from service.bodies import BodyOf
 from service.checks import system_with_frames
 from service.errors import MalformedError, NotAcceptableError
+from service.exports import EXPORTS
 from service.exports.negotiation import accepted_export
-from service.exports.registry import EXPORTS
 from service.problems import problem_responses
 from service.requests import PosteriorRequest
 from service.state import state_of

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from inference.posterior.sampling.diagnostics import split_r_hat
+from service.exports import EXPORTS, export_by
 from service.exports.described import DescribedDraws, describe_draws
 from service.exports.export import Export
 from service.exports.ndjson import to_ndjson
 from service.exports.negotiation import accepted_export
 from service.exports.netcdf import to_netcdf
-from service.exports.registry import EXPORTS, export_by
 from tests.service.drawn import ENSEMBLES, SATURATED, STEPS, THINNED, WALKERS, draws, job
 
 

@@ -120,8 +120,11 @@ def test_standard_input_is_named(
         ("w3,w1,w2", "did you mean w1 or w2?"),
         ("object_presnt,w1,w2", "did you mean object_present?"),
         ("0.1,w1,w2", "the first line must name the columns"),
+        ("Time;W1;W2", "is the file separated by ';'?"),
         ("time_s;w1;w2", "is the file separated by ';'?"),
         ("time_s\tw1\tw2", "is the file separated by '\\t'?"),
+        ("time_s w1 w2", "is the file separated by ' '?"),
+        ("W1 (V),w1,w2", "did you mean w1?"),
     ],
 )
 def test_hints(
