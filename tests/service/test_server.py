@@ -123,8 +123,9 @@ def test_workers_end_with_a_killed_server(tmp_path: Path) -> None:
     with server(*fake_server(outlive=str(mark))) as (process, address), client(address) as http:
         body = {"sensor": SENSOR, "scene": {}, "frames": FRAMES}
         assert http.post("/v1/posteriors", json=body).status_code == 202
-        while len(workers := children(process.pid)) < 2:
+        while not mark.with_suffix(".begun").exists():
             time.sleep(0.05)
+        workers = children(process.pid)
         process.kill()
         process.wait()
         assert end(*workers)
