@@ -32,6 +32,7 @@ __all__ = [
     "WIDE_SPREAD",
     "Identifiability",
     "contraction_of",
+    "is_positive",
     "spread_of_fit",
     "status_of",
 ]
@@ -100,6 +101,11 @@ def contraction_of(spread: float) -> float:
     return 1 - spread**2 if math.isfinite(spread) else 0.0
 
 
+def is_positive(name: str) -> bool:
+    """Tell whether an unknown of a scene path can only be positive; its logarithm is judged."""
+    return not name.startswith("crosstalk") and not name.endswith(".c1")
+
+
 def spread_of_fit(
     parameters: Parameters, name: str, values: Mapping[str, float], sd: float
 ) -> float:
@@ -133,7 +139,7 @@ def spread_of_fit(
         Where ``name`` is not an unknown of the scene.
     """
     unknown = parameters.unknowns[parameters.names.index(name)]
-    positive = not name.startswith("crosstalk") and not name.endswith(".c1")
+    positive = is_positive(name)
     value = values[name]
     if not (math.isfinite(value) and 0.0 < sd < math.inf) or (positive and not value > 0.0):
         return 1.0

@@ -1,7 +1,7 @@
 """What a fit says of its unknowns and of itself."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,20 +13,14 @@ from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.multistart import Optimum
 from inference.fits.likelihood.problem import FitProblem
 from inference.identifiability.information import Information
+from inference.identifiability.status import is_positive, spread_of_fit, status_of
+from simulator.parameters import Parameters
 
-__all__ = ["FALSE_ALARM", "describe", "entry", "fit_report"]
+__all__ = ["FALSE_ALARM", "describe", "entries", "fit_report"]
 
 Array = NDArray[np.float64]
 
 FALSE_ALARM = 1e-3
-_IDENTIFIED, _WEAK = 0.1, 1.0
-_CROSSTALK = (3, 4)
-
-
-def _typical_light(problem: FitProblem, x: Array) -> float:
-    """Median modulus of the readings net of crosstalk, in the problem's unit."""
-    net = problem.frames[:, :2] - problem.values(x)[3:5]
-    return float(np.median(np.abs(net).max(axis=1)))
 
 
 def describe(
@@ -56,44 +50,56 @@ def describe(
     Returns
     -------
     dict
-        By scene path: ``value`` and ``sd`` (Cramer-Rao bound, ranges eliminated, times ``wider``,
-        or what ``undecided`` asks for) in SI or reading units, and ``status``: identified (sd
-        below a tenth), weak, not_identified (above 1), of the logarithm of what is positive, of
-        crosstalk against the light of the scene.
+        As `entries`; ``sd`` is the Cramer-Rao bound, ranges eliminated, times ``wider``, or what
+        ``undecided`` asks for.
     """
     functionals = problem.chain(top.x)[problem.slots] * problem.units[:, None]
     sds = wider * facts.sd_of(functionals)
     values = problem.natural(top.x)
-    relative = wider * facts.sd
-    for other in undecided:
-        reach = math.sqrt(max(other.deviance - top.deviance, WITHIN))
-        with np.errstate(over="ignore", invalid="ignore"):
-            sds = np.fmax(sds, np.abs(problem.natural(other.x) - values) / reach)
-            relative = np.fmax(relative, np.abs(other.x - top.x) / reach)
-    light = max(_typical_light(problem, top.x), 1e-300)
-    relative = relative / np.where(np.isin(problem.slots, _CROSSTALK), light, 1.0)
-    found: dict[str, Any] = {}
-    for name, value, sd, size in zip(problem.names, values, sds, relative, strict=True):
-        found[name] = entry(float(value), float(sd), float(size))
-    return found
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        ratios = sds / np.abs(values)
+        for other in undecided:
+            reach = math.sqrt(max(other.deviance - top.deviance, WITHIN))
+            there = problem.natural(other.x)
+            sds = np.fmax(sds, np.abs(there - values) / reach)
+            ratios = np.fmax(ratios, np.abs(np.log(there / values)) / reach)
+    columns = zip(values.tolist(), sds.tolist(), ratios.tolist(), strict=True)
+    return entries(problem.parameters, dict(zip(problem.names, columns, strict=True)))
 
 
-def entry(value: float, sd: float, relative: float) -> dict[str, Any]:
-    """Return ``value``, ``sd`` and ``status`` of an unknown that was fitted.
+def entries(
+    parameters: Parameters, found: Mapping[str, tuple[float, float, float]]
+) -> dict[str, Any]:
+    """Return value, standard deviation and status of unknowns that were fitted.
+
+    The fit uses no prior, but `inference.identifiability.status` tells by how much it would narrow
+    the prior that the scene states, or that is its default: identified where what is left is less
+    than 0.2 of the prior's standard deviation, weak up to 0.7, not_identified beyond.
 
     Parameters
     ----------
-    value, sd : float
-        In SI or reading units; None in their place where they are not finite.
-    relative : float
-        Standard deviation of its logarithm, or of crosstalk against the light of the scene.
+    parameters : Parameters
+        The unknowns of the scene with their priors.
+    found : mapping of str to (float, float, float)
+        By scene path, value and standard deviation in SI or reading units, and the standard
+        deviation of the logarithm, which is read of what can only be positive.
+
+    Returns
+    -------
+    dict
+        By scene path ``value``, ``sd`` (None in their place where they are not finite) and
+        ``status``.
     """
-    status = "identified" if relative < _IDENTIFIED else "weak"
-    return {
-        "value": value if math.isfinite(value) else None,
-        "sd": sd if math.isfinite(sd) else None,
-        "status": status if relative < _WEAK else "not_identified",
-    }
+    values = {path: value for path, (value, _, _) in found.items()}
+    answer: dict[str, Any] = {}
+    for path, (value, sd, ratio) in found.items():
+        own = ratio * value if is_positive(path) else sd
+        answer[path] = {
+            "value": value if math.isfinite(value) else None,
+            "sd": sd if math.isfinite(sd) else None,
+            "status": status_of(path, spread_of_fit(parameters, path, values, own)),
+        }
+    return answer
 
 
 def fit_report(

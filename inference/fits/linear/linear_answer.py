@@ -1,7 +1,6 @@
 """From a linear fit to a result: parameters, fit report, ranges that all frames agree upon."""
 
 import functools
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -11,12 +10,13 @@ from scipy import special
 
 from inference.estimates import TechniqueResult
 from inference.fits.answer.ranges import Answer, frame_ranges
-from inference.fits.answer.report import FALSE_ALARM, entry
+from inference.fits.answer.report import FALSE_ALARM, entries
 from inference.fits.likelihood.problem import fit_problem
 from inference.fits.linear.weighted import LinearFit
 from inference.realtime.net import SATURATED, rule_out
 from inference.technique import Task
 from simulator.errors import RefusedError
+from simulator.parameters import parameters_of
 
 __all__ = ["linear_answer", "not_identified", "without_warnings"]
 
@@ -47,15 +47,11 @@ def without_warnings(
     return quiet
 
 
-def _entry(value: float, sd: float, size: float) -> dict[str, Any]:
-    return entry(float(value), float(sd), sd / size if size > 0 else math.inf)
-
-
 def linear_answer(
     name: str,
     task: Task,
     fit: LinearFit,
-    natural: dict[str, tuple[float, Array, float]],
+    natural: dict[str, tuple[float, Array]],
     single: TechniqueResult,
     missing: dict[str, str],
 ) -> TechniqueResult:
@@ -70,8 +66,7 @@ def linear_answer(
     fit : LinearFit
         The fit.
     natural : dict
-        By scene path: value, gradient along the fit's coordinates, and the size against which
-        its standard deviation is judged.
+        By scene path: value, and gradient along the fit's coordinates.
     single : TechniqueResult
         Ranges of single frames; they stand where a parameter is not identified.
     missing : dict
@@ -82,16 +77,18 @@ def linear_answer(
     TechniqueResult
         Ranges by all readings and parameters together where every parameter is identified.
     """
-    numbers = [fit.chi_square, *(value for value, _, _ in natural.values())]
+    numbers = [fit.chi_square, *(value for value, _ in natural.values())]
     if not np.isfinite(numbers).all():
         raise RefusedError(
             "the fit overflows: the readings are too large or too small against gain and noise, or "
             "do not follow the object's law; check them"
         )
-    parameters: dict[str, Any] = {
-        path: _entry(value, float(np.linalg.norm(gradient @ fit.factor)), size)
-        for path, (value, gradient, size) in natural.items()
+    sds = {path: float(np.linalg.norm(slope @ fit.factor)) for path, (_, slope) in natural.items()}
+    found = {
+        path: (float(value), sds[path], float(np.divide(sds[path], abs(value))))
+        for path, (value, _) in natural.items()
     }
+    parameters = entries(parameters_of(task.sensor, task.scene), found)
     parameters |= {path: not_identified(reason) for path, reason in missing.items()}
     freedom = fit.residuals.size - fit.x.size
     p_value = float(special.chdtrc(freedom, fit.chi_square))
@@ -119,7 +116,7 @@ def linear_answer(
     report["optima"] = [
         {
             "excess_deviance": 0.0,
-            "parameters": {path: float(value) for path, (value, _, _) in natural.items()},
+            "parameters": {path: float(value) for path, (value, _) in natural.items()},
         }
     ]
     state = rule_out(task.sensor, task.frames)

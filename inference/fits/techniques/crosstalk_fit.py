@@ -178,11 +178,7 @@ def _solve(task: Task) -> TechniqueResult:
                 "readings; take joint_fit, which starts from everywhere"
             )
         return answer
-    light = float(np.median(np.abs(task.frames.readings - np.median(task.frames.readings, axis=0))))
-    natural = {
-        path: (values[path], np.eye(len(order))[k], light if path != "object.c2" else values[path])
-        for k, path in enumerate(order)
-    }
+    natural = {path: (values[path], np.eye(len(order))[k]) for k, path in enumerate(order)}
     return linear_answer("crosstalk_fit", task, fit, natural, single, {})
 
 

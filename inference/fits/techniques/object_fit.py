@@ -140,18 +140,13 @@ def _open(
     return missing
 
 
-def _natural(x: Array, factor: Array) -> dict[str, tuple[float, Array, float]]:
+def _natural(x: Array, factor: Array) -> dict[str, tuple[float, Array]]:
     """Values of c0, c1, c2 with gradients along the fit's coordinates; ``factor`` is dx/dy."""
     c2, c1, c0 = 1.0 / x[0], x[1] / x[2], x[0] / x[2]
     g0 = (factor[0] - c0 * factor[2]) / x[2]
     g1 = (factor[1] - c1 * factor[2]) / x[2]
     g2 = -c2 * c2 * factor[0]
-    root = math.sqrt(abs(c0))
-    return {
-        "object.c0": (c0, g0, abs(c0)),
-        "object.c1": (c1, g1, c1 + 2 * root),
-        "object.c2": (c2, g2, abs(c2)),
-    }
+    return {"object.c0": (c0, g0), "object.c1": (c1, g1), "object.c2": (c2, g2)}
 
 
 def _solve(task: Task) -> TechniqueResult:

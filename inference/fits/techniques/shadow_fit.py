@@ -93,12 +93,8 @@ def _solve(task: Task) -> TechniqueResult:
         )
     fitted0, fitted1 = 1.0 / y[0], y[1] / y[0]
     natural = {
-        _C0: (fitted0, -fitted0 * fitted0 * to_y[0], fitted0),
-        _C1: (
-            fitted1,
-            (to_y[1] - fitted1 * to_y[0]) / y[0],
-            fitted1 + 2.0 * math.sqrt(fitted0),
-        ),
+        _C0: (fitted0, -fitted0 * fitted0 * to_y[0]),
+        _C1: (fitted1, (to_y[1] - fitted1 * to_y[0]) / y[0]),
     }
     kept = {path: natural[path] for path in unknown}
     return linear_answer("shadow_fit", task, fit, kept, single, {})
@@ -129,7 +125,7 @@ def _solve_strength(task: Task) -> TechniqueResult:
             f"the best fit has a background of strength {value:.3g}; leave the background out of "
             "the scene, or use a posterior with priors"
         )
-    natural = {_STRENGTH: (value, np.ones(1), value)}
+    natural = {_STRENGTH: (value, np.ones(1))}
     return linear_answer("shadow_fit", task, fit, natural, single, {})
 
 
