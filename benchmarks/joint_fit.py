@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from inference.estimate import estimate
-from inference.fits.likelihood.multistart import optimum_from
+from inference.fits.likelihood.maximum import maximum_from
 from inference.fits.likelihood.problem import fit_problem
 from simulator.frames import Frames
 from simulator.object_model import object_flux_slope
@@ -115,7 +115,7 @@ def _thesis(seeds: int) -> None:
             sensor, shown, ranges = _example(frames, seed)
             problem = fit_problem(sensor, SCENE, shown)
             truth = problem.coordinates(np.array([[C0, C1, C2, 1.0, 1.0]]))[0]
-            reference = optimum_from(problem, truth)
+            reference = maximum_from(problem, truth)
             if seed == 0:
                 estimate(sensor, SCENE, shown, ["joint_fit"])
             begin = time.process_time()

@@ -8,7 +8,7 @@ the prior then sees only false valleys, which can lie thousands of nats below th
 import numpy as np
 
 from inference.density.collapsed import CollapsedDensity
-from inference.fits.likelihood.multistart import find_optima
+from inference.fits.likelihood.multistart import find_maxima
 from inference.fits.likelihood.problem import fit_problem
 from inference.posterior.job import Job
 from inference.posterior.sampling.start import Optimum, climb, refine
@@ -42,7 +42,7 @@ def fitted_optima(job: Job, density: CollapsedDensity) -> list[Optimum]:
     problem = fit_problem(job.sensor, job.scene, job.frames.select(job.usable))
     if problem.names != names:
         return []
-    fits = find_optima(problem)
+    fits = find_maxima(problem)
     found = []
     for fit in fits[:_MOST]:
         if not fit.deviance < fits[0].deviance + _DEVIANCE:

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from inference.estimate import estimate
 from inference.fits.answer.determined import LIMIT
-from inference.fits.answer.inflation import widening
+from inference.fits.answer.inflation import inflation
 from inference.fits.likelihood.information import residuals_and_information
-from inference.fits.likelihood.multistart import optimum_from
+from inference.fits.likelihood.maximum import maximum_from
 from inference.fits.likelihood.problem import fit_problem
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor, parse_sensor
@@ -152,10 +152,10 @@ def outcome_of(one: RandomSet) -> Outcome:
     truth = problem.coordinates(np.array([[known[name] for name in problem.names]]))[0]
     _, facts = residuals_and_information(problem, truth, np.log(one.simulation.range_m))
     shared = float(np.median(facts.sd_of(facts.response[problem.present])))
-    reference = optimum_from(problem, truth)
+    reference = maximum_from(problem, truth)
     _, there = residuals_and_information(problem, reference.x, reference.positions)
     if there.rank == len(problem):
-        wider, _ = widening(problem, reference, there)
+        wider, _ = inflation(problem, reference, there)
         own = float(np.median(there.sd_of(there.response[problem.present])))
         shared = max(shared, wider * own)
     found = estimate(one.sensor, one.scene, frames, ["joint_fit"])

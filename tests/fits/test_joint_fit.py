@@ -12,7 +12,8 @@ from inference.estimate import estimate
 from inference.estimates import Status, TechniqueResult
 from inference.fits.answer import likelihood_answer
 from inference.fits.likelihood.information import residuals_and_information
-from inference.fits.likelihood.multistart import Optimum, find_optima, optimum_from
+from inference.fits.likelihood.maximum import Maximum, maximum_from
+from inference.fits.likelihood.multistart import find_maxima
 from inference.fits.likelihood.problem import fit_problem
 from inference.identifiability.experiment import Experiment, information
 from simulator.frames import Frames
@@ -105,8 +106,8 @@ def test_the_example_of_the_thesis(frames: int) -> None:
     shown = data(sensor, truth, trajectory)
     problem = fit_problem(sensor, scene, shown)
     start = problem.coordinates(np.array([[0.1, 10.0, 0.1, 3.0, 3.0]]))[0]
-    at_truth = optimum_from(problem, start)
-    found = find_optima(problem)
+    at_truth = maximum_from(problem, start)
+    found = find_maxima(problem)
     assert found[0].deviance == pytest.approx(at_truth.deviance, abs=0.1)
     freedom = frames - 5
     assert special.chdtri(freedom, 1 - 1e-5) < found[0].deviance < special.chdtri(freedom, 1e-5)
@@ -132,7 +133,7 @@ def test_bounds_are_attained() -> None:
     sets = 60
     for seed in range(sets):
         shown = data(sensor, truth, trajectory, seed)
-        top = optimum_from(fit_problem(sensor, parse_scene(scene), shown), at)
+        top = maximum_from(fit_problem(sensor, parse_scene(scene), shown), at)
         distance += float(np.sum((facts.jacobian @ (top.x - at)) ** 2))
         chi_square += top.deviance
     for value, freedom in ((distance, 5 * sets), (chi_square, 7 * sets)):
@@ -296,10 +297,10 @@ def test_settings_of_the_joint_fit_give_its_answer() -> None:
 def test_walks_without_end_leave_an_answer_in_one_piece(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every walk meets a better optimum: values, bounds and optima are those of the same one."""
 
-    def restless(_: Any, top: Optimum, __: Any) -> tuple[float, Optimum]:
+    def restless(_: Any, top: Maximum, __: Any) -> tuple[float, Maximum]:
         return 1.0, dataclasses.replace(top, x=top.x * (1 + 1e-4), deviance=top.deviance - 1.0)
 
-    monkeypatch.setattr(likelihood_answer, "widening", restless)
+    monkeypatch.setattr(likelihood_answer, "inflation", restless)
     sensor = sensor_of("pulsed")
     result = fitted(sensor, {}, data(sensor, {"object": OBJECT}, path(16)))
     assert result.parameters is not None

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from inference.fits.likelihood.coordinates import bounds_of, chain, physical
+from inference.fits.likelihood.arguments import SLOTS
+from inference.fits.likelihood.coordinates import chain, physical
 from inference.fits.likelihood.polish import _Profile
 from inference.fits.likelihood.problem import FitProblem, fit_problem
-from inference.fits.likelihood.slopes import SLOTS, frame_slopes
-from inference.fits.likelihood.triangle import damped_step, solve_least_squares, triangularise
+from inference.fits.likelihood.triangle import damped_step, reduce_columns, solve_least_squares
 from simulator.scene import parse_scene
 from tests.fits.scenes import OBJECT, VAGUE, WALL, data, path, sensor_of
 
@@ -30,35 +30,6 @@ def problem_of(
 ) -> FitProblem:
     sensor = sensor_of(kind, **noise)
     return fit_problem(sensor, parse_scene(scene), data(sensor, truth, path(14, 2)))
-
-
-@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
-@pytest.mark.parametrize("present", [True, False])
-def test_slopes_are_those_of_central_differences(kind: str, present: bool) -> None:
-    """Truncation h^2 and rounding eps / h are 1e-10 and 1e-11 of the derivatives' size."""
-    problem = problem_of(kind, EVERYTHING, TRUTH)
-    values = np.array([0.07, -0.1, 0.1, 30.0, -20.0, 500.0, 3.0, 0.05, 0.02, 1.3])
-    u = np.log(0.7) if present else np.nan
-    r0, wave = problem.instrument[:2]
-    out, plus, minus = (np.empty((SLOTS + 2, 4)) for _ in range(3))
-    frame_slopes(out, u, values, problem.gain, True, r0, wave)
-    for k in range(SLOTS + 1):
-        if k == SLOTS and not present:
-            assert (out[k] == 0).all()
-            continue
-        h = 1e-5 * (abs(values[k]) if k < SLOTS else 1.0)
-        sides = []
-        for sign, table in ((1.0, plus), (-1.0, minus)):
-            moved = values.copy()
-            if k < SLOTS:
-                moved[k] += sign * h
-            frame_slopes(
-                table, u + (sign * h if k == SLOTS else 0.0), moved, problem.gain, True, r0, wave
-            )
-            sides.append(table[SLOTS + 1].copy())
-        wanted = (sides[0] - sides[1]) / (2 * h)
-        scale = np.abs(out[SLOTS + 1]).max() / (abs(values[k]) if k < SLOTS else 1.0)
-        np.testing.assert_allclose(out[k], wanted, atol=1e-8 * scale, rtol=1e-8)
 
 
 @pytest.mark.parametrize("shadow", ["object", "free"])
@@ -90,13 +61,12 @@ def test_bounds_follow_the_support_of_a_prior() -> None:
     scene = {"object": {"c1": {"prior": "uniform", "low": -0.05, "high": 0.2}}}
     problem = problem_of("pulsed", scene, {"object": OBJECT})
     x = np.array([np.log(0.04), 0.0, -2.0])
-    values, low, high = problem.values(x), np.empty(3), np.empty(3)
-    bounds_of(low, high, values, problem.layout)
-    for end, c1 in ((low, -0.05), (high, 0.2)):
+    values, bounds = problem.values(x), problem.bounds(x)
+    for end, c1 in ((bounds.low, -0.05), (bounds.high, 0.2)):
         x[1] = end[1]
         assert problem.values(x)[1] == pytest.approx(c1, rel=1e-12)
     out = np.empty((SLOTS, 3))
-    chain(out, problem.values(x), x, problem.layout, low, high)
+    chain(out, problem.values(x), x, problem.layout, bounds)
     assert out[1, 0] == 0.0  # a c1 that its bound holds does not move with c0
     assert physical(values, x, problem.layout)
 
@@ -114,7 +84,7 @@ def test_triangles_solve_graded_least_squares() -> None:
         wanted = np.linalg.lstsq(plain, target, rcond=None)[0]
         tolerance = 100 * np.linalg.cond(plain) ** 2 * np.finfo(float).eps
         np.testing.assert_allclose(solution * scales, wanted, rtol=tolerance, atol=tolerance)
-        triangularise(matrix, n)
+        reduce_columns(matrix, n)
         norms = np.linalg.norm(plain * scales, axis=0)
         for damping in (0.0, 0.3):
             damped_step(solution, matrix[:n], norms, damping)
@@ -128,7 +98,7 @@ def test_triangles_solve_graded_least_squares() -> None:
 def test_a_held_coordinate_stays() -> None:
     matrix = np.random.default_rng(1).standard_normal((10, 4))
     matrix[:, 1] = 0.0
-    triangularise(matrix, 3)
+    reduce_columns(matrix, 3)
     step = np.empty(3)
     damped_step(step, matrix[:3], np.array([1.0, 0.0, 1.0]), 0.0)
     assert step[1] == 0.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from inference.fits.answer.motion_seen import numbers_shown
-from inference.fits.likelihood.multistart import Optimum
+from inference.fits.likelihood.maximum import Maximum
 from inference.fits.likelihood.problem import fit_problem
 from simulator.scene import parse_scene
 from tests.fits.scenes import OBJECT, SIGNAL_AT_1M, data, path, sensor_of, values_of
@@ -25,7 +25,7 @@ def shown(
     known = values_of(sensor, {"object": OBJECT})
     truth = problem.coordinates(np.array([[known[name] for name in problem.names]]))[0]
     ranges = np.log(np.linspace(*span, 40))
-    return numbers_shown(problem, Optimum(truth, 0.0, 0.0, ranges))
+    return numbers_shown(problem, Maximum(truth, 0.0, 0.0, ranges))
 
 
 @pytest.mark.parametrize(("span", "numbers"), SHAPES)

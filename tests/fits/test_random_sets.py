@@ -7,12 +7,13 @@ import pytest
 
 from inference.estimate import estimate
 from inference.fits.answer.determined import LIMIT
-from inference.fits.answer.inflation import widening
+from inference.fits.answer.inflation import inflation
 from inference.fits.answer.ranges import WITHIN, Answer, frame_ranges
 from inference.fits.answer.report import describe
-from inference.fits.likelihood.conditional_fit import held, released
+from inference.fits.likelihood.conditional_fit import conditional, unconditional
 from inference.fits.likelihood.information import residuals_and_information
-from inference.fits.likelihood.multistart import find_optima, optimum_from
+from inference.fits.likelihood.maximum import maximum_from
+from inference.fits.likelihood.multistart import find_maxima
 from inference.fits.likelihood.problem import fit_problem
 from tests.fits.random_sets import CLASSES, outcome_of, random_set
 
@@ -52,7 +53,7 @@ def test_values_that_fit_nearly_as_well_and_leave_the_ranges_open_are_a_reason_t
     """The best optimum of this set is sure of ranges that are a quarter too large."""
     one = random_set("free shadow", "pulsed", 52)
     problem = fit_problem(one.sensor, one.scene, one.simulation.frames)
-    best, other = find_optima(problem)[:2]
+    best, other = find_maxima(problem)[:2]
     _, there = residuals_and_information(problem, best.x, best.positions)
     sure = np.median(there.sd_of(there.response[problem.present]))
     truth = np.log(one.simulation.range_m)
@@ -69,9 +70,9 @@ def test_widened_intervals_reach_as_far_as_a_profile_walked_in_small_steps() -> 
     """Set 117 lies in a valley whose wall c0 meets between one doubling of the way and the next."""
     one = random_set("free shadow", "pulsed", 117)
     problem = fit_problem(one.sensor, one.scene, one.simulation.frames)
-    top = find_optima(problem)[0]
+    top = find_maxima(problem)[0]
     _, there = residuals_and_information(problem, top.x, top.positions)
-    wider, better = widening(problem, top, there)
+    wider, better = inflation(problem, top, there)
     assert better is None
     spread = float(np.median(there.sd_of(there.response[problem.present])))
     j, x = problem.names.index("object.c0"), top.x
@@ -79,9 +80,9 @@ def test_widened_intervals_reach_as_far_as_a_profile_walked_in_small_steps() -> 
     while costs[-1] < WITHIN:
         x = x.copy()
         x[j] += 0.02
-        smaller, rest = held(problem, j, x)
-        found = optimum_from(smaller, rest)
-        x = released(problem, smaller, found.x)
+        smaller, rest = conditional(problem, j, x)
+        found = maximum_from(smaller, rest)
+        x = unconditional(problem, smaller, found.x)
         costs.append(found.deviance - top.deviance)
         shifts.append(float(np.mean(found.positions - top.positions)))
     reach = float(np.interp(WITHIN, costs, shifts)) / np.sqrt(WITHIN)
@@ -95,7 +96,7 @@ def test_parameters_reach_as_far_as_optima_that_are_not_decided_against(excess: 
     """In standard deviations by the root of what they cost, inside of 95 % by the interval's."""
     one = random_set("object", "pulsed", 0)
     problem = fit_problem(one.sensor, one.scene, one.simulation.frames)
-    top = find_optima(problem)[0]
+    top = find_maxima(problem)[0]
     _, there = residuals_and_information(problem, top.x, top.positions)
     alone = describe(problem, top, there)
     x = top.x.copy()
@@ -114,7 +115,7 @@ def test_parameters_reach_as_far_as_optima_that_are_not_decided_against(excess: 
 def test_a_mode_merged_with_a_less_certain_one_takes_over_its_interval() -> None:
     one = random_set("object", "pulsed", 0)
     problem = fit_problem(one.sensor, one.scene, one.simulation.frames)
-    top = find_optima(problem)[0]
+    top = find_maxima(problem)[0]
     state = np.zeros(len(one.simulation.frames), dtype=np.uint8)
     sharp, loose = 1e-4 * np.eye(len(problem)), 0.3 * np.eye(len(problem))
     for excess, reached in ((1.0, np.sqrt(1.0 - 1.0 / WITHIN)), (5.0, 0.0)):

@@ -9,15 +9,17 @@ from inference.fits.answer.counts import ranges_needed
 from inference.fits.answer.motion_seen import numbers_shown
 from inference.fits.answer.ranges import WITHIN
 from inference.fits.answer.report import describe
+from inference.fits.likelihood.arguments import CROSSTALK
 from inference.fits.likelihood.information import residuals_and_information
-from inference.fits.likelihood.multistart import Optimum
+from inference.fits.likelihood.maximum import Maximum
 from inference.fits.likelihood.problem import FitProblem
+from inference.frame.sensitivity import Value
 from inference.identifiability.information import Information
 from simulator.errors import RefusedError, listed
 
 __all__ = ["LIMIT", "refuse_if_open", "refuse_if_undetermined"]
 
-_SEEN_WITHOUT_OBJECT = (3, 4, 5, 6)  # crosstalk, strength and distance of the background
+_SEEN_WITHOUT_OBJECT = (*CROSSTALK, Value.STRENGTH, Value.DISTANCE)
 
 _SHOWN = {
     1.0: "the object does not move: all frames read the same but for noise",
@@ -48,14 +50,14 @@ def _less_noise(problem: FitProblem) -> str:
     )
 
 
-def refuse_if_undetermined(problem: FitProblem, top: Optimum, facts: Information) -> None:
+def refuse_if_undetermined(problem: FitProblem, top: Maximum, facts: Information) -> None:
     """Refuse where frames tell fewer numbers than are unknown.
 
     Parameters
     ----------
     problem : FitProblem
         The problem.
-    top : Optimum
+    top : Maximum
         Its best optimum.
     facts : Information
         There.
@@ -74,7 +76,7 @@ def refuse_if_undetermined(problem: FitProblem, top: Optimum, facts: Information
             f"{listed(names or list(problem.names))} cannot be determined (rank {facts.rank} of "
             f"{len(problem)}): {cause}; {_remedy(problem, len(problem) - facts.rank)}"
         )
-    kind = "pulsed" if problem.instrument[1] is None else "sine_wave"
+    kind = "pulsed" if problem.instrument.wave is None else "sine_wave"
     needed = ranges_needed(kind, problem.names, not problem.present.all())
     if shown < needed:
         raise RefusedError(
@@ -86,10 +88,10 @@ def refuse_if_undetermined(problem: FitProblem, top: Optimum, facts: Information
 
 def refuse_if_open(
     problem: FitProblem,
-    top: Optimum,
+    top: Maximum,
     facts: Information,
     wider: float,
-    others: Sequence[tuple[float, Optimum]] = (),
+    others: Sequence[tuple[float, Maximum]] = (),
 ) -> None:
     """Refuse what the frames determine too badly.
 
@@ -97,13 +99,13 @@ def refuse_if_open(
     ----------
     problem : FitProblem
         The problem.
-    top : Optimum
+    top : Maximum
         Its best optimum.
     facts : Information
         There.
     wider : float
-        Factor on all standard deviations (`widening`).
-    others : sequence of (float, Optimum)
+        Factor on all standard deviations (`inflation`).
+    others : sequence of (float, Maximum)
         Optima that are nearly as good, with their deviance above the best.
 
     Raises

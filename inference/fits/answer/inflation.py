@@ -11,12 +11,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.fits.likelihood.conditional_fit import held, released
-from inference.fits.likelihood.multistart import Optimum, optimum_from
+from inference.fits.likelihood.conditional_fit import conditional, unconditional
+from inference.fits.likelihood.maximum import Maximum, maximum_from
 from inference.fits.likelihood.problem import FitProblem
 from inference.identifiability.information import Information
 
-__all__ = ["BETTER", "loosely_told", "shift_of", "widening"]
+__all__ = ["BETTER", "inflation", "loosely_told", "shift_of"]
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,6 @@ _LEAST = 0.01  # below which rounding of an optimum counts
 _FARTHEST = 1.0  # change of the mean log range beyond which nothing more need be known
 BETTER = 0.05  # deviance by which another optimum is better
 _STRIDE = 1.0  # most that a coordinate is moved ahead
-_CROSSTALK = (3, 4)
 
 
 def loosely_told(problem: FitProblem, facts: Information) -> bool:
@@ -42,21 +41,21 @@ def loosely_told(problem: FitProblem, facts: Information) -> bool:
     facts : Information
         At its best optimum.
     """
-    return bool((facts.sd[~np.isin(problem.slots, _CROSSTALK)] >= _LINEAR).any())
+    return bool((facts.sd[problem.logarithms] >= _LINEAR).any())
 
 
-def shift_of(problem: FitProblem, top: Optimum, facts: Information, other: Optimum) -> float:
+def shift_of(problem: FitProblem, top: Maximum, facts: Information, other: Maximum) -> float:
     """Return how far other values shift the ranges, in standard deviations of their common scale.
 
     Parameters
     ----------
     problem : FitProblem
         The problem.
-    top : Optimum
+    top : Maximum
         Its best optimum.
     facts : Information
         There, of full rank.
-    other : Optimum
+    other : Maximum
         Other values.
     """
     present = problem.present & np.isfinite(top.positions) & np.isfinite(other.positions)
@@ -65,21 +64,23 @@ def shift_of(problem: FitProblem, top: Optimum, facts: Information, other: Optim
     return shift / spread if spread > 0.0 else 0.0
 
 
-def widening(problem: FitProblem, top: Optimum, facts: Information) -> tuple[float, Optimum | None]:
+def inflation(
+    problem: FitProblem, top: Maximum, facts: Information
+) -> tuple[float, Maximum | None]:
     """Return by how much standard deviations of the ranges exceed those from curvature.
 
     Parameters
     ----------
     problem : FitProblem
         The problem.
-    top : Optimum
+    top : Maximum
         Its best optimum.
     facts : Information
         There, of full rank.
 
     Returns
     -------
-    (float, Optimum or None)
+    (float, Maximum or None)
         At least 1, and 1 where the unknowns are fixed so well that curvature tells everything;
         and a better optimum, if the walk met one.
     """
@@ -103,8 +104,8 @@ def widening(problem: FitProblem, top: Optimum, facts: Information) -> tuple[flo
 
 
 def _walk(
-    problem: FitProblem, top: Optimum, facts: Information, j: int, sign: float
-) -> tuple[float, Optimum | None]:
+    problem: FitProblem, top: Maximum, facts: Information, j: int, sign: float
+) -> tuple[float, Maximum | None]:
     """Hold one unknown farther and farther out; the shift of the ranges a standard deviation."""
     present = problem.present & np.isfinite(top.positions)
     sd = float(facts.sd[j])
@@ -115,13 +116,13 @@ def _walk(
     for _ in range(_DOUBLINGS):
         start = x.copy()
         start[j] = top.x[j] + sign * min(reach * sd, _STRIDE * reach)
-        smaller, rest = held(problem, j, start)
-        found = optimum_from(smaller, rest)
+        smaller, rest = conditional(problem, j, start)
+        found = maximum_from(smaller, rest)
         if not math.isfinite(found.deviance):
             break
         cost = found.deviance - top.deviance
         if cost < -BETTER:
-            better = optimum_from(problem, released(problem, smaller, found.x))
+            better = maximum_from(problem, unconditional(problem, smaller, found.x))
             return widest, better if better.deviance < top.deviance else None
         shift = abs(float(np.mean(found.positions[present] - top.positions[present])))
         if cost > _LEAST:
@@ -129,7 +130,7 @@ def _walk(
         if shift > _FARTHEST or _ENOUGH <= cost < 2.0 * _ENOUGH:
             break
         if cost < _ENOUGH:
-            near, x = reach, released(problem, smaller, found.x)
+            near, x = reach, unconditional(problem, smaller, found.x)
         else:
             far, halvings = reach, halvings + 1
         if halvings > _HALVINGS:

@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
 from inference.fits.answer.determined import refuse_if_open, refuse_if_undetermined
-from inference.fits.answer.inflation import shift_of, widening
-from inference.fits.answer.profile_scan import elsewhere
+from inference.fits.answer.inflation import inflation, shift_of
+from inference.fits.answer.profile_scan import profile_scan
 from inference.fits.answer.ranges import DECIDED, WITHIN, Answer, frame_ranges
 from inference.fits.answer.report import describe, fit_report
 from inference.fits.likelihood.information import residuals_and_information
-from inference.fits.likelihood.multistart import Optimum, optimum_from
+from inference.fits.likelihood.maximum import Maximum, maximum_from
 from inference.fits.likelihood.problem import FitProblem, fit_problem
 from inference.realtime.net import SATURATED, rule_out
 from inference.technique import Task
@@ -45,11 +45,11 @@ def likelihood_answer_from(name: str, task: Task, values: dict[str, float]) -> T
     x = problem.coordinates(np.array([[values[path] for path in problem.names]]))[0]
     if not np.isfinite(x).all():
         raise RefusedError("the best fit is no object: a size or reflectance is not positive")
-    return likelihood_answer(name, problem, [optimum_from(problem, x)], state)
+    return likelihood_answer(name, problem, [maximum_from(problem, x)], state)
 
 
 def likelihood_answer(
-    name: str, problem: FitProblem, found: Iterable[Optimum], state: NDArray[np.uint8]
+    name: str, problem: FitProblem, found: Iterable[Maximum], state: NDArray[np.uint8]
 ) -> TechniqueResult:
     """Build the result of a fit by likelihood.
 
@@ -59,7 +59,7 @@ def likelihood_answer(
         The technique.
     problem : FitProblem
         With the frames that were fitted.
-    found : iterable of Optimum
+    found : iterable of Maximum
         The best first.
     state : ndarray of uint8, shape (frames of the request,)
         What rules frames out (`inference.realtime.net.rule_out`).
@@ -80,14 +80,14 @@ def likelihood_answer(
             "no values of the unknowns give the readings a likelihood that can be computed; check "
             "gain, noise and range_m"
         )
-    points: list[Optimum] = []
+    points: list[Maximum] = []
     for walk in range(_WALKS + 1):
         top = optima[0]
         _, facts = residuals_and_information(problem, top.x, top.positions)
         refuse_if_undetermined(problem, top, facts)
-        wider, better = widening(problem, top, facts)
+        wider, better = inflation(problem, top, facts)
         if better is None:
-            points, better = elsewhere(problem, top, facts)
+            points, better = profile_scan(problem, top, facts)
         if better is None or walk == _WALKS:
             break
         # the old one lies in the same valley, on the way to this

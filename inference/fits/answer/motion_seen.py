@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from inference.fits.likelihood.multistart import Optimum
+from inference.fits.likelihood.maximum import Maximum
 from inference.fits.likelihood.problem import FitProblem
-from inference.fits.linear.weighted import whitener_of
+from inference.frame.noise import covariances, whiteners
+from inference.frame.sensitivity import Value
+from simulator.readings import object_readings
 
 __all__ = ["numbers_shown"]
 
@@ -25,14 +27,14 @@ _FALSE_ALARM = 1e-3  # of finding motion or a bend where there is none
 _TURNS = 10  # of the line, whose weights depend on its direction
 
 
-def numbers_shown(problem: FitProblem, top: Optimum) -> float:
+def numbers_shown(problem: FitProblem, top: Maximum) -> float:
     """Return how many numbers the frames with an object tell at most, as far as can be told.
 
     Parameters
     ----------
     problem : FitProblem
         The problem.
-    top : Optimum
+    top : Maximum
         Its best optimum, which gives the object's part of the readings: to it the relative error
         belongs.
 
@@ -46,43 +48,37 @@ def numbers_shown(problem: FitProblem, top: Optimum) -> float:
     if not shown.any() or np.ptp(problem.frames[shown, 2]) > 0:
         return math.inf
     readings = problem.frames[shown, :2]
-    own, signal = _noise(problem, top, shown)
+    signal = _signal(problem, top, shown)
     if not np.isfinite(signal).all():
         return math.inf
     freedom = 2 * max(len(readings) - 1, 1)
     miss = readings - readings.mean(axis=0)
-    white = np.einsum("nij,nj->ni", whitener_of(own, signal[None]), miss)
+    white = np.einsum("nij,nj->ni", whiteners(problem.instrument, readings, signal), miss)
     if np.square(white).sum() < special.chdtri(freedom, _FALSE_ALARM):
         return 1.0
     if len(readings) < 3:
         return 2.0
-    read = np.asarray(problem.instrument[2])
-    off = _off_a_line(readings / read, own / read / read[:, None], signal / read)
+    read = np.asarray(problem.instrument.read)
+    covariance = covariances(problem.instrument, readings, signal) / read / read[:, None]
+    off = _off_a_line(readings / read, covariance)
     return 2.0 if off < special.chdtri(len(readings) - 2, _FALSE_ALARM) else math.inf
 
 
-def _noise(problem: FitProblem, top: Optimum, shown: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return the readings' own covariances, (m, 2, 2), and their relative error, (m, 2)."""
-    r0, wave, read, shot, relative = problem.instrument
-    frames = problem.frames[shown]
-    light = (shot or 0.0) * np.abs(frames[:, :2])
-    own = np.zeros((len(frames), 2, 2))
-    own[:, 0, 0], own[:, 1, 1] = (np.square(read) + light).T
-    if wave is None:
-        own[:, 0, 1] = own[:, 1, 0] = light.min(axis=1)
-    c0, c1, c2 = problem.values(top.x)[:3]
-    r = np.exp(top.positions[shown])
-    with np.errstate(all="ignore"):
-        size = problem.gain * frames[:, 2] * c0 * c2 / (r * r * (r * (r + c1) + c0))
-    if wave is None:
-        carrier = np.stack([np.minimum(r / r0, 1.0), np.ones_like(r)], axis=1)
-    else:
-        phase = wave[0] * r + wave[1]
-        carrier = np.stack([np.cos(phase), np.sin(phase)], axis=1)
-    return own, (relative or 0.0) * size[:, None] * carrier
+def _signal(problem: FitProblem, top: Maximum, shown: NDArray[np.bool_]) -> Array:
+    """Return the object's part of the readings, shape (m, 2)."""
+    c0, c1, c2 = problem.values(top.x)[: Value.CROSSTALK_1].tolist()
+    r0, wave = problem.instrument.r0, problem.instrument.wave
+    strengths = problem.gain * problem.frames[shown, 2] * c0 * c2
+    ranges = np.exp(top.positions[shown])
+    return np.array(
+        [
+            object_readings(r, r0, wave, strength, c0, c1)
+            for r, strength in zip(ranges.tolist(), strengths.tolist(), strict=True)
+        ]
+    )
 
 
-def _off_a_line(readings: Array, own: Array, signal: Array) -> float:
+def _off_a_line(readings: Array, covariance: Array) -> float:
     """Return the chi-square of the readings' distances from the straight line nearest to them.
 
     All in units of the read noise, in which a line's weights hardly depend on its direction.
@@ -92,7 +88,7 @@ def _off_a_line(readings: Array, own: Array, signal: Array) -> float:
         miss = readings - np.average(readings, axis=0, weights=weight)
         # the direction with the least weighted variance, which no sum of squares loses
         across = np.linalg.svd(np.sqrt(weight)[:, None] * miss, full_matrices=False)[2][1]
-        variance = np.einsum("i,nij,j->n", across, own, across) + np.square(signal @ across)
+        variance = np.einsum("i,nij,j->n", across, covariance, across)
         weight = 1.0 / variance
         least = min(least, float(weight @ np.square(miss @ across)))
     return least

@@ -12,58 +12,58 @@ from scipy import special
 
 from inference.fits.answer.inflation import BETTER, loosely_told
 from inference.fits.answer.ranges import DECIDED
-from inference.fits.likelihood.conditional_fit import held, released
-from inference.fits.likelihood.multistart import BREADTH, Optimum, climb_from, optimum_from
+from inference.fits.likelihood.conditional_fit import conditional, unconditional
+from inference.fits.likelihood.maximum import Maximum, approach, maximum_from
+from inference.fits.likelihood.multistart import BREADTH
 from inference.fits.likelihood.problem import FitProblem
 from inference.identifiability.information import Information
 
-__all__ = ["elsewhere"]
+__all__ = ["profile_scan"]
 
 Array = NDArray[np.float64]
 
 _QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
 _STEPS = 50
-_CROSSTALK = (3, 4)
 
 
-def elsewhere(
-    problem: FitProblem, top: Optimum, facts: Information
-) -> tuple[list[Optimum], Optimum | None]:
+def profile_scan(
+    problem: FitProblem, top: Maximum, facts: Information
+) -> tuple[list[Maximum], Maximum | None]:
     """Look for values far from the best optimum that are nearly as good.
 
     Parameters
     ----------
     problem : FitProblem
         The problem.
-    top : Optimum
+    top : Maximum
         Its best optimum.
     facts : Information
         There, of full rank.
 
     Returns
     -------
-    (list of Optimum, Optimum or None)
+    (list of Maximum, Maximum or None)
         Points of the whole problem, optimal but for one unknown each, that are not decided
         against; and a better optimum, if one was met.
     """
-    found: list[Optimum] = []
+    found: list[Maximum] = []
     if len(problem) < 2 or not loosely_told(problem, facts):
         return found, None
-    for j in np.flatnonzero(~np.isin(problem.slots, _CROSSTALK)).tolist():
+    for j in np.flatnonzero(problem.logarithms).tolist():
         for value in _spread_over_prior(problem, j):
             x = top.x.copy()
             x[j] = value
-            smaller, rest = held(problem, j, x)
-            there = climb_from(smaller, rest, _STEPS)
+            smaller, rest = conditional(problem, j, x)
+            there = approach(smaller, rest, _STEPS)
             excess = there.deviance - top.deviance
             if not excess <= DECIDED:
                 continue
-            whole = released(problem, smaller, there.x)
+            whole = unconditional(problem, smaller, there.x)
             if excess < -BETTER:
-                better = optimum_from(problem, whole)
+                better = maximum_from(problem, whole)
                 if better.deviance < top.deviance:
                     return found, better
-            found.append(Optimum(whole, there.deviance, there.remaining, there.positions))
+            found.append(Maximum(whole, there.deviance, there.remaining, there.positions))
     return found, None
 
 

@@ -10,7 +10,7 @@ from scipy import special
 
 from inference.fits.answer.ranges import WITHIN
 from inference.fits.likelihood.information import residuals_and_information
-from inference.fits.likelihood.multistart import Optimum
+from inference.fits.likelihood.maximum import Maximum
 from inference.fits.likelihood.problem import FitProblem
 from inference.identifiability.information import Information
 from inference.identifiability.status import is_positive, spread_of_fit, status_of
@@ -25,10 +25,10 @@ FALSE_ALARM = 1e-3
 
 def describe(
     problem: FitProblem,
-    top: Optimum,
+    top: Maximum,
     facts: Information,
     wider: float = 1.0,
-    undecided: Sequence[Optimum] = (),
+    undecided: Sequence[Maximum] = (),
 ) -> dict[str, Any]:
     """Return value, standard deviation and status of every unknown.
 
@@ -36,13 +36,13 @@ def describe(
     ----------
     problem : FitProblem
         The problem.
-    top : Optimum
+    top : Maximum
         Its best optimum.
     facts : Information
         There.
     wider : float
-        Factor on all standard deviations (`widening`).
-    undecided : sequence of Optimum
+        Factor on all standard deviations (`inflation`).
+    undecided : sequence of Maximum
         Other values that are not decided against: standard deviations are widened until such
         values lie as far out as their deviance says, or in the interval of 95 % if that reaches
         them.
@@ -103,7 +103,7 @@ def entries(
 
 
 def fit_report(
-    problem: FitProblem, optima: Sequence[Optimum], facts: Information, wider: float
+    problem: FitProblem, optima: Sequence[Maximum], facts: Information, wider: float
 ) -> dict[str, Any]:
     """Return how well a fit explains the frames.
 
@@ -111,12 +111,12 @@ def fit_report(
     ----------
     problem : FitProblem
         The problem.
-    optima : sequence of Optimum
+    optima : sequence of Maximum
         Distinct ones, the best first.
     facts : Information
         At the best.
     wider : float
-        Factor on all standard deviations (`widening`).
+        Factor on all standard deviations (`inflation`).
 
     Returns
     -------

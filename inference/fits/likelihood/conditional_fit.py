@@ -5,15 +5,15 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.fits.likelihood.coordinates import KNOWN, SAME
+from inference.fits.likelihood.coordinates import KNOWN
 from inference.fits.likelihood.problem import FitProblem
 
-__all__ = ["held", "released"]
+__all__ = ["conditional", "unconditional"]
 
 Array = NDArray[np.float64]
 
 
-def held(problem: FitProblem, j: int, x: Array) -> tuple[FitProblem, Array]:
+def conditional(problem: FitProblem, j: int, x: Array) -> tuple[FitProblem, Array]:
     """Return the problem with one unknown held, and the coordinates of the others.
 
     Parameters
@@ -30,31 +30,28 @@ def held(problem: FitProblem, j: int, x: Array) -> tuple[FitProblem, Array]:
     (FitProblem, ndarray)
         Of d - 1 unknowns.
     """
-    values = problem.values(x)
-    index, known = problem.layout[0].copy(), problem.layout[1].copy()
-    slot = int(problem.slots[j])
+    layout, slot = problem.layout, int(problem.slots[j])
+    index, known = layout.coordinate.copy(), layout.known.copy()
     index[index > j] -= 1
     index[slot] = KNOWN
-    known[slot] = values[slot]
-    if problem.layout[0][7] == SAME:
-        index[7:] = SAME
+    known[slot] = problem.values(x)[slot]
     keep = np.arange(x.size) != j
     smaller = dataclasses.replace(
         problem,
         names=tuple(name for name, kept in zip(problem.names, keep, strict=True) if kept),
         slots=problem.slots[keep],
-        layout=(index, known, *problem.layout[2:]),
+        layout=layout._replace(coordinate=index, known=known),
     )
     return smaller, x[keep]
 
 
-def released(problem: FitProblem, smaller: FitProblem, x: Array) -> Array:
+def unconditional(problem: FitProblem, smaller: FitProblem, x: Array) -> Array:
     """Return the coordinates of the whole problem for those with one unknown held.
 
     Parameters
     ----------
     problem, smaller : FitProblem
-        The whole problem, and that of `held`.
+        The whole problem, and that of `conditional`.
     x : ndarray, shape (d - 1,)
         Coordinates of the smaller one.
 

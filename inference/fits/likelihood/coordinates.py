@@ -9,17 +9,17 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.fits.likelihood.slopes import SLOTS
+from inference.fits.likelihood.arguments import CROSSTALK, SLOTS, Bounds, Layout, Place
+from inference.frame.sensitivity import Value
 from simulator.compiled import compiled
 
-__all__ = ["KNOWN", "SAME", "Layout", "bounds_of", "chain", "physical"]
+__all__ = ["KNOWN", "SAME", "SHAPES", "bounds_of", "chain", "move_inside", "physical"]
 
 Array = NDArray[np.float64]
-# index of each slot's coordinate (KNOWN: a known number, SAME: the object's), known numbers, and
-# the least and largest physical value of each slot
-Layout = tuple[NDArray[np.int64], Array, Array, Array]
 
 KNOWN, SAME = -1, -2
+SHAPES = (Value.C1, Value.SHADOW_C1)  # each with its c0 before it
+_SHADOW = int(Value.SHADOW_C0 - Value.C0)  # from a number of the object to that of its shadow
 _TIGHTEST = -13.0  # log(1 + c1 / (2 sqrt c0)): a part in half a million above the poles
 
 
@@ -30,57 +30,57 @@ def _shape(c0: float, x: float) -> float:
 
 @compiled
 def physical(values: Array, x: Array, layout: Layout) -> bool:
-    """Fill the values of all slots; tell whether they are numbers.
+    """Fill the physical values; tell whether they are numbers.
 
     Parameters
     ----------
-    values : ndarray, shape (at least SLOTS,)
+    values : ndarray, shape (SLOTS,)
         Filled.
     x : ndarray, shape (d,)
         Coordinates.
     layout : Layout
-        Which slot is which coordinate.
+        Which value is which coordinate.
     """
-    index, known = layout[0], layout[1]
     for k in range(SLOTS):
-        j = index[k]
+        j = layout.coordinate[k]
         if j == KNOWN:
-            values[k] = known[k]
+            values[k] = layout.known[k]
         elif j == SAME:
-            values[k] = values[k - 7]
-        elif k == 3 or k == 4:
+            values[k] = values[k - _SHADOW]
+        elif k in CROSSTALK:
             values[k] = x[j]
-        elif k == 1 or k == 8:
+        elif k in SHAPES:
             values[k] = _shape(values[k - 1], x[j])
         else:
             values[k] = math.exp(x[j])
-    good = values[0] > 0.0 and values[2] > 0.0
+    good = values[Value.C0] > 0.0 and values[Value.C2] > 0.0
     for k in range(SLOTS):
         good = good and math.isfinite(values[k])
     return bool(good)
 
 
 @compiled
-def bounds_of(low: Array, high: Array, values: Array, layout: Layout) -> None:
+def bounds_of(bounds: Bounds, values: Array, layout: Layout) -> None:
     """Fill the least and largest value of each coordinate.
 
     Parameters
     ----------
-    low, high : ndarray, shape (d,)
+    bounds : Bounds
         Filled.
     values : ndarray
         From `physical`: the bounds of a shape c1 move with c0.
     layout : Layout
-        Which slot is which coordinate.
+        Which value is which coordinate.
     """
-    index, _, least, largest = layout
+    low, high = bounds
+    least, largest = layout.least, layout.largest
     for k in range(SLOTS):
-        j = index[k]
+        j = layout.coordinate[k]
         if j < 0:
             continue
-        if k == 3 or k == 4:
+        if k in CROSSTALK:
             low[j], high[j] = least[k], largest[k]
-        elif k == 1 or k == 8:
+        elif k in SHAPES:
             root = 2.0 * math.sqrt(values[k - 1])
             low[j], high[j] = _TIGHTEST, math.inf
             if least[k] > root * math.expm1(_TIGHTEST):
@@ -93,31 +93,41 @@ def bounds_of(low: Array, high: Array, values: Array, layout: Layout) -> None:
 
 
 @compiled
-def chain(out: Array, values: Array, x: Array, layout: Layout, low: Array, high: Array) -> None:
-    """Fill the derivative of every slot along every coordinate.
+def move_inside(place: Place, bounds: Bounds, layout: Layout) -> bool:
+    """Move coordinates into their bounds and fill both; tell whether the values are numbers."""
+    x = place.x
+    physical(place.values, x, layout)
+    bounds_of(bounds, place.values, layout)
+    for j in range(x.size):
+        x[j] = min(max(x[j], bounds.low[j]), bounds.high[j])
+    return physical(place.values, x, layout)
+
+
+@compiled
+def chain(out: Array, values: Array, x: Array, layout: Layout, bounds: Bounds) -> None:
+    """Fill the derivative of every physical value along every coordinate.
 
     Parameters
     ----------
     out : ndarray, shape (SLOTS, d)
         Filled.
-    values, x, layout, low, high
+    values, x, layout, bounds
         From and for `physical` and `bounds_of`.
     """
-    index = layout[0]
     out[:] = 0.0
     for k in range(SLOTS):
-        j = index[k]
+        j = layout.coordinate[k]
         if j == SAME:
             for i in range(out.shape[1]):
-                out[k, i] = out[k - 7, i]
+                out[k, i] = out[k - _SHADOW, i]
         elif j >= 0:
-            if k == 3 or k == 4:
+            if k in CROSSTALK:
                 out[k, j] = 1.0
-            elif k == 1 or k == 8:
+            elif k in SHAPES:
                 out[k, j] = values[k] + 2.0 * math.sqrt(values[k - 1])
                 # a c1 that its own bound holds does not move with c0
-                held = x[j] <= low[j] or x[j] >= high[j]
-                if not held:
+                fixed = x[j] <= bounds.low[j] or x[j] >= bounds.high[j]
+                if not fixed:
                     for i in range(out.shape[1]):
                         out[k, i] += 0.5 * values[k] / values[k - 1] * out[k - 1, i]
             else:

@@ -1,7 +1,5 @@
 """Residuals, rank and Cramer-Rao bounds of a fit at one point."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,21 +35,14 @@ def residuals_and_information(
     """
     n, d = problem.frames.shape[0], len(problem)
     jacobian, along, residual = np.empty((n, 2, d)), np.empty((n, 2)), np.empty((n, 2))
-    values = problem.values(x)
-    near, far = problem.support
-    if problem.background is not None:
-        near = max(near, -float(values[8]))
+    positions = np.ascontiguousarray(positions)
     whitened_slopes(
         jacobian,
         along,
         residual,
-        values,
+        problem.values(x),
         problem.chain(x),
-        np.ascontiguousarray(positions),
-        problem.frames,
-        (math.log(near) + 1e-9, math.log(far) - 1e-9),
-        problem.gain,
-        problem.background,
-        *problem.instrument,
+        positions,
+        problem.kernel_fit(),
     )
     return residual, eliminate(problem.names, jacobian, along)

@@ -12,59 +12,62 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.density.gaussian import Pair
-from inference.fits.likelihood.slopes import SLOTS, frame_slopes
+from inference.fits.likelihood.arguments import SLOTS, Bounds, Fit, Place
+from inference.fits.likelihood.coordinates import bounds_of, chain
+from inference.fits.likelihood.deviance import POSITION, nearest_range
+from inference.frame.arguments import Instrument, Pair
+from inference.frame.noise import NoiseParts, Triangle, noise_of, whitener
+from inference.frame.sensitivity import SLOPES, Value, fill_slopes
 from simulator.compiled import compiled
-from simulator.readings import noise_parts
 
-__all__ = ["linearise", "whitened_slopes"]
+__all__ = ["fill_projected", "rows_of", "whitened_slopes"]
 
 Array = NDArray[np.float64]
 
+# columns of frames, and of slopes: the readings, then the object's part of them
+_FIRST, _SECOND, _GAIN = 0, 1, 2
+_SIGNAL_1, _SIGNAL_2 = 2, 3
+_READINGS = 2  # rows of a frame that are whitened readings
+_ALL = 5  # rows where the covariance tells something, too
+_EDGE = 1e-9  # in log r from the end of its support, where a range cannot give way
+
 
 @compiled
-def _whiten(
+def rows_of(frames: int, instrument: Instrument) -> int:
+    """Return how many rows so many frames have."""
+    return frames * (_READINGS if instrument.shot is None else _ALL)
+
+
+@compiled
+def _add_covariance(
     rows: Array,
     slopes: Array,
-    frame: Pair,
-    read: Pair,
+    noise: NoiseParts,
+    white: Triangle,
+    pulsed: bool,
     shot: float | None,
     relative: float | None,
-    pulsed: bool,
 ) -> None:
-    """Fill one frame's rows: columns are slots, log r, and last the residual."""
-    top = SLOTS + 1
-    mean = (slopes[top, 0], slopes[top, 1])
-    signal = (slopes[top, 2], slopes[top, 3])
-    own1, own2, shared, s1, s2 = noise_parts(read, shot, relative, pulsed, mean, signal)
-    first = own1 + shared + s1 * s1
-    cross = shared + s1 * s2
-    # the determinant as a sum of squares: nothing cancels (`inference.density.integrand`)
-    determinant = own1 * own2 + shared * (own1 + own2) + own2 * s1 * s1 + own1 * s2 * s2
-    determinant += shared * (s1 - s2) ** 2
-    root = math.sqrt(first)
-    i11, i22 = 1.0 / root, root / math.sqrt(determinant)
-    i21 = -cross / root / math.sqrt(determinant)
-    w1 = i11 * (frame[0] - mean[0])
-    w2 = i21 * (frame[0] - mean[0]) + i22 * (frame[1] - mean[1])
-    rows[0, top], rows[1, top] = w1, w2
-    for k in range(top):
-        rows[0, k] = i11 * slopes[k, 0]
-        rows[1, k] = i21 * slopes[k, 0] + i22 * slopes[k, 1]
+    """Fill the rows of what the covariance tells, those of the readings given."""
     if shot is not None and relative is not None:
         half = math.sqrt(0.5)
+        i11, i21, i22 = white
+        s1, s2 = noise.common1, noise.common2
+        top = Value.READINGS
+        mean1, mean2 = slopes[top, _FIRST], slopes[top, _SECOND]
+        w1, w2 = rows[0, top], rows[1, top]
         rows[2, top], rows[3, top], rows[4, top] = (
             half * (w1 * w1 - 1.0),
             half * (w2 * w2 - 1.0),
             w1 * w2,
         )
-        for k in range(top):
-            d1 = shot * slopes[k, 0] * math.copysign(1.0, mean[0])
-            d2 = shot * slopes[k, 1] * math.copysign(1.0, mean[1])
+        for k in range(Value.READINGS):
+            d1 = shot * slopes[k, _FIRST] * math.copysign(1.0, mean1)
+            d2 = shot * slopes[k, _SECOND] * math.copysign(1.0, mean2)
             d12 = 0.0
             if pulsed:
-                d12 = d1 if abs(mean[0]) < abs(mean[1]) else d2
-            t1, t2 = relative * slopes[k, 2], relative * slopes[k, 3]
+                d12 = d1 if abs(mean1) < abs(mean2) else d2
+            t1, t2 = relative * slopes[k, _SIGNAL_1], relative * slopes[k, _SIGNAL_2]
             v11, v22 = d1 + 2.0 * s1 * t1, d2 + 2.0 * s2 * t2
             v12 = d12 + s1 * t2 + s2 * t1
             a11 = i11 * i11 * v11
@@ -74,75 +77,88 @@ def _whiten(
 
 
 @compiled
-def _along_coordinates(out: Array, rows: Array, a: int, slopes_of_values: Array) -> None:
-    """Fill one whitened row along the coordinates from that along the slots."""
-    for j in range(slopes_of_values.shape[1]):
+def _whiten(rows: Array, slopes: Array, frame: Pair, instrument: Instrument) -> None:
+    """Fill one frame's rows; columns are those of `Value`, the residual in place of readings."""
+    top = Value.READINGS
+    mean = (slopes[top, _FIRST], slopes[top, _SECOND])
+    noise = noise_of(mean, (slopes[top, _SIGNAL_1], slopes[top, _SIGNAL_2]), instrument)
+    white = whitener(noise)
+    i11, i21, i22 = white
+    e1, e2 = frame[0] - mean[0], frame[1] - mean[1]
+    rows[0, top], rows[1, top] = i11 * e1, i21 * e1 + i22 * e2
+    for k in range(Value.READINGS):
+        rows[0, k] = i11 * slopes[k, _FIRST]
+        rows[1, k] = i21 * slopes[k, _FIRST] + i22 * slopes[k, _SECOND]
+    pulsed = instrument.wave is None
+    _add_covariance(rows, slopes, noise, white, pulsed, instrument.shot, instrument.relative)
+
+
+@compiled
+def _fill_frame(rows: Array, slopes: Array, i: int, u: float, values: Array, fit: Fit) -> None:
+    """Fill the slopes and the whitened rows of frame i at log range u."""
+    frame, instrument = fit.data.frames[i], fit.instrument
+    fill_slopes(slopes, u, values, fit.gain, frame[_GAIN], fit.background, instrument)
+    _whiten(rows, slopes, (frame[_FIRST], frame[_SECOND]), instrument)
+
+
+@compiled
+def _along_coordinates(out: Array, rows: Array, a: int, chained: Array) -> None:
+    """Fill one whitened row along the coordinates from that along the physical values."""
+    for j in range(chained.shape[1]):
         total = 0.0
         for k in range(SLOTS):
-            total += rows[a, k] * slopes_of_values[k, j]
+            total += rows[a, k] * chained[k, j]
         out[j] = total
 
 
 @compiled
-def linearise(
-    matrix: Array,
-    values: Array,
-    slopes_of_values: Array,
-    positions: Array,
-    frames: Array,
-    inside: Pair,
-    gain: float,
-    background: bool | None,
-    r0: float,
-    wave: Pair | None,
-    read: Pair,
-    shot: float | None,
-    relative: float | None,
-) -> None:
-    """Fill the projected rows of all frames.
+def _gives_way(u: float, values: Array, fit: Fit) -> bool:
+    """Tell whether a range lies within its support, not at an end of it."""
+    near, far = fit.support
+    near = nearest_range(values, near, fit.background)
+    return math.log(near) + _EDGE < u < math.log(far) - _EDGE
+
+
+@compiled
+def fill_projected(matrix: Array, place: Place, bounds: Bounds, fit: Fit) -> None:
+    """Fill the projected rows of all frames, and the bounds.
 
     Parameters
     ----------
-    matrix : ndarray, shape (frames * m, d + 1)
-        m is 5 where noise depends on the mean, else 2. Filled: slopes of the model along each
-        coordinate, and the residuals.
-    values : ndarray, shape (SLOTS + 1,)
-        Physical values (`coordinates.physical`); the last entry is work space.
-    slopes_of_values : ndarray, shape (SLOTS, d)
-        From `coordinates.chain`.
-    positions : ndarray, shape (frames,)
-        log r; nan without an object.
-    frames : ndarray, shape (frames, 3)
-        Readings and gain factor.
-    inside : (float, float)
-        log r beyond which a range lies at the end of its support and cannot give way.
-    gain, background, r0, wave, read, shot, relative
-        Sensor and scene.
+    matrix : ndarray, shape (`rows_of` the frames, d + 1)
+        Filled: slopes of the model along each coordinate, and the residuals.
+    place : Place
+        From `deviance`.
+    bounds : Bounds
+        Filled.
+    fit : Fit
+        The fit.
     """
-    d = slopes_of_values.shape[1]
-    m = 2 if shot is None else 5
-    slopes = np.empty((SLOTS + 2, 4))
-    rows = np.zeros((5, SLOTS + 2))
-    for i in range(frames.shape[0]):
-        u = positions[i]
-        values[SLOTS] = frames[i, 2]
-        frame_slopes(slopes, u, values, gain, background, r0, wave)
-        _whiten(rows, slopes, (frames[i, 0], frames[i, 1]), read, shot, relative, wave is None)
+    values, d = place.values, place.x.size
+    bounds_of(bounds, values, fit.layout)
+    chained = np.empty((SLOTS, d))
+    chain(chained, values, place.x, fit.layout, bounds)
+    n = fit.data.frames.shape[0]
+    m = matrix.shape[0] // n
+    slopes, rows = np.empty((SLOPES, 4)), np.zeros((_ALL, SLOPES))
+    for i in range(n):
+        u = place.best[0, i, POSITION]
+        _fill_frame(rows, slopes, i, u, values, fit)
         first = i * m
         length = 0.0
         for a in range(m):
-            _along_coordinates(matrix[first + a], rows, a, slopes_of_values)
-            matrix[first + a, d] = rows[a, SLOTS + 1]
-            length += rows[a, SLOTS] ** 2
-        if not (math.isfinite(u) and length > 0.0 and inside[0] < u < inside[1]):
+            _along_coordinates(matrix[first + a], rows, a, chained)
+            matrix[first + a, d] = rows[a, Value.READINGS]
+            length += rows[a, Value.LOG_RANGE] ** 2
+        if not (math.isfinite(u) and length > 0.0 and _gives_way(u, values, fit)):
             continue
         for j in range(d + 1):
             along = 0.0
             for a in range(m):
-                along += rows[a, SLOTS] * matrix[first + a, j]
+                along += rows[a, Value.LOG_RANGE] * matrix[first + a, j]
             along /= length
             for a in range(m):
-                matrix[first + a, j] -= along * rows[a, SLOTS]
+                matrix[first + a, j] -= along * rows[a, Value.LOG_RANGE]
 
 
 @compiled
@@ -151,17 +167,9 @@ def whitened_slopes(
     along_range: Array,
     residual: Array,
     values: Array,
-    slopes_of_values: Array,
+    chained: Array,
     positions: Array,
-    frames: Array,
-    inside: Pair,
-    gain: float,
-    background: bool | None,
-    r0: float,
-    wave: Pair | None,
-    read: Pair,
-    shot: float | None,
-    relative: float | None,
+    fit: Fit,
 ) -> None:
     """Fill whitened residuals of the readings and their model's slopes, nothing projected out.
 
@@ -173,21 +181,23 @@ def whitened_slopes(
         Filled: along log r; 0 for a range at the end of its support, nan without an object.
     residual : ndarray, shape (frames, 2)
         Filled.
-    values, slopes_of_values, positions, frames, inside
-        As for `linearise`.
-    gain, background, r0, wave, read, shot, relative
-        Sensor and scene.
+    values : ndarray, shape (SLOTS,)
+        From `coordinates.physical`.
+    chained : ndarray, shape (SLOTS, d)
+        From `coordinates.chain`.
+    positions : ndarray, shape (frames,)
+        log r; nan without an object.
+    fit : Fit
+        The fit.
     """
-    slopes = np.empty((SLOTS + 2, 4))
-    rows = np.zeros((5, SLOTS + 2))
-    for i in range(frames.shape[0]):
+    slopes, rows = np.empty((SLOPES, 4)), np.zeros((_ALL, SLOPES))
+    for i in range(positions.size):
         u = positions[i]
-        values[SLOTS] = frames[i, 2]
-        frame_slopes(slopes, u, values, gain, background, r0, wave)
-        _whiten(rows, slopes, (frames[i, 0], frames[i, 1]), read, shot, relative, wave is None)
-        for a in range(2):
-            _along_coordinates(jacobian[i, a], rows, a, slopes_of_values)
-            residual[i, a] = rows[a, SLOTS + 1]
+        _fill_frame(rows, slopes, i, u, values, fit)
+        for a in range(_READINGS):
+            _along_coordinates(jacobian[i, a], rows, a, chained)
+            residual[i, a] = rows[a, Value.READINGS]
             along_range[i, a] = math.nan
             if math.isfinite(u):
-                along_range[i, a] = rows[a, SLOTS] if inside[0] < u < inside[1] else 0.0
+                inside = _gives_way(u, values, fit)
+                along_range[i, a] = rows[a, Value.LOG_RANGE] if inside else 0.0

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from inference.fits.likelihood.coordinates import bounds_of
+from inference.fits.likelihood.deviance import POSITION
+from inference.fits.likelihood.linearisation import rows_of
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.profile_slopes import profile_slopes
 
@@ -22,7 +23,6 @@ _STEPS = 40
 _DIFFERENCE = 0.05  # standard deviations
 _LONGEST = 1.0  # change of a logarithm along one unit of a direction
 _ENOUGH = 5e-5  # half deviance that a whole step would still gain
-_CROSSTALK = (3, 4)
 
 
 class _Profile:
@@ -30,35 +30,18 @@ class _Profile:
 
     def __init__(self, problem: FitProblem) -> None:
         self.problem = problem
-        self.work = problem.work()
+        self.fit = problem.kernel_fit()
         n, d = problem.frames.shape[0], len(problem)
-        rows = n * (2 if problem.instrument[3] is None else 5)
-        self.best, self.matrix = np.empty((1, n, 3)), np.empty((rows, d + 1))
+        self.place = problem.place(np.empty(d))
+        self.matrix = np.empty((rows_of(n, problem.instrument), d + 1))
 
     def __call__(self, x: Array) -> tuple[float, Array]:
-        p = self.problem
-        value = profile_slopes(
-            x,
-            self.best,
-            self.matrix,
-            p.layout,
-            self.work,
-            p.support[0],
-            p.gain,
-            p.background,
-            p.frames,
-            p.present,
-            p.instrument,
-        )
+        self.place.x[:] = x
+        value = profile_slopes(self.matrix, self.place, self.fit)
         return 0.5 * value, -(self.matrix[:, :-1].T @ self.matrix[:, -1])
 
-    def bounds(self, x: Array) -> tuple[Array, Array]:
-        low, high = np.empty(x.size), np.empty(x.size)
-        bounds_of(low, high, self.problem.values(x), self.problem.layout)
-        return low, high
 
-
-def _directions(jacobian: Array, slots: NDArray[np.int64], free: NDArray[np.bool_]) -> Array:
+def _directions(jacobian: Array, problem: FitProblem, free: NDArray[np.bool_]) -> Array:
     """Columns along which the first-order information is the unit matrix or less, (d, free)."""
     j = jacobian[:, free]
     scale = np.linalg.norm(j, axis=0)
@@ -67,7 +50,7 @@ def _directions(jacobian: Array, slots: NDArray[np.int64], free: NDArray[np.bool
     _, sizes, right = linalg.svd(triangle)
     sizes = np.concatenate([sizes, np.zeros(j.shape[1] - sizes.size)])
     columns = (right.T / np.maximum(sizes, 1e-12)) / scale[:, None]
-    logarithms = ~np.isin(slots[free], _CROSSTALK)
+    logarithms = problem.logarithms[free]
     if logarithms.any():
         longest = np.abs(columns[logarithms]).max(axis=0)
         columns = columns / np.maximum(longest / _LONGEST, 1.0)
@@ -120,12 +103,12 @@ def polish(problem: FitProblem, x: Array) -> tuple[Array, float, float, Array]:
     for _ in range(_STEPS):
         if not (np.isfinite(value) and np.isfinite(gradient).all()):
             break
-        low, high = profile.bounds(x)
+        low, high = problem.bounds(x)
         free = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
         if not free.any():
             predicted = 0.0
             break
-        basis = _directions(profile.matrix[:, :-1], problem.slots, free)
+        basis = _directions(profile.matrix[:, :-1], problem, free)
         columns = []
         for k in range(basis.shape[1]):
             trial = np.clip(x + _DIFFERENCE * basis[:, k], low, high)
@@ -147,7 +130,7 @@ def polish(problem: FitProblem, x: Array) -> tuple[Array, float, float, Array]:
             if predicted < _ENOUGH and radius > 0.5:
                 break
             trial = np.clip(x + basis @ step, low, high)
-            low_there, high_there = profile.bounds(trial)
+            low_there, high_there = problem.bounds(trial)
             trial = np.clip(trial, low_there, high_there)
             trial_value, trial_gradient = profile(trial)
             if trial_value < value:
@@ -163,4 +146,4 @@ def polish(problem: FitProblem, x: Array) -> tuple[Array, float, float, Array]:
         if gained < 0.25 * predicted:
             radius *= 0.5
     value, _ = profile(x)
-    return x, 2.0 * value, 2.0 * predicted, profile.best[0, :, 0].copy()
+    return x, 2.0 * value, 2.0 * predicted, profile.place.best[0, :, POSITION].copy()

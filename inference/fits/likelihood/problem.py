@@ -2,14 +2,21 @@
 
 import dataclasses
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.fits.likelihood.coordinates import KNOWN, SAME, Layout, bounds_of, chain, physical
-from inference.fits.likelihood.deviance import Instrument
-from inference.fits.likelihood.slopes import SLOTS
+from inference.fits.likelihood.arguments import CROSSTALK, SLOTS, Bounds, Fit, Layout, Place
+from inference.fits.likelihood.coordinates import (
+    KNOWN,
+    SAME,
+    SHAPES,
+    bounds_of,
+    chain,
+    physical,
+)
+from inference.frame.arguments import Data, Instrument, Rows
+from inference.frame.sensitivity import Value
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.parameters import Parameters, parameters_of
@@ -22,8 +29,9 @@ Array = NDArray[np.float64]
 
 _LOUDEST = 1e100  # times the noise: squares of readings, and bounds made from them, are numbers
 _WIDEST = 1e6  # of a square length against the ranges of the scene
-_CROSSTALK = (3, 4)
-_IN_READINGS = (3, 4, 5)
+_IN_READINGS = (*CROSSTALK, Value.STRENGTH)
+_SHADOW = slice(Value.SHADOW_C0, Value.SHADOW_C1 + 1)
+_FREE = (-math.inf, math.inf)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -35,7 +43,7 @@ class FitProblem:
     names : tuple of str
         Scene path of each coordinate.
     slots : ndarray of int, shape (d,)
-        Slot (`slopes.SLOTS`) of each coordinate.
+        `Value` of each coordinate.
     layout : Layout
         As the kernels take it; readings in ``unit``.
     unit : float
@@ -71,25 +79,46 @@ class FitProblem:
     def __len__(self) -> int:
         return len(self.names)
 
-    def work(self) -> tuple[Any, ...]:
-        """Return fresh work space for the kernels."""
-        low, high = self.support
-        law = np.array([[0.0, -1.0, 0.0, 0.0, 0.0, 0.0, low, high]])
-        rows = None if self.background is None else np.empty((1, 4))
-        return np.empty((1, 3)), np.empty((1, 2)), rows, law
+    @property
+    def logarithms(self) -> NDArray[np.bool_]:
+        """Which coordinates are logarithms: all but crosstalk, shape (d,)."""
+        return ~np.isin(self.slots, CROSSTALK)
+
+    def kernel_fit(self) -> Fit:
+        """Return what the kernels take, with fresh work space."""
+        prior = np.array([[0.0, -1.0, 0.0, 0.0, 0.0, 0.0, *self.support]])
+        background = None if self.background is None else np.empty((1, 4))
+        return Fit(
+            self.layout,
+            Rows(np.empty((1, 3)), np.empty((1, 2)), background, prior),
+            Data(self.frames, self.present),
+            self.instrument,
+            self.gain,
+            self.background,
+            self.support,
+        )
+
+    def place(self, x: Array) -> Place:
+        """Return room for what the likelihood finds at a copy of coordinates x."""
+        best = np.full((1, self.frames.shape[0], 3), np.nan)
+        return Place(np.array(x, dtype=np.float64), np.empty(SLOTS), best)
 
     def values(self, x: Array) -> Array:
-        """Return the physical values of all slots, readings in ``unit``, shape (SLOTS + 1,)."""
-        values = np.ones(SLOTS + 1)
+        """Return all physical values, readings in ``unit``, shape (SLOTS,)."""
+        values = np.empty(SLOTS)
         physical(values, x, self.layout)
         return values
 
+    def bounds(self, x: Array) -> Bounds:
+        """Return the bounds of the coordinates at x."""
+        bounds = Bounds(np.empty(x.size), np.empty(x.size))
+        bounds_of(bounds, self.values(x), self.layout)
+        return bounds
+
     def chain(self, x: Array) -> Array:
-        """Return the derivatives of all slots along the coordinates, shape (SLOTS, d)."""
-        values, low, high = self.values(x), np.empty(x.size), np.empty(x.size)
+        """Return the derivatives of all values along the coordinates, shape (SLOTS, d)."""
         out = np.empty((SLOTS, x.size))
-        bounds_of(low, high, values, self.layout)
-        chain(out, values, x, self.layout, low, high)
+        chain(out, self.values(x), x, self.layout, self.bounds(x))
         return out
 
     @property
@@ -108,10 +137,10 @@ class FitProblem:
         with np.errstate(all="ignore"):
             for j, slot in enumerate(self.slots.tolist()):
                 value = natural[:, j]
-                if slot in _CROSSTALK:
+                if slot in CROSSTALK:
                     x[:, j] = value / self.unit
-                elif slot in (1, 8):
-                    c0 = columns.get(slot - 1, self.layout[1][slot - 1])
+                elif slot in SHAPES:
+                    c0 = columns.get(slot - 1, self.layout.known[slot - 1])
                     x[:, j] = np.log1p(value / (2 * np.sqrt(c0)))
                 else:
                     x[:, j] = np.log(value / (self.unit if slot in _IN_READINGS else 1.0))
@@ -127,6 +156,7 @@ class FitProblem:
 
 
 def _paths(sensor: Sensor) -> tuple[str, ...]:
+    """Scene paths in the order of `Value`."""
     first, second = sensor.columns
     return (
         "object.c0",
@@ -160,19 +190,23 @@ def unknowns_of(sensor: Sensor, scene: Scene) -> tuple[str, ...]:
     return tuple(path for path in _paths(sensor) if path in names)
 
 
-def _quantities(scene: Scene) -> list[Quantity | None]:
-    """Quantities of all slots; a member that the scene leaves out is None."""
-    crosstalk = scene.crosstalk_values or (0.0, 0.0)
-    found: list[Quantity | None] = [scene.object.c0, scene.object.c1, scene.object.c2, *crosstalk]
-    if scene.background is None or scene.shadow is None:
-        return [*found, 0.0, 0.0, 0.0, 0.0]
-    return [*found, scene.background.strength, scene.background.distance_m, *scene.shadow]
+def _quantities(scene: Scene) -> dict[Value, Quantity | None]:
+    """Quantities of all values; a member that the scene leaves out is None."""
+    found: dict[Value, Quantity | None] = dict.fromkeys(list(Value)[:SLOTS], 0.0)
+    shape = scene.object
+    found |= {Value.C0: shape.c0, Value.C1: shape.c1, Value.C2: shape.c2}
+    found |= zip(CROSSTALK, scene.crosstalk_values or (0.0, 0.0), strict=True)
+    if scene.background is not None and scene.shadow is not None:
+        found[Value.STRENGTH] = scene.background.strength
+        found[Value.DISTANCE] = scene.background.distance_m
+        found[Value.SHADOW_C0], found[Value.SHADOW_C1] = scene.shadow
+    return found
 
 
 def _supports(
     sensor: Sensor, scene: Scene, support: tuple[float, float], light: tuple[float, float]
 ) -> tuple[Array, Array]:
-    """Least and largest value of each slot: support of the prior, and what ranges can tell.
+    """Least and largest physical values: support of the prior, and what ranges can tell.
 
     Object and background are readings at gain factor 1: ``light`` is the loudest reading at the
     largest gain factor of the frames, and the loudest one of each frame's reading over its own.
@@ -181,41 +215,54 @@ def _supports(
     wide = (near * near / _WIDEST, far * far * _WIDEST)
     dim, bright = light
     farthest = sensor.r0 if isinstance(sensor, PulsedSensor) else math.inf
-    box = [
-        wide,
-        (-math.inf, math.inf),
-        (
+    box = {
+        Value.C0: wide,
+        Value.C2: (
             dim / sensor.gain * near * near * 1e-12,
             bright / sensor.gain * far**4 / wide[0] * 1e6,
         ),
-        (-math.inf, math.inf),
-        (-math.inf, math.inf),
-        (dim * 1e-9, bright * 1e3),
-        (near * 1e-3, farthest),
-        wide,
-        # a shadow of which nothing is stated has c1' >= 0 (its default prior)
-        (0.0, math.inf),
-    ]
+        Value.STRENGTH: (dim * 1e-9, bright * 1e3),
+        Value.DISTANCE: (near * 1e-3, farthest),
+        Value.SHADOW_C0: wide,
+    }
     low, high = np.empty(SLOTS), np.empty(SLOTS)
-    for k, quantity in enumerate(_quantities(scene)):
-        a, b = box[k]
+    quantities = _quantities(scene)
+    for k, quantity in quantities.items():
+        a, b = box.get(k, _FREE)
         if quantity is not None and not isinstance(quantity, float | int):
             law = quantity.distribution()
-            if k == 8:
-                a = -math.inf
             a, b = max(a, law.low), min(b, law.high)
             if not a < b:  # the scene allows only what the box leaves out
                 a, b = law.low, law.high
+        elif k == Value.SHADOW_C1:
+            a = 0.0  # its default prior, where nothing is stated
         low[k], high[k] = a, b
     if not isinstance(sensor, PulsedSensor):
         # beyond a wrap the background looks the same
-        high[6] = min(high[6], max(low[6], 0.0) + sensor.max_range_m)
-    quantities = _quantities(scene)
-    for k in (0, 7):
-        c1 = quantities[k + 1]
-        if isinstance(c1, float | int) and c1 < 0.0:
-            low[k] = max(low[k], 0.25 * c1 * c1 * (1 + 1e-9))
+        wrap = max(low[Value.DISTANCE], 0.0) + sensor.max_range_m
+        high[Value.DISTANCE] = min(high[Value.DISTANCE], wrap)
+    for c0, c1 in ((Value.C0, Value.C1), (Value.SHADOW_C0, Value.SHADOW_C1)):
+        stated = quantities[c1]
+        if isinstance(stated, float | int) and stated < 0.0:
+            low[c0] = max(low[c0], 0.25 * stated * stated * (1 + 1e-9))
     return low, high
+
+
+def _known_and_unknown(
+    sensor: Sensor, parameters: Parameters, unit: float
+) -> tuple[tuple[str, ...], NDArray[np.int64], Array]:
+    """Return names of the coordinates, the coordinate of each value, and the known values."""
+    index, known = np.full(SLOTS, KNOWN, dtype=np.int64), np.zeros(SLOTS)
+    paths = _paths(sensor)
+    names = tuple(path for path in paths if path in parameters.names)
+    for k, path in enumerate(paths):
+        if path in names:
+            index[k] = names.index(path)
+        elif path in parameters.known:
+            known[k] = parameters.known[path] / (unit if k in _IN_READINGS else 1.0)
+    if parameters.shadow_is_object:
+        index[_SHADOW] = SAME
+    return names, index, known
 
 
 def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
@@ -261,26 +308,18 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
     with np.errstate(over="ignore"):
         light = float(loudest.max() / gain.max()), float((loudest / gain).max())
     low, high = _supports(sensor, scene, (near, far), light)
-    low[3:6], high[3:6] = low[3:6] / unit, high[3:6] / unit
-    index, known = np.full(SLOTS, KNOWN, dtype=np.int64), np.zeros(SLOTS)
-    paths = _paths(sensor)
-    names = tuple(path for path in paths if path in parameters.names)
-    for k, path in enumerate(paths):
-        if path in names:
-            index[k] = names.index(path)
-        elif path in parameters.known:
-            known[k] = parameters.known[path] / (unit if k in _IN_READINGS else 1.0)
-    if parameters.shadow_is_object:
-        index[7:] = SAME
+    for k in _IN_READINGS:
+        low[k], high[k] = low[k] / unit, high[k] / unit
+    names, index, known = _known_and_unknown(sensor, parameters, unit)
     return FitProblem(
         names=names,
         slots=np.flatnonzero(index >= 0),
-        layout=(index, known, low, high),
+        layout=Layout(index, known, low, high),
         unit=unit,
         frames=readings,
         present=frames.present,
         gain=sensor.gain / unit,
-        instrument=(
+        instrument=Instrument(
             r0,
             wave,
             (noise.read[0] / unit, noise.read[1] / unit),

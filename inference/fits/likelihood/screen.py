@@ -6,41 +6,84 @@ all frames at their best ranges judge the whole.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.gaussian import log_top
-from inference.fits.likelihood.coordinates import Layout, bounds_of, physical
-from inference.fits.likelihood.deviance import deviance
-from inference.fits.likelihood.slopes import SLOTS, frame_slopes
+from inference.fits.likelihood.arguments import CROSSTALK, SLOTS, Bounds, Fit, Layout, Place
+from inference.fits.likelihood.coordinates import move_inside, physical
+from inference.fits.likelihood.deviance import TOP, deviance
 from inference.fits.likelihood.triangle import solve_least_squares
+from inference.frame.sensitivity import SLOPES, Value, fill_slopes
 from simulator.compiled import compiled
 
-__all__ = ["LINEAR", "screen"]
+__all__ = ["screen"]
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
-LINEAR = (2, 3, 4, 5)  # slots in which readings are linear
+_LINEAR = (Value.C2, Value.CROSSTALK_1, Value.CROSSTALK_2, Value.STRENGTH)
+_GAIN = 2  # column of the frames
 _TOLERANCE = 0.1  # of an anchor's reading against the farthest one's: the drawn ranges are guesses
 
 
 @compiled
-def screen(
-    points: Array,
-    scores: Array,
-    ranges: Array,
-    anchors: NDArray[np.int64],
-    layout: Layout,
-    work: Any,
-    nearest: float,
-    gain: float,
-    background: bool | None,
-    frames: Array,
-    present: NDArray[np.bool_],
-    instrument: Any,
-) -> None:
+def _linear_unknowns(index: Indices) -> Indices:
+    """Return which physical values are unknown and linear in the readings."""
+    found = np.empty(len(_LINEAR), dtype=np.int64)
+    count = 0
+    for k in _LINEAR:
+        if index[k] >= 0:
+            found[count] = k
+            count += 1
+    return found[:count]
+
+
+@compiled
+def _equations(values: Array, ranges: Array, anchors: Indices, linear: Indices, fit: Fit) -> Array:
+    """Return the anchors' readings as equations of the linear unknowns, the last column constant.
+
+    The last anchor is the one with the least light.
+    """
+    frames, read = fit.data.frames, fit.instrument.read
+    matrix = np.empty((2 * anchors.size, linear.size + 1))
+    slopes = np.empty((SLOPES, 4))
+    darkest = anchors[anchors.size - 1]
+    for a in range(anchors.size):
+        frame = anchors[a]
+        factor = frames[frame, _GAIN]
+        fill_slopes(slopes, ranges[a], values, fit.gain, factor, fit.background, fit.instrument)
+        for side in range(2):
+            row = matrix[2 * a + side]
+            rest = frames[frame, side] - slopes[Value.READINGS, side]
+            for c in range(linear.size):
+                k = linear[c]
+                row[c] = slopes[k, side]
+                rest += values[k] * slopes[k, side]
+            row[linear.size] = rest
+            spread = abs(frames[frame, side] - frames[darkest, side])
+            row *= 1.0 / (_TOLERANCE * spread + read[side])
+    return matrix
+
+
+@compiled
+def _take_over(x: Array, solution: Array, linear: Indices, bounds: Bounds, layout: Layout) -> None:
+    """Put solved values into the coordinates, as far as they are physical."""
+    for c in range(linear.size):
+        k = linear[c]
+        j = layout.coordinate[k]
+        if k in CROSSTALK:
+            x[j] = solution[c]
+        elif solution[c] > 0.0:
+            x[j] = math.log(solution[c])
+        if not math.isfinite(x[j]):
+            x[j] = math.nan
+        x[j] = min(max(x[j], bounds.low[j]), bounds.high[j])
+
+
+@compiled
+def screen(points: Array, scores: Array, ranges: Array, anchors: Indices, fit: Fit) -> None:
     """Solve the linear unknowns of drawn points and score the points.
 
     Parameters
@@ -53,83 +96,26 @@ def screen(
         Drawn log ranges of the anchors; nan for one without an object.
     anchors : ndarray of int, shape (anchors,)
         Their frames, the one with the least light last.
-    layout, work, nearest, gain, background, frames, present, instrument
-        As for `climb`.
+    fit : Fit
+        The fit.
     """
-    index = layout[0]
-    count = 0
-    slots = np.empty(4, dtype=np.int64)
-    for k in (2, 3, 4, 5):
-        if index[k] >= 0:
-            slots[count] = k
-            count += 1
-    values = np.ones(SLOTS + 1)
-    d = points.shape[1]
-    low, high = np.empty(d), np.empty(d)
-    slopes = np.empty((SLOTS + 2, 4))
-    rows = 2 * anchors.size
-    solution = np.empty(count)
-    best = np.empty((1, frames.shape[0], 3))
-    darkest = anchors[anchors.size - 1]
-    top = log_top(instrument[2])
+    n, d = fit.data.frames.shape[0], points.shape[1]
+    linear = _linear_unknowns(fit.layout.coordinate)
+    values, best = np.empty(SLOTS), np.empty((1, n, 3))
+    bounds, solution = Bounds(np.empty(d), np.empty(d)), np.empty(linear.size)
+    top = log_top(fit.instrument.read)
     for i in range(points.shape[0]):
         scores[i] = math.inf
-        x = points[i]
-        if not physical(values, x, layout):
+        place = Place(points[i], values, best)
+        if not physical(values, place.x, fit.layout):
             continue
-        bounds_of(low, high, values, layout)
-        for j in range(d):
-            x[j] = min(max(x[j], low[j]), high[j])
-        if not physical(values, x, layout):
+        if not move_inside(place, bounds, fit.layout):
             continue
-        if count > 0 and rows >= count:
-            matrix = np.zeros((rows, count + 1))
-            for a in range(anchors.size):
-                frame = anchors[a]
-                values[SLOTS] = frames[frame, 2]
-                frame_slopes(
-                    slopes, ranges[i, a], values, gain, background, instrument[0], instrument[1]
-                )
-                for side in range(2):
-                    row = 2 * a + side
-                    rest = frames[frame, side] - slopes[SLOTS + 1, side]
-                    for c in range(count):
-                        k = slots[c]
-                        matrix[row, c] = slopes[k, side]
-                        rest += values[k] * slopes[k, side]
-                    matrix[row, count] = rest
-                    spread = abs(frames[frame, side] - frames[darkest, side])
-                    weight = 1.0 / (_TOLERANCE * spread + instrument[2][side])
-                    for c in range(count + 1):
-                        matrix[row, c] *= weight
+        if 0 < linear.size <= 2 * anchors.size:
+            matrix = _equations(values, ranges[i], anchors, linear, fit)
             solve_least_squares(solution, matrix)
-            for c in range(count):
-                k = slots[c]
-                j = index[k]
-                if k == 3 or k == 4:
-                    x[j] = solution[c]
-                elif solution[c] > 0.0:
-                    x[j] = math.log(solution[c])
-                if not math.isfinite(x[j]):
-                    x[j] = math.nan
-                x[j] = min(max(x[j], low[j]), high[j])
-            if not physical(values, x, layout):
-                continue
-        value = deviance(
-            best,
-            values,
-            work[0],
-            work[1],
-            work[2],
-            work[3],
-            nearest,
-            gain,
-            frames,
-            present,
-            instrument,
-        )
-        if value < math.inf:
-            total = 0.0
-            for j in range(frames.shape[0]):
-                total += math.log1p(max(-2.0 * (best[0, j, 1] - top), 0.0))
-            scores[i] = total
+            _take_over(place.x, solution, linear, bounds, fit.layout)
+        if deviance(place, fit) < math.inf:
+            scores[i] = 0.0
+            for j in range(n):
+                scores[i] += math.log1p(max(-2.0 * (best[0, j, TOP] - top), 0.0))

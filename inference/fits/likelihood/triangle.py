@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from simulator.compiled import compiled
 
-__all__ = ["damped_step", "solve_least_squares", "triangularise"]
+__all__ = ["damped_step", "reduce_columns", "solve_least_squares"]
 
 Array = NDArray[np.float64]
 
 
 @compiled
-def triangularise(matrix: Array, columns: int) -> None:
+def reduce_columns(matrix: Array, columns: int) -> None:
     """Reduce the leading columns of a matrix to an upper triangle, in place.
 
     Parameters
@@ -80,7 +80,7 @@ def solve_least_squares(solution: Array, matrix: Array) -> None:
             scale[j] = largest
             for i in range(matrix.shape[0]):
                 matrix[i, j] /= largest
-    triangularise(matrix, n)
+    reduce_columns(matrix, n)
     _back_substitute(solution, matrix, n)
     for j in range(n):
         solution[j] /= scale[j]
@@ -110,7 +110,7 @@ def damped_step(step: Array, triangle: Array, scale: Array, damping: float) -> N
                 work[i, j] = triangle[i, j] / scale[j]
         work[i, d] = triangle[i, d]
         work[d + i, i] = root if scale[i] > 0.0 else 1.0
-    triangularise(work, d)
+    reduce_columns(work, d)
     _back_substitute(step, work, d)
     for j in range(d):
         step[j] = step[j] / scale[j] if scale[j] > 0.0 else 0.0

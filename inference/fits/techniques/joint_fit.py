@@ -3,7 +3,7 @@
 from inference.estimates import TechniqueResult
 from inference.fits.answer.counts import joint_obstacle
 from inference.fits.answer.likelihood_answer import likelihood_answer
-from inference.fits.likelihood.multistart import find_optima
+from inference.fits.likelihood.multistart import find_maxima
 from inference.fits.likelihood.problem import fit_problem, unknowns_of
 from inference.known import Known
 from inference.realtime.net import SATURATED, rule_out
@@ -18,7 +18,7 @@ __all__ = ["ITERATIVE_BACKGROUND_CANCELLING", "ITERATIVE_DIFFERENTIAL", "JOINT_F
 def _solve_as(name: str, task: Task) -> TechniqueResult:
     state = rule_out(task.sensor, task.frames)
     problem = fit_problem(task.sensor, task.scene, task.frames.select(state != SATURATED))
-    return likelihood_answer(name, problem, find_optima(problem), state)
+    return likelihood_answer(name, problem, find_maxima(problem), state)
 
 
 def _differential_obstacle(
