@@ -108,7 +108,8 @@ def test_parameters_reach_as_far_as_optima_that_are_not_decided_against(excess: 
     assert both["object.c0"]["value"] == value
     # of c0 = exp(x)
     assert both["object.c0"]["sd"] == pytest.approx(value * np.expm1(3.0) / reach, rel=1e-9)
-    assert both["object.c0"]["status"] == "not_identified"  # 3 / reach is above one
+    # 3 / reach is 1.5 at most, against the 2 of the prior: spreads of 0.5 to 0.6
+    assert both["object.c0"]["status"] == "weak"
     assert both["object.c2"] == alone["object.c2"]
 
 
