@@ -11,7 +11,7 @@ from scipy import special
 
 from inference.estimate import estimate
 from inference.estimates import Status, TechniqueResult
-from inference.fits.linear.weighted import whitener_of
+from inference.fits.techniques.crosstalk_fit import with_error
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
 from simulator.scene import parse_scene
@@ -341,7 +341,7 @@ def test_weights_where_the_range_is_far_less_certain_than_the_readings(noise: fl
     rng = np.random.default_rng(1)
     own = noise**2 * np.array([[[1.0, 0.3], [0.3, 2.0]]])
     common = rng.standard_normal((2, 1, 2)) * np.array([noise, 1e-3])[:, None, None]
-    found = whitener_of(own, common)[0]
+    found = with_error(with_error(np.linalg.inv(np.linalg.cholesky(own)), common[0]), common[1])[0]
     with mpmath.workdps(50):
         total = mpmath.matrix(own[0].tolist())
         for part in common[:, 0]:

@@ -22,6 +22,7 @@ __all__ = [
     "joint_obstacle",
     "linear_obstacle",
     "ranges_needed",
+    "too_few",
     "unmodelled_error",
 ]
 
@@ -93,6 +94,26 @@ def unmodelled_error(scene: Scene) -> str | None:
     if scene.discrepancy is None:
         return None
     return "has no term for the scene's discrepancy; use a posterior"
+
+
+def too_few(frames: Frames | None, unknowns: tuple[str, ...]) -> str | None:
+    """Return that frames are too few for a fit that takes one equation of each, None if not.
+
+    Parameters
+    ----------
+    frames : Frames, optional
+        Left out: enough are supposed.
+    unknowns : tuple of str
+        Scene paths of what is fitted.
+    """
+    needed = len(unknowns) + 1
+    count = needed if frames is None else int(frames.present.sum())
+    if count >= needed:
+        return None
+    return (
+        f"needs at least {needed} frames with the object at different ranges for "
+        f"{', '.join(unknowns)}, and has {count}; send more"
+    )
 
 
 def linear_obstacle(scene: Scene, unknowns: tuple[str, ...]) -> str | None:

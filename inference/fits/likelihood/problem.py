@@ -15,23 +15,22 @@ from inference.fits.likelihood.coordinates import (
     chain,
     physical,
 )
+from inference.fits.likelihood.supports import supports_of
 from inference.frame.arguments import Data, Instrument, Rows
 from inference.frame.sensitivity import Value
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.parameters import Parameters, parameters_of
-from simulator.scene import Quantity, Scene
-from simulator.sensor import PulsedSensor, Sensor, instrument
+from simulator.scene import Scene
+from simulator.sensor import Sensor, instrument
 
 __all__ = ["FitProblem", "fit_problem", "unknowns_of"]
 
 Array = NDArray[np.float64]
 
 _LOUDEST = 1e100  # times the noise: squares of readings, and bounds made from them, are numbers
-_WIDEST = 1e6  # of a square length against the ranges of the scene
 _IN_READINGS = (*CROSSTALK, Value.STRENGTH)
 _SHADOW = slice(Value.SHADOW_C0, Value.SHADOW_C1 + 1)
-_FREE = (-math.inf, math.inf)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -190,64 +189,6 @@ def unknowns_of(sensor: Sensor, scene: Scene) -> tuple[str, ...]:
     return tuple(path for path in _paths(sensor) if path in names)
 
 
-def _quantities(scene: Scene) -> dict[Value, Quantity | None]:
-    """Quantities of all values; a member that the scene leaves out is None."""
-    found: dict[Value, Quantity | None] = dict.fromkeys(list(Value)[:SLOTS], 0.0)
-    shape = scene.object
-    found |= {Value.C0: shape.c0, Value.C1: shape.c1, Value.C2: shape.c2}
-    found |= zip(CROSSTALK, scene.crosstalk_values or (0.0, 0.0), strict=True)
-    if scene.background is not None and scene.shadow is not None:
-        found[Value.STRENGTH] = scene.background.strength
-        found[Value.DISTANCE] = scene.background.distance_m
-        found[Value.SHADOW_C0], found[Value.SHADOW_C1] = scene.shadow
-    return found
-
-
-def _supports(
-    sensor: Sensor, scene: Scene, support: tuple[float, float], light: tuple[float, float]
-) -> tuple[Array, Array]:
-    """Least and largest physical values: support of the prior, and what ranges can tell.
-
-    Object and background are readings at gain factor 1: ``light`` is the loudest reading at the
-    largest gain factor of the frames, and the loudest one of each frame's reading over its own.
-    """
-    near, far = support
-    wide = (near * near / _WIDEST, far * far * _WIDEST)
-    dim, bright = light
-    farthest = sensor.r0 if isinstance(sensor, PulsedSensor) else math.inf
-    box = {
-        Value.C0: wide,
-        Value.C2: (
-            dim / sensor.gain * near * near * 1e-12,
-            bright / sensor.gain * far**4 / wide[0] * 1e6,
-        ),
-        Value.STRENGTH: (dim * 1e-9, bright * 1e3),
-        Value.DISTANCE: (near * 1e-3, farthest),
-        Value.SHADOW_C0: wide,
-    }
-    low, high = np.empty(SLOTS), np.empty(SLOTS)
-    quantities = _quantities(scene)
-    for k, quantity in quantities.items():
-        a, b = box.get(k, _FREE)
-        if quantity is not None and not isinstance(quantity, float | int):
-            law = quantity.distribution()
-            a, b = max(a, law.low), min(b, law.high)
-            if not a < b:  # the scene allows only what the box leaves out
-                a, b = law.low, law.high
-        elif k == Value.SHADOW_C1:
-            a = 0.0  # its default prior, where nothing is stated
-        low[k], high[k] = a, b
-    if not isinstance(sensor, PulsedSensor):
-        # beyond a wrap the background looks the same
-        wrap = max(low[Value.DISTANCE], 0.0) + sensor.max_range_m
-        high[Value.DISTANCE] = min(high[Value.DISTANCE], wrap)
-    for c0, c1 in ((Value.C0, Value.C1), (Value.SHADOW_C0, Value.SHADOW_C1)):
-        stated = quantities[c1]
-        if isinstance(stated, float | int) and stated < 0.0:
-            low[c0] = max(low[c0], 0.25 * stated * stated * (1 + 1e-9))
-    return low, high
-
-
 def _known_and_unknown(
     sensor: Sensor, parameters: Parameters, unit: float
 ) -> tuple[tuple[str, ...], NDArray[np.int64], Array]:
@@ -307,7 +248,7 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
     loudest = np.maximum(np.abs(scaled).max(axis=1), 1.0) * unit
     with np.errstate(over="ignore"):
         light = float(loudest.max() / gain.max()), float((loudest / gain).max())
-    low, high = _supports(sensor, scene, (near, far), light)
+    low, high = supports_of(sensor, scene, (near, far), light)
     for k in _IN_READINGS:
         low[k], high[k] = low[k] / unit, high[k] / unit
     names, index, known = _known_and_unknown(sensor, parameters, unit)

@@ -12,7 +12,7 @@ from inference.estimates import TechniqueResult
 from inference.fits.answer.ranges import Answer, frame_ranges
 from inference.fits.answer.report import FALSE_ALARM, entries
 from inference.fits.likelihood.problem import fit_problem
-from inference.fits.linear.weighted import LinearFit
+from inference.fits.linear.least_squares import LinearFit
 from inference.realtime.net import SATURATED, rule_out
 from inference.technique import Task
 from simulator.errors import RefusedError

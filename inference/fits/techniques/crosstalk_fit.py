@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.fits.answer.counts import unmodelled_error
+from inference.fits.answer.counts import too_few, unmodelled_error
 from inference.fits.answer.likelihood_answer import likelihood_answer_from
 from inference.fits.likelihood.problem import unknowns_of
+from inference.fits.linear.least_squares import LinearFit, solve_weighted
+from inference.fits.linear.light import object_light
 from inference.fits.linear.linear_answer import linear_answer, without_warnings
-from inference.fits.linear.weighted import LinearFit, covariances, solve_weighted, whitener_of
-from inference.fits.techniques.object_fit import carrier, gains
+from inference.frame.arguments import instrument_of
+from inference.frame.noise import whiteners
 from inference.known import Known
 from inference.realtime.net import SATURATED, rule_out
 from inference.realtime.techniques.differential import DIFFERENTIAL
@@ -26,9 +28,9 @@ from inference.technique import Task, Technique
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene
-from simulator.sensor import PulsedSensor, Sensor
+from simulator.sensor import Sensor
 
-__all__ = ["CROSSTALK_FIT"]
+__all__ = ["CROSSTALK_FIT", "with_error"]
 
 Array = NDArray[np.float64]
 
@@ -36,38 +38,55 @@ _PASSES = 50
 _NARROW = 0.1  # relative standard deviation of a range up to which first order describes it
 
 
+def with_error(whitener: Array, along: Array) -> Array:
+    """Return whiteners of covariances to which one more error is added.
+
+    Parameters
+    ----------
+    whitener : ndarray, shape (n, 2, 2)
+        W with W^T W the inverse of a covariance V.
+    along : ndarray, shape (n, 2)
+        Standard deviations a of a common error: it may be a million times the rest, and is never
+        added to it.
+
+    Returns
+    -------
+    ndarray, shape (n, 2, 2)
+        Of V + a a^T.
+    """
+    w = np.einsum("nij,nj->ni", whitener, along)
+    root = np.hypot(1.0, np.hypot(w[:, 0], w[:, 1]))
+    # (I + w w^T)^(-1/2) = I - w w^T / (root (1 + root))
+    shrunk = w / root[:, None] / (1.0 + root)[:, None]
+    across = np.einsum("nj,nji->ni", w, whitener)
+    return np.asarray(whitener - shrunk[:, :, None] * across[:, None, :])
+
+
 def _unit_signal(task: Task, r: Array) -> tuple[Array, Array]:
     """Return the object's readings for c2 = 1, and their derivative along log r; each (n, 2)."""
     c0, c1 = task.known.get("object.c0"), task.known.get("object.c1")
-    q = r * (r + c1) + c0
-    size = (task.sensor.gain * gains(task.frames) * c0 / (r * r * q))[:, None]
-    slope = (-2.0 - r * (2.0 * r + c1) / q)[:, None]
-    unit = carrier(task.sensor, r)
-    if isinstance(task.sensor, PulsedSensor):
-        turn = np.stack([np.where(r < task.sensor.r0, unit[:, 0], 0.0), np.zeros(r.size)], axis=1)
-    else:
-        angle = (task.sensor.wave_number * r)[:, None]
-        turn = angle * np.stack([-unit[:, 1], unit[:, 0]], axis=1)
-    return size * unit, size * (slope * unit + turn)
+    return object_light(task.sensor, (c0, c1, 1.0), r, task.frames)
+
+
+def _paths(task: Task) -> tuple[str, str, str]:
+    """Scene paths of what readings are linear in: both crosstalks and c2."""
+    first, second = task.sensor.columns
+    return f"crosstalk.{first}", f"crosstalk.{second}", "object.c2"
 
 
 def _fit(
     task: Task, roots: Array, sds: Array, chosen: NDArray[np.intp], unknown: tuple[str, ...]
 ) -> LinearFit:
     """Fit on chosen roots; choose and weigh anew until nothing changes."""
-    sensor, frames = task.sensor, task.frames
-    n = len(frames)
-    usable = rule_out(sensor, frames) != SATURATED
-    empty = usable & ~frames.present
-    first, second = sensor.columns
-    paths = (f"crosstalk.{first}", f"crosstalk.{second}", "object.c2")
-    values = np.array([_known(task, path) for path in paths])
+    sensor, readings, instrument = task.sensor, task.frames.readings, instrument_of(task.sensor)
+    n = len(task.frames)
+    usable = rule_out(sensor, task.frames) != SATURATED
+    empty = usable & ~task.frames.present
+    paths = _paths(task)
     free = np.array([path in unknown for path in paths])
-    x = np.zeros(3)
-    x[~free] = values[~free]
+    x = np.where(free, 0.0, [_known(task, path) for path in paths])
     fit = LinearFit(np.empty(0), np.empty((0, 0)), 0, np.empty(0), usable, np.full(n, np.nan))
-    rows = np.arange(n)
-    index = chosen
+    rows, index = np.arange(n), chosen
     shift = np.zeros(n)  # log r of the fit less that of the derivatives
     for _ in range(_PASSES):
         spread = sds[rows, index] / roots[rows, index]
@@ -77,17 +96,16 @@ def _fit(
         used = usable & np.isfinite(unit).all(axis=1) & (spread < _NARROW)
         if int((used & ~empty).sum()) <= int(free.sum()):
             return dataclasses.replace(fit, rank=0)
-        own = covariances(sensor, frames.readings, np.zeros_like(unit))
-        common = np.stack([sensor.noise.relative * x[2] * unit, x[2] * spread[:, None] * slope])
-        used &= np.isfinite(own).all(axis=(1, 2)) & np.isfinite(common).all(axis=(0, 2))
+        signal, error = x[2] * unit, x[2] * spread[:, None] * slope
+        used &= (np.isfinite(readings) & np.isfinite(signal) & np.isfinite(error)).all(axis=1)
         # linear in the range about the fitted one
         expected = unit - shift[:, None] * slope
         design = np.zeros((n, 2, 3))
         design[:, 0, 0] = design[:, 1, 1] = 1.0
         design[:, :, 2] = expected
-        whitener = whitener_of(own[used], common[:, used])
+        whitener = with_error(whiteners(instrument, readings[used], signal[used]), error[used])
         matrix = np.einsum("nij,njk->nik", whitener, design[used])
-        target = np.einsum("nij,nj->ni", whitener, frames.readings[used])
+        target = np.einsum("nij,nj->ni", whitener, readings[used])
         target = target - matrix[:, :, ~free] @ x[~free]
         flat = matrix[:, :, free].reshape(-1, int(free.sum()))
         solution, factor, rank = solve_weighted(flat, target.ravel())
@@ -97,7 +115,7 @@ def _fit(
         fit = LinearFit(solution, factor, rank, residuals, used, np.where(used & ~empty, r, np.nan))
         if rank < solution.size:
             break
-        miss = frames.readings - x[:2] - x[2] * expected
+        miss = readings - x[:2] - x[2] * expected
         pull = np.zeros((n, 2))
         white = np.einsum("nij,nj->ni", whitener, miss[used])
         pull[used] = np.einsum("nji,nj->ni", whitener, white)
@@ -156,12 +174,7 @@ def _solve(task: Task) -> TechniqueResult:
             "take joint_fit"
         )
     fit = min(good, key=lambda one: one.chi_square)
-    first, second = task.sensor.columns
-    order = [
-        path
-        for path in (f"crosstalk.{first}", f"crosstalk.{second}", "object.c2")
-        if path in unknown
-    ]
+    order = [path for path in _paths(task) if path in unknown]
     values = dict(zip(order, fit.x.tolist(), strict=True))
     if values.get("object.c2", 1.0) <= 0.0:
         raise RefusedError(
@@ -182,7 +195,7 @@ def _solve(task: Task) -> TechniqueResult:
     return linear_answer("crosstalk_fit", task, fit, natural, single, {})
 
 
-def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None) -> str | None:
+def _obstacle(sensor: Sensor, scene: Scene, _known: Known, frames: Frames | None) -> str | None:
     if scene.motion != "radial":
         return f"needs radial motion, and the scene's is {scene.motion}"
     unmodelled = unmodelled_error(scene)
@@ -193,13 +206,7 @@ def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None)
     unknown = unknowns_of(sensor, scene)
     if not any(path.startswith("crosstalk.") for path in unknown):
         return "fits crosstalk, and the scene's is known"
-    if frames is not None and int(frames.present.sum()) < len(unknown) + 1:
-        return (
-            f"needs at least {len(unknown) + 1} frames with the object at different ranges for "
-            f"{', '.join(unknown)}, and has {int(frames.present.sum())}; send more"
-        )
-    del known
-    return None
+    return too_few(frames, unknown)
 
 
 CROSSTALK_FIT = Technique(

@@ -6,23 +6,21 @@ Their noise is treated to first order here; from the values found the likelihood
 climbed, in which every range is unknown.
 """
 
+import functools
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.fits.answer.counts import linear_obstacle
+from inference.fits.answer.counts import linear_obstacle, too_few
 from inference.fits.answer.likelihood_answer import likelihood_answer_from
 from inference.fits.likelihood.problem import unknowns_of
+from inference.fits.linear.at_rest import refuse_at_rest
+from inference.fits.linear.equations import Equations, Observed, fit_equations
+from inference.fits.linear.least_squares import LinearFit
+from inference.fits.linear.light import background_light, carrier, component, gains
 from inference.fits.linear.linear_answer import linear_answer, without_warnings
-from inference.fits.linear.weighted import (
-    Equations,
-    LinearFit,
-    Observed,
-    fit_equations,
-    refuse_at_rest,
-)
 from inference.known import Known
 from inference.realtime.techniques.background_intensity import BACKGROUND_INTENSITY
 from inference.realtime.techniques.conventional import CONVENTIONAL
@@ -30,9 +28,9 @@ from inference.technique import Task, Technique
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene
-from simulator.sensor import PulsedSensor, Sensor
+from simulator.sensor import Sensor
 
-__all__ = ["OBJECT_FIT", "carrier", "gains", "visible_background"]
+__all__ = ["OBJECT_FIT"]
 
 Array = NDArray[np.float64]
 
@@ -48,39 +46,21 @@ _NARROW = 0.1  # relative standard deviation of a range up to which first order 
 _POWER_LAW = 0.15  # distance of the exponent from a whole number
 
 
-def gains(frames: Frames) -> Array:
-    """Return the gain factor of every frame, shape (n,)."""
-    return np.ones(len(frames)) if frames.gain is None else frames.gain
-
-
-def carrier(sensor: Sensor, r: Array) -> Array:
-    """Return what one unit of flux from range r reads, shape (n, 2)."""
-    if isinstance(sensor, PulsedSensor):
-        return np.stack([np.minimum(r / sensor.r0, 1.0), np.ones_like(r)], axis=1)
-    phase = sensor.wave_number * r + sensor.phase_offset_rad
-    return np.stack([np.cos(phase), np.sin(phase)], axis=1)
-
-
-def visible_background(task: Task, r: Array, frames: Frames) -> Array:
-    """Return the known background's readings behind an object at range r, shape (n, 2)."""
-    if task.scene.background is None:
-        return np.zeros((r.size, 2))
-    strength, distance, c0, c1 = (task.known.get(path) for path in _BACKGROUND)
-    visible = r * (r + c1) / (r * (r + c1) + c0)
-    bare = carrier(task.sensor, np.full(1, distance))
-    return np.asarray(strength * (gains(frames) * visible)[:, None] * bare)
-
-
 def _flux(task: Task, r: Array, frames: Frames) -> Array:
     """Phi / (Phi0 A_D) of the object, shape (n,) [1/m^2]."""
-    crosstalk = task.known.crosstalk
+    sensor, crosstalk = task.sensor, task.known.crosstalk
     assert crosstalk is not None  # noqa: S101  # the plan leaves the technique out
-    net = frames.readings - np.asarray(crosstalk) - visible_background(task, r, frames)
-    if isinstance(task.sensor, PulsedSensor):
-        size = net[:, 1]
-    else:
-        size = np.einsum("ni,ni->n", net, carrier(task.sensor, r))
-    return np.asarray(size / gains(frames) / task.sensor.gain)
+    net = frames.readings - np.asarray(crosstalk)
+    if task.scene.background is not None:
+        strength, distance, c0, c1 = (task.known.get(path) for path in _BACKGROUND)
+        net = net - background_light(sensor, (strength, distance, c0, c1), r, frames)
+    return np.asarray(component(sensor, net, r) / gains(frames) / sensor.gain)
+
+
+def _signal(task: Task, r: Array, frames: Frames) -> Array:
+    """Return the object's part of the readings as its flux has it, shape (n, 2)."""
+    size = task.sensor.gain * gains(frames) * _flux(task, r, frames)
+    return np.asarray(size[:, None] * carrier(task.sensor, r))
 
 
 def _map(unknown: tuple[str, ...], known: Known) -> tuple[Array, Array]:
@@ -159,10 +139,7 @@ def _solve(task: Task) -> TechniqueResult:
         powers = np.stack([r**2, r**3, r**4], axis=1) * flux[:, None]
         return Observed(powers @ to_x, 1.0 - powers @ fixed)
 
-    def signal(r: Array, frames: Frames) -> Array:
-        size = task.sensor.gain * gains(frames) * _flux(task, r, frames)
-        return np.asarray(size[:, None] * carrier(task.sensor, r))
-
+    signal = functools.partial(_signal, task)
     fit, single = fit_equations(Equations(technique, task, equation, signal, unknown, _NARROW))
     refuse_at_rest(fit, single, unknown)
     x = to_x @ fit.x + fixed
@@ -191,10 +168,7 @@ def _square_law(
     def equation(r: Array, frames: Frames) -> Observed:
         return Observed((r**2 * _flux(task, r, frames))[:, None], np.ones(r.size))
 
-    def signal(r: Array, frames: Frames) -> Array:
-        size = task.sensor.gain * gains(frames) * _flux(task, r, frames)
-        return np.asarray(size[:, None] * carrier(task.sensor, r))
-
+    signal = functools.partial(_signal, task)
     flat, _ = fit_equations(Equations(technique, task, equation, signal, ("object.c2",), _NARROW))
     # a cubic term without a fourth-order one is no square law: keep the whole fit's c2
     if flat.chi_square - fit.chi_square > _SIGNIFICANT**2 * 2:
@@ -213,12 +187,7 @@ def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None)
             return f"needs a background that is known, and {', '.join(missing)} is not"
     if not any(path in _OBJECT for path in unknown):
         return "fits the object, and the scene's is known"
-    if frames is not None and int(frames.present.sum()) < len(unknown) + 1:
-        return (
-            f"needs at least {len(unknown) + 1} frames with the object at different ranges for "
-            f"{', '.join(unknown)}, and has {int(frames.present.sum())}; send more"
-        )
-    return None
+    return too_few(frames, unknown)
 
 
 OBJECT_FIT = Technique(

@@ -5,17 +5,19 @@ not what is fitted here. With S the visible share, S / (1 - S) = r^2 / c0' + r c
 in 1 / c0' and c1' / c0'; with a known shadow the readings are linear in the strength.
 """
 
+import functools
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.fits.answer.counts import linear_obstacle
+from inference.fits.answer.counts import linear_obstacle, too_few
 from inference.fits.likelihood.problem import unknowns_of
+from inference.fits.linear.at_rest import refuse_at_rest
+from inference.fits.linear.equations import Equations, Observed, fit_equations
+from inference.fits.linear.light import background_light, component, gains, object_light
 from inference.fits.linear.linear_answer import linear_answer, without_warnings
-from inference.fits.linear.weighted import Equations, Observed, fit_equations, refuse_at_rest
-from inference.fits.techniques.object_fit import carrier, gains
 from inference.known import Known
 from inference.realtime.net import SATURATED, rule_out
 from inference.realtime.techniques.background_cancelling import BACKGROUND_CANCELLING
@@ -23,7 +25,7 @@ from inference.technique import Task, Technique
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene
-from simulator.sensor import PulsedSensor, Sensor
+from simulator.sensor import Sensor
 
 __all__ = ["SHADOW_FIT"]
 
@@ -37,20 +39,20 @@ _SIGNIFICANT = 3.0
 def _signal(task: Task, r: Array, frames: Frames) -> Array:
     """Return the known object's readings, shape (n, 2)."""
     c0, c1, c2 = (task.known.get(f"object.{name}") for name in ("c0", "c1", "c2"))
-    flux = c0 * c2 / (r * r * (r * (r + c1) + c0))
-    size = task.sensor.gain * gains(frames) * flux
-    return np.asarray(size[:, None] * carrier(task.sensor, r))
+    return object_light(task.sensor, (c0, c1, c2), r, frames)[0]
 
 
-def _visible(task: Task, r: Array, frames: Frames) -> Array:
-    """Return the background's reading (w2 or its component towards it) over the gain factor."""
+def _from_background(task: Task, readings: Array, frames: Frames) -> Array:
+    """Return the size of the background's light in readings, over the gain factor, shape (n,)."""
+    distance = np.full(len(frames), task.known.get("background.distance_m"))
+    return np.asarray(component(task.sensor, readings, distance) / gains(frames))
+
+
+def _visible(task: Task, signal: Array, frames: Frames) -> Array:
+    """Return the size of the background in readings of which the object's part is given."""
     crosstalk = task.known.crosstalk
     assert crosstalk is not None  # noqa: S101  # the plan leaves the technique out
-    net = frames.readings - np.asarray(crosstalk) - _signal(task, r, frames)
-    if isinstance(task.sensor, PulsedSensor):
-        return np.asarray(net[:, 1] / gains(frames))
-    bare = carrier(task.sensor, np.full(1, task.known.get("background.distance_m")))[0]
-    return np.asarray(net @ bare / gains(frames))
+    return _from_background(task, frames.readings - np.asarray(crosstalk) - signal, frames)
 
 
 def _solve(task: Task) -> TechniqueResult:
@@ -68,28 +70,23 @@ def _solve(task: Task) -> TechniqueResult:
         to_y, fixed = np.eye(2), np.zeros(2)
 
     def equation(r: Array, frames: Frames) -> Observed:
-        share = _visible(task, r, frames) / strength
+        share = _visible(task, _signal(task, r, frames), frames) / strength
         powers = np.stack([r**2, r], axis=1) * (1.0 - share)[:, None]
         return Observed(powers @ to_y, share - powers @ fixed)
 
-    def signal(r: Array, frames: Frames) -> Array:
-        return _signal(task, r, frames)
-
+    signal = functools.partial(_signal, task)
     fit, single = fit_equations(Equations(BACKGROUND_CANCELLING, task, equation, signal, unknown))
     refuse_at_rest(fit, single, unknown)
     y = to_y @ fit.x + fixed
     sd = np.linalg.norm(to_y @ fit.factor, axis=1)
-    missing: dict[str, str] = {}
+    reason = None
     if y[0] <= _SIGNIFICANT * sd[0] and fixed[0] == 0.0:
         reason = "no term in r^2 is seen over these ranges: the shadow is not identifiable"
-        missing = dict.fromkeys(unknown, reason)
     elif not y[1] / y[0] > -2.0 / math.sqrt(y[0]):
         reason = "the best fit has c1' <= -2 sqrt(c0'), where the shadow would have poles"
-        missing = dict.fromkeys(unknown, reason)
-    if missing:
+    if reason:
         raise RefusedError(
-            "; ".join(dict.fromkeys(missing.values()))
-            + "; move the object nearer, lower the noise, or use a posterior with priors"
+            f"{reason}; move the object nearer, lower the noise, or use a posterior with priors"
         )
     fitted0, fitted1 = 1.0 / y[0], y[1] / y[0]
     natural = {
@@ -101,15 +98,16 @@ def _solve(task: Task) -> TechniqueResult:
 
 
 def _solve_strength(task: Task) -> TechniqueResult:
-    c0, c1 = task.known.get(_C0), task.known.get(_C1)
+    distance, c0, c1 = (task.known.get(path) for path in ("background.distance_m", _C0, _C1))
     clipped = rule_out(task.sensor, task.frames) == SATURATED
 
     def equation(r: Array, frames: Frames) -> Observed:
-        visible = _visible(task, r, frames)
-        share = r * (r + c1) / (r * (r + c1) + c0)
+        visible = _visible(task, _signal(task, r, frames), frames)
+        unit = background_light(task.sensor, (1.0, distance, c0, c1), r, frames)
+        share = _from_background(task, unit, frames)
         # an empty scene shows all of it, unless it is beyond full scale
         empty = ~frames.present
-        bare = np.where(clipped, np.nan, _visible_of_empty(task, frames))
+        bare = np.where(clipped, np.nan, _visible(task, np.zeros_like(unit), frames))
         share, visible = np.where(empty, 1.0, share), np.where(empty, bare, visible)
         return Observed(share[:, None], visible)
 
@@ -129,15 +127,6 @@ def _solve_strength(task: Task) -> TechniqueResult:
     return linear_answer("shadow_fit", task, fit, natural, single, {})
 
 
-def _visible_of_empty(task: Task, frames: Frames) -> Array:
-    crosstalk = task.known.crosstalk
-    assert crosstalk is not None  # noqa: S101
-    net = frames.readings - np.asarray(crosstalk)
-    bare = carrier(task.sensor, np.full(1, task.known.get("background.distance_m")))[0]
-    size = net[:, 1] if isinstance(task.sensor, PulsedSensor) else net @ bare
-    return np.asarray(size / gains(frames))
-
-
 def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None) -> str | None:
     unknown = unknowns_of(sensor, scene)
     unserved = linear_obstacle(scene, unknown)
@@ -149,12 +138,7 @@ def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None)
         return "strength and shadow together are not linear in the readings: take joint_fit"
     if not known.has(_STRENGTH) and _STRENGTH not in unknown:
         return "needs background.strength as a number, or as an unknown of a term that stays"
-    if frames is not None and int(frames.present.sum()) < len(unknown) + 1:
-        return (
-            f"needs at least {len(unknown) + 1} frames with the object at different ranges for "
-            f"{', '.join(unknown)}, and has {int(frames.present.sum())}; send more"
-        )
-    return None
+    return too_few(frames, unknown)
 
 
 SHADOW_FIT = Technique(

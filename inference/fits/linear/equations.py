@@ -11,64 +11,21 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
 from inference.estimates import TechniqueResult
+from inference.fits.linear.least_squares import LinearFit, solve_weighted
+from inference.frame.arguments import instrument_of
+from inference.frame.noise import covariances
 from inference.technique import Task, Technique
-from simulator.errors import RefusedError, listed
+from simulator.errors import RefusedError
 from simulator.frames import Frames
-from simulator.sensor import PulsedSensor, Sensor
 
-__all__ = [
-    "Equations",
-    "LinearFit",
-    "Observed",
-    "covariances",
-    "fit_equations",
-    "refuse_at_rest",
-    "solve_weighted",
-    "whitener_of",
-]
+__all__ = ["Equations", "Observed", "fit_equations"]
 
 Array = NDArray[np.float64]
 
 _PASSES = 20
 _STEP = 0.05  # standard deviations of a reading by which it is moved to see what follows
-_ROUNDING = 1e-12
-_STILL = 4.0  # variance of the ranges over that of their noise up to which an object is at rest
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class LinearFit:
-    """Result of linear least squares.
-
-    Attributes
-    ----------
-    x : ndarray, shape (p,)
-        Solution.
-    factor : ndarray, shape (p, p)
-        F with F F^T its covariance.
-    rank : int
-        Of the weighted matrix.
-    residuals : ndarray, shape (m,)
-        Weighted: of unit variance where the model holds.
-    used : ndarray of bool, shape (n,)
-        Frames that took part.
-    ranges : ndarray, shape (n,)
-        The root of each frame that the fit chose [m], nan where there is none.
-    """
-
-    x: Array
-    factor: Array
-    rank: int
-    residuals: Array
-    used: NDArray[np.bool_]
-    ranges: Array
-
-    @property
-    def chi_square(self) -> float:
-        """Sum of squares of the weighted residuals."""
-        return float(self.residuals @ self.residuals)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -83,82 +40,6 @@ class Observed:
 
     matrix: Array
     target: Array
-
-
-def covariances(sensor: Sensor, readings: Array, signal: Array) -> Array:
-    """Return the covariance of every frame's readings, shape (n, 2, 2).
-
-    Parameters
-    ----------
-    sensor : Sensor
-        Its noise.
-    readings : ndarray, shape (n, 2)
-        As measured, in place of their means.
-    signal : ndarray, shape (n, 2)
-        The object's part, to which the relative error belongs.
-    """
-    noise = sensor.noise
-    out = noise.relative**2 * signal[:, :, None] * signal[:, None, :]
-    shot = noise.shot * np.abs(readings)
-    for k in (0, 1):
-        out[:, k, k] += noise.read[k] ** 2 + shot[:, k]
-    if isinstance(sensor, PulsedSensor):
-        shared = shot.min(axis=1)
-        out[:, 0, 1] += shared
-        out[:, 1, 0] += shared
-    return np.asarray(out)
-
-
-def whitener_of(own: Array, common: Array) -> Array:
-    """Return W with W^T W the inverse of own + the sum of a a^T over a of common.
-
-    Parameters
-    ----------
-    own : ndarray, shape (n, 2, 2)
-        Covariances.
-    common : ndarray, shape (k, n, 2)
-        May be a million times the rest: never added to it.
-
-    Returns
-    -------
-    ndarray, shape (n, 2, 2)
-    """
-    result = np.linalg.inv(np.linalg.cholesky(own))
-    for along in common:
-        w = np.einsum("nij,nj->ni", result, along)
-        root = np.hypot(1.0, np.hypot(w[:, 0], w[:, 1]))
-        # (I + w w^T)^(-1/2) = I - w w^T / (root (1 + root))
-        shrunk = w / root[:, None] / (1.0 + root)[:, None]
-        across = np.einsum("nj,nji->ni", w, result)
-        result = result - shrunk[:, :, None] * across[:, None, :]
-    return np.asarray(result)
-
-
-def solve_weighted(matrix: Array, target: Array) -> tuple[Array, Array, int]:
-    """Solve least squares by QR with scaled columns.
-
-    Parameters
-    ----------
-    matrix : ndarray, shape (m, p)
-        Whitened.
-    target : ndarray, shape (m,)
-        Whitened.
-
-    Returns
-    -------
-    (ndarray, ndarray, int)
-        Solution, F with F F^T its covariance, rank; nan where the rank is not full.
-    """
-    p = matrix.shape[1]
-    scale = np.linalg.norm(matrix, axis=0)
-    scale = np.where(scale > 0, scale, 1.0)
-    q, r = linalg.qr(matrix / scale, mode="economic")
-    sizes = linalg.svdvals(r)
-    rank = int(np.count_nonzero(sizes > _ROUNDING * sizes[0])) if sizes.size else 0
-    if rank < p:
-        return np.full(p, np.nan), np.full((p, p), np.nan), rank
-    inverse = linalg.solve_triangular(r, np.eye(p)) / scale[:, None]
-    return inverse @ (q.T @ target), inverse, rank
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -204,15 +85,16 @@ class Equations:
             the correlation of the readings' noise, shape (n, 2, 2).
         """
         task = self.task
-        v = covariances(task.sensor, task.frames.readings, self.signal(ranges, task.frames))
+        readings, signal = task.frames.readings, self.signal(ranges, task.frames)
+        v = covariances(instrument_of(task.sensor), readings, signal)
         sd = np.sqrt(np.einsum("nii->ni", v))
         slopes = []
         for k in (0, 1):
             ends = []
             for sign in (1.0, -1.0):
-                readings = task.frames.readings.copy()
-                readings[:, k] += sign * _STEP * sd[:, k]
-                frames = dataclasses.replace(task.frames, readings=readings)
+                moved_readings = readings.copy()
+                moved_readings[:, k] += sign * _STEP * sd[:, k]
+                frames = dataclasses.replace(task.frames, readings=moved_readings)
                 moved = self.technique.solve(dataclasses.replace(task, frames=frames))
                 ends.append(self.equation(_nearest(moved.roots_m, ranges), frames))
             slopes.append(
@@ -317,40 +199,3 @@ def _best_roots(equations: Equations, roots: Array, x: Array) -> Array:
         misses.append(np.where(np.isnan(miss), np.inf, miss))
     index = np.argmin(np.stack(misses, axis=1), axis=1)
     return np.asarray(roots[np.arange(roots.shape[0]), index])
-
-
-def refuse_at_rest(fit: LinearFit, single: TechniqueResult, unknowns: tuple[str, ...]) -> None:
-    """Refuse where the ranges differ by no more than their own noise.
-
-    They are regressed on: where their differences are noise, what follows from them is noise too,
-    and surer of itself the more frames there are. Of a still object `_STILL` is exceeded in at
-    most 1e-3 of sets of four frames or more.
-
-    Parameters
-    ----------
-    fit : LinearFit
-        The fit.
-    single : TechniqueResult
-        Ranges of single frames, of which the fit has chosen.
-    unknowns : tuple of str
-        What is fitted.
-
-    Raises
-    ------
-    RefusedError
-        There, with the remedy; never for one unknown, which one range tells.
-    """
-    if len(unknowns) < 2:
-        return
-    r = fit.ranges[fit.used]
-    roots, sds = single.roots_m[fit.used], single.roots_sd_m[fit.used]
-    chosen = np.nanargmin(np.abs(roots - r[:, None]), axis=1)
-    own = float(np.nanmedian(sds[np.arange(r.size), chosen] / r)) ** 2
-    between = float(np.var(np.log(r)))
-    if not between > _STILL * own:
-        raise RefusedError(
-            "the object hardly moves: the ranges of single frames differ by "
-            f"{math.sqrt(between):.2g} of themselves and are uncertain by {math.sqrt(own):.2g}; "
-            f"{listed(list(unknowns))} need distinct ranges; move the object nearer and farther, "
-            f"or state {'one' if len(unknowns) == 2 else len(unknowns) - 1} of them as known"
-        )
