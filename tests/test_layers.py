@@ -15,6 +15,7 @@ PACKAGES = ("simulator", "inference", "service", "hybridtof")
 
 _TEMPLATE = "inference.technique inference.known inference.estimates"
 _POSTERIOR = "inference.posterior inference.density inference.frame inference.identifiability"
+_OF_FITS = f"inference.realtime.net inference.frame {_TEMPLATE}"
 _FITS = f"inference.fits inference.realtime inference.density inference.frame {_TEMPLATE}"
 
 # folder: what its files may import besides one another
@@ -32,9 +33,9 @@ ALLOWED: dict[str, str] = {
     "inference/realtime/solving/curves": "inference.realtime.solving",
     "inference/realtime/techniques": f"inference.realtime inference.frame {_TEMPLATE}",
     "inference/fits": _FITS,
-    "inference/fits/likelihood": f"{_FITS} inference.identifiability",
-    "inference/fits/linear": f"{_FITS} inference.identifiability",
-    "inference/fits/answer": f"{_FITS} inference.identifiability",
+    "inference/fits/likelihood": "inference.density inference.frame inference.identifiability",
+    "inference/fits/answer": f"inference.fits.likelihood {_OF_FITS} inference.identifiability",
+    "inference/fits/linear": f"inference.fits.likelihood inference.fits.answer {_OF_FITS}",
     "inference/fits/techniques": f"{_FITS} inference.identifiability",
     "inference/posterior": f"{_POSTERIOR} inference.fits",
     "inference/posterior/answer": _POSTERIOR,
