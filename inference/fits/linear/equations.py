@@ -43,6 +43,31 @@ class Observed:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class _Response:
+    """How equations change with the readings, ranges following, and the readings' noise.
+
+    Attributes
+    ----------
+    matrix : ndarray, shape (n, 2, p)
+        Central differences over a standard deviation of each reading.
+    target : ndarray, shape (n, 2)
+        The same.
+    correlation : ndarray, shape (n, 2, 2)
+        Of the noise.
+    """
+
+    matrix: Array
+    target: Array
+    correlation: Array
+
+    def sd(self, x: Array) -> Array:
+        """Return the standard deviation of each equation's sides at a solution, shape (n,)."""
+        gradient = self.matrix @ x - self.target
+        variance = np.einsum("ni,nij,nj->n", gradient, self.correlation, gradient)
+        return np.asarray(np.sqrt(variance))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Equations:
     """One linear equation a frame, on the ranges of a technique of single frames.
 
@@ -70,40 +95,25 @@ class Equations:
     unknowns: tuple[str, ...]
     widest: float = math.inf
 
-    def slopes(self, ranges: Array) -> tuple[Observed, Observed, Array]:
-        """Return how the equations change with the first and the second reading.
+    def _with(self, readings: Array, ranges: Array) -> Observed:
+        """Return the equations of other readings, their ranges following."""
+        frames = dataclasses.replace(self.task.frames, readings=readings)
+        moved = self.technique.solve(dataclasses.replace(self.task, frames=frames))
+        return self.equation(_nearest(moved.roots_m, ranges), frames)
 
-        Parameters
-        ----------
-        ranges : ndarray, shape (n,)
-            The roots chosen [m].
-
-        Returns
-        -------
-        (Observed, Observed, ndarray)
-            Central differences over a standard deviation of each reading, ranges following, and
-            the correlation of the readings' noise, shape (n, 2, 2).
-        """
-        task = self.task
-        readings, signal = task.frames.readings, self.signal(ranges, task.frames)
-        v = covariances(instrument_of(task.sensor), readings, signal)
+    def response(self, ranges: Array) -> _Response:
+        """Return how the equations change with the readings at the roots chosen [m]."""
+        readings, signal = self.task.frames.readings, self.signal(ranges, self.task.frames)
+        v = covariances(instrument_of(self.task.sensor), readings, signal)
         sd = np.sqrt(np.einsum("nii->ni", v))
-        slopes = []
-        for k in (0, 1):
-            ends = []
-            for sign in (1.0, -1.0):
-                moved_readings = readings.copy()
-                moved_readings[:, k] += sign * _STEP * sd[:, k]
-                frames = dataclasses.replace(task.frames, readings=moved_readings)
-                moved = self.technique.solve(dataclasses.replace(task, frames=frames))
-                ends.append(self.equation(_nearest(moved.roots_m, ranges), frames))
-            slopes.append(
-                Observed(
-                    (ends[0].matrix - ends[1].matrix) / (2 * _STEP),
-                    (ends[0].target - ends[1].target) / (2 * _STEP),
-                )
-            )
-        return slopes[0], slopes[1], v / sd[:, :, None] / sd[:, None, :]
+        matrices, targets = [], []
+        for step in _STEP * np.eye(2):
+            ahead = self._with(readings + step * sd, ranges)
+            behind = self._with(readings - step * sd, ranges)
+            matrices.append((ahead.matrix - behind.matrix) / (2 * _STEP))
+            targets.append((ahead.target - behind.target) / (2 * _STEP))
+        correlation = v / sd[:, :, None] / sd[:, None, :]
+        return _Response(np.stack(matrices, axis=1), np.stack(targets, axis=1), correlation)
 
 
 def _nearest(roots: Array, to: Array) -> Array:
@@ -164,14 +174,13 @@ def _fit_from(equations: Equations, roots: Array, ranges: Array) -> LinearFit:
     fit = LinearFit(
         np.full(p, np.nan), np.full((p, p), np.nan), 0, np.empty(0), np.zeros(n, bool), ranges
     )
-    slopes = equations.slopes(ranges)
+    response = equations.response(ranges)
     for turn in range(_PASSES):
         observed = equations.equation(ranges, frames)
         used = np.isfinite(observed.matrix).all(axis=1) & np.isfinite(observed.target)
         weights = np.ones(n)
         if turn > 0:
-            gradient = np.stack([s.matrix @ fit.x - s.target for s in slopes[:2]], axis=1)
-            sd = np.sqrt(np.einsum("ni,nij,nj->n", gradient, slopes[2], gradient))
+            sd = response.sd(fit.x)
             used &= np.isfinite(sd) & (sd > 0)
             weights = 1.0 / np.where(used, sd, 1.0)
         if int(used.sum()) <= p:
@@ -184,7 +193,7 @@ def _fit_from(equations: Equations, roots: Array, ranges: Array) -> LinearFit:
             return fit
         chosen = _best_roots(equations, roots, x)
         if not np.array_equal(chosen, ranges, equal_nan=True):
-            ranges, slopes = chosen, equations.slopes(chosen)
+            ranges, response = chosen, equations.response(chosen)
         elif turn > 1 and np.allclose(last.x, x, rtol=1e-10, atol=0.0):
             break
     return fit
