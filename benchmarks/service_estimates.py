@@ -17,7 +17,7 @@ import numpy as np
 from inference.estimate import estimate
 from inference.estimates import Status
 from service.answers.estimates import encode_estimates
-from service.checks import system_with_frames
+from service.checked_system import checked_frames
 from service.requests import EstimateRequest
 from service.strict_json import check_bulk, decode
 from simulator.validated import parse
@@ -46,14 +46,14 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=1_000_000)
     n = parser.parse_args().frames
     small = parse(EstimateRequest, decode(body(10)))
-    estimate(*system_with_frames(small.sensor, small.scene, small.frames), small.techniques)
+    estimate(*checked_frames(small.sensor, small.scene, small.frames), small.techniques)
 
     raw = body(n)
     print(f"{n} frames, body of {len(raw) / 2**20:.1f} MiB")
     data = timed("decode", decode, raw)
     timed("check of long columns", check_bulk, data)
     request = timed("validate", parse, EstimateRequest, data)
-    checked = timed("frames", system_with_frames, request.sensor, request.scene, request.frames)
+    checked = timed("frames", checked_frames, request.sensor, request.scene, request.frames)
     estimates = timed("estimate (conventional)", estimate, *checked, request.techniques)
     text = timed("encode", encode_estimates, estimates)
     print(f"answer of {len(text) / 2**20:.1f} MiB")

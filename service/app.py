@@ -15,20 +15,20 @@ from service.job_store import MemoryJobStore
 from service.jobs import Jobs
 from service.process_pool import ProcessPool
 from service.routes import ROUTERS
-from service.settings import Settings
-from service.state import State
+from service.service_settings import ServiceSettings
+from service.shared import Shared
 
 __all__ = ["create_app"]
 
 
 def create_app(
-    settings: Settings | None = None, fold: Fold[Any, Any, Any, Any] = posterior_fold
+    settings: ServiceSettings | None = None, fold: Fold[Any, Any, Any, Any] = posterior_fold
 ) -> FastAPI:
     """Make an application of its own: nothing is shared between two of them.
 
     Parameters
     ----------
-    settings : Settings, optional
+    settings : ServiceSettings, optional
         Left out: the defaults; the environment is read by the caller.
     fold : Fold, optional
         How posteriors are computed.
@@ -38,11 +38,11 @@ def create_app(
     FastAPI
         An ASGI application; jobs run from its start to its end (ASGI lifespan).
     """
-    settings = settings or Settings()
+    settings = settings or ServiceSettings()
     pool = ProcessPool(settings.workers)
     store = MemoryJobStore(settings.max_jobs, settings.max_draws_bytes)
     jobs = Jobs(fold, store, pool, running=settings.workers)
-    state = State(settings, jobs, anyio.CapacityLimiter(settings.threads))
+    shared = Shared(settings, jobs, anyio.CapacityLimiter(settings.threads))
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -59,7 +59,7 @@ def create_app(
         lifespan=lifespan,
         redirect_slashes=False,
     )
-    app.state.shared = state
+    app.state.shared = shared
     problems.install(app)
     openapi.install(app, ROUTERS)
     for router in ROUTERS:

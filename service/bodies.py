@@ -7,7 +7,7 @@ import anyio.to_thread
 from fastapi import Request
 
 from service.errors import BodyTooLargeError, MalformedError, UnsupportedMediaTypeError
-from service.state import state_of
+from service.shared import shared_of
 from service.strict_json import check_bulk, decode
 from simulator.validated import Validated, parse
 
@@ -116,11 +116,11 @@ class BodyOf(Generic[T]):
             Each as its name says.
         """
         _check_media_type(request.headers.get("content-type"))
-        state = state_of(request)
+        shared = shared_of(request)
         raw = await read_limited(
-            request.stream(), request.headers.get("content-length"), state.settings.max_body_bytes
+            request.stream(), request.headers.get("content-length"), shared.settings.max_body_bytes
         )
         parsed = await anyio.to_thread.run_sync(
-            parse_document, self.model, raw, limiter=state.threads
+            parse_document, self.model, raw, limiter=shared.threads
         )
         return parsed, raw

@@ -14,7 +14,7 @@ from inference.realtime.registry import TECHNIQUES
 from service.app import create_app
 from service.cli import main
 from service.commands import COMMANDS
-from service.settings import Settings
+from service.service_settings import ServiceSettings
 from service.technique_table import END, START, technique_table
 from simulator.scene import check_scene
 
@@ -58,7 +58,7 @@ async def test_curl_example() -> None:
     assert len(words) == 7
     name, _, value = words[4].partition(": ")
     async with httpx.AsyncClient(
-        transport=httpx.ASGITransport(create_app(Settings(workers=1))),
+        transport=httpx.ASGITransport(create_app(ServiceSettings(workers=1))),
         base_url="http://127.0.0.1:8000",
     ) as client:
         response = await client.post(

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from service.bad_rows import with_saturated_rows
-from service.checks import system_with_frames
+from service.checked_system import checked_frames
 from service.commands.command import note
 from service.commands.files import naming, read_document, read_table, source
 from service.frame_table import FrameTable
@@ -41,7 +41,7 @@ def checked(args: argparse.Namespace) -> tuple[Sensor, Scene, Frames, FrameTable
     system = read_document(SystemDescription, args.scene)
     table = read_table(args.frames)
     with naming({"/frames": source(args.frames), "": str(args.scene)}):
-        sensor, scene, frames = system_with_frames(system.sensor, system.scene, table.columns)
+        sensor, scene, frames = checked_frames(system.sensor, system.scene, table.columns)
     _say(args, args.frames, table)
     for doubt in doubts(sensor, frames):
         note(args, f"note: {doubt}")

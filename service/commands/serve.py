@@ -39,9 +39,9 @@ def _run(args: argparse.Namespace) -> int:
     import uvicorn
 
     from service.app import create_app
-    from service.settings import Settings
+    from service.service_settings import ServiceSettings
 
-    settings = Settings.from_environment(os.environ)
+    settings = ServiceSettings.from_environment(os.environ)
     config = uvicorn.Config(
         create_app(settings),
         host=args.host,

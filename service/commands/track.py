@@ -32,7 +32,7 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
 
 def _run(args: argparse.Namespace) -> int:
     from inference.tracking.tracker import tracker
-    from service.checks import system
+    from service.checked_system import checked_system
     from service.commands.files import naming, open_lines, read_document, reading
     from service.commands.output import write_result
     from service.plausibility import doubts
@@ -41,7 +41,7 @@ def _run(args: argparse.Namespace) -> int:
 
     stated = read_document(TrackedSystem, args.scene)
     with naming({"/settings": f"{args.scene}#/tracking", "": str(args.scene)}):
-        sensor, scene = system(stated.sensor, stated.scene)
+        sensor, scene = checked_system(stated.sensor, stated.scene)
         model = tracker(sensor, scene, stated.tracking)
     for doubt in doubts(sensor):
         note(args, f"note: {doubt}")

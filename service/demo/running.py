@@ -14,7 +14,7 @@ from typing import Any
 import httpx
 
 from service.errors import ServiceError
-from service.settings import PREFIX
+from service.service_settings import PREFIX
 
 __all__ = ["Client", "DemoError", "running_service"]
 

@@ -9,10 +9,10 @@ from fastapi.responses import Response
 from inference.estimate import estimate
 from service.answers.estimates import EstimatesResponse, encode_estimates
 from service.bodies import BodyOf
-from service.checks import system_with_frames
+from service.checked_system import checked_frames
 from service.problems import problem_responses
 from service.requests import EstimateRequest
-from service.state import state_of
+from service.shared import shared_of
 
 __all__ = ["answer", "router"]
 
@@ -38,7 +38,7 @@ def answer(request: EstimateRequest) -> bytes:
     InvalidInputError
         With pointers into the request.
     """
-    sensor, scene, frames = system_with_frames(request.sensor, request.scene, request.frames)
+    sensor, scene, frames = checked_frames(request.sensor, request.scene, request.frames)
     return encode_estimates(estimate(sensor, scene, frames, request.techniques))
 
 
@@ -49,6 +49,6 @@ def answer(request: EstimateRequest) -> bytes:
 )
 async def create(request: Request, body: Body) -> Response:
     """Return all physical roots of every frame."""
-    limiter = state_of(request).threads
+    limiter = shared_of(request).threads
     content = await anyio.to_thread.run_sync(answer, body[0], limiter=limiter)
     return Response(content, media_type="application/json")

@@ -7,7 +7,7 @@ from pydantic import BaseModel
 
 from service.errors import BusyError
 from service.problems import problem_responses
-from service.state import state_of
+from service.shared import shared_of
 
 __all__ = ["Health", "router"]
 
@@ -29,6 +29,6 @@ async def live() -> Health:
 @router.get("/ready", responses=problem_responses(503))
 async def ready(request: Request) -> Health:
     """Answer 503 while the service starts or ends."""
-    if not state_of(request).jobs.open:
+    if not shared_of(request).jobs.open:
         raise BusyError("the service is starting or ending")
     return Health()

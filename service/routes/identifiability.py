@@ -12,7 +12,7 @@ from service.answers.identifiability import IdentifiabilityResponse, identifiabi
 from service.bodies import BodyOf
 from service.problems import problem_responses
 from service.requests import IdentifiabilityRequest
-from service.state import state_of
+from service.shared import shared_of
 
 __all__ = ["router"]
 
@@ -27,7 +27,7 @@ Body = Annotated[tuple[IdentifiabilityRequest, bytes], Depends(BodyOf(Identifiab
 )
 async def create(request: Request, body: Body) -> Response:
     """Return rank, Cramer-Rao bounds, and a status with a reason for every unknown."""
-    limiter = state_of(request).threads
+    limiter = shared_of(request).threads
 
     def content() -> bytes:
         return pydantic_core.to_json(dataclasses.asdict(identifiability_of(body[0])))

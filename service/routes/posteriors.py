@@ -10,13 +10,13 @@ from fastapi.responses import JSONResponse, Response
 
 from service.answers.posteriors import PosteriorPage, PosteriorResponse, brief, full
 from service.bodies import BodyOf
-from service.checks import system_with_frames
+from service.checked_system import checked_frames
 from service.errors import MalformedError, NotAcceptableError
 from service.exports import EXPORTS
 from service.exports.negotiation import accepted_export
 from service.problems import problem_responses
 from service.requests import PosteriorRequest
-from service.state import state_of
+from service.shared import shared_of
 
 __all__ = ["router"]
 
@@ -46,12 +46,12 @@ async def create(
     """Start a posterior; the same Idempotency-Key with the same body gives the same one."""
     key = _key(idempotency_key)
     asked, raw = body
-    state = state_of(request)
+    shared = shared_of(request)
     checked = await anyio.to_thread.run_sync(
-        system_with_frames, asked.sensor, asked.scene, asked.frames, limiter=state.threads
+        checked_frames, asked.sensor, asked.scene, asked.frames, limiter=shared.threads
     )
     digest = hashlib.sha256(raw).hexdigest()
-    record = await state.jobs.submit(*checked, asked.sampler, key=key, digest=digest)
+    record = await shared.jobs.submit(*checked, asked.sampler, key=key, digest=digest)
     return JSONResponse(full(record), 202, {"Location": f"/v1/posteriors/{record.id}"})
 
 
@@ -69,7 +69,7 @@ async def page(
     if cursor is not None and not re.fullmatch(r"[0-9]{1,18}", cursor):
         raise MalformedError("the cursor is not one that this service gave")
     after = None if cursor is None else int(cursor)
-    records = await state_of(request).jobs.page(after, limit + 1)
+    records = await shared_of(request).jobs.page(after, limit + 1)
     more = str(records[limit - 1].sequence) if len(records) > limit else None
     return JSONResponse({"items": [brief(r) for r in records[:limit]], "next_cursor": more})
 
@@ -81,7 +81,7 @@ async def page(
 )
 async def get(request: Request, job_id: str) -> Response:
     """Return a posterior as it stands."""
-    return JSONResponse(full(await state_of(request).jobs.get(job_id)))
+    return JSONResponse(full(await shared_of(request).jobs.get(job_id)))
 
 
 @router.get(
@@ -99,7 +99,7 @@ async def draws(request: Request, job_id: str) -> Response:
     if form is None:
         names = " or ".join(form.media_type for form in EXPORTS)
         raise NotAcceptableError(f"draws come as {names}")
-    data = await state_of(request).jobs.draws(job_id, form.media_type)
+    data = await shared_of(request).jobs.draws(job_id, form.media_type)
     name = f'attachment; filename="{job_id}{form.suffix}"'
     headers = {"Content-Disposition": name, "Vary": "Accept"}
     return Response(data, headers=headers, media_type=form.media_type)
@@ -113,11 +113,11 @@ async def draws(request: Request, job_id: str) -> Response:
 )
 async def cancel(request: Request, job_id: str) -> Response:
     """End a posterior after the chunk that runs; it keeps what it has. One that ended stays."""
-    return JSONResponse(full(await state_of(request).jobs.cancel(job_id)), 202)
+    return JSONResponse(full(await shared_of(request).jobs.cancel(job_id)), 202)
 
 
 @router.delete("/{job_id}", status_code=204, response_model=None, responses=problem_responses(404))
 async def delete(request: Request, job_id: str) -> Response:
     """Forget a posterior, running or not."""
-    await state_of(request).jobs.delete(job_id)
+    await shared_of(request).jobs.delete(job_id)
     return Response(status_code=204)

@@ -11,7 +11,7 @@ from service.answers.simulations import SimulationResponse, simulation_of
 from service.bodies import BodyOf
 from service.problems import problem_responses
 from service.requests import SimulationRequest
-from service.state import state_of
+from service.shared import shared_of
 
 __all__ = ["router"]
 
@@ -26,7 +26,7 @@ Body = Annotated[tuple[SimulationRequest, bytes], Depends(BodyOf(SimulationReque
 )
 async def create(request: Request, body: Body) -> Response:
     """Simulate frames; unknowns of the scene are drawn from their priors, once."""
-    limiter = state_of(request).threads
+    limiter = shared_of(request).threads
 
     def content() -> bytes:
         return pydantic_core.to_json(simulation_of(body[0]))

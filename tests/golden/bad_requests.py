@@ -17,7 +17,7 @@ from typing import Any
 import httpx
 
 from service.app import create_app
-from service.settings import Settings
+from service.service_settings import ServiceSettings
 
 ANSWERS = Path(__file__).with_name("bad_answers.json")
 MAX_BODY_BYTES = 200_000
@@ -271,7 +271,7 @@ def requests() -> dict[str, BadRequest]:
 
 async def answers() -> dict[str, Any]:
     """Send every bad request; return status, problem type and pointers by its name."""
-    app = create_app(Settings(workers=1, threads=1, max_body_bytes=MAX_BODY_BYTES))
+    app = create_app(ServiceSettings(workers=1, threads=1, max_body_bytes=MAX_BODY_BYTES))
     found: dict[str, Any] = {}
     async with (
         app.router.lifespan_context(app),

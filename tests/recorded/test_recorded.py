@@ -8,7 +8,7 @@ import pytest
 
 from service.app import create_app
 from service.recordings import Recording, pulsed, sine_wave
-from service.settings import Settings
+from service.service_settings import ServiceSettings
 from tests.recorded.experiment import (
     PATH,
     calibration_of,
@@ -73,7 +73,7 @@ async def test_over_http(recording: Recording, kind: str) -> None:
         "frames": frames.to_columns(sensor),
         "techniques": ["conventional", "differential"],
     }
-    app = create_app(Settings(workers=1))
+    app = create_app(ServiceSettings(workers=1))
     async with httpx.AsyncClient(
         transport=httpx.ASGITransport(app), base_url="http://test"
     ) as client:

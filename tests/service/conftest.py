@@ -8,7 +8,7 @@ import httpx
 import pytest
 
 from service.app import create_app
-from service.settings import Settings
+from service.service_settings import ServiceSettings
 from tests.service import fake_fold
 
 SENSOR: dict[str, Any] = {
@@ -35,7 +35,7 @@ def request_body() -> dict[str, Any]:
 async def client() -> AsyncIterator[httpx.AsyncClient]:
     """Client of an application whose posteriors are `fake_fold`; its jobs run."""
     fake_fold.order()
-    app = create_app(Settings(workers=2, threads=2), fake_fold)
+    app = create_app(ServiceSettings(workers=2, threads=2), fake_fold)
     transport = httpx.ASGITransport(app)
     async with (
         app.router.lifespan_context(app),

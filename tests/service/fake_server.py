@@ -6,11 +6,11 @@ import sys
 import uvicorn
 
 from service.app import create_app
-from service.settings import Settings
+from service.service_settings import ServiceSettings
 from tests.service import fake_fold
 
 # guarded: the workers import their parent's main module
 if __name__ == "__main__":
     fake_fold.order(**json.loads(sys.argv[1]))
-    app = create_app(Settings(workers=2, max_body_bytes=int(sys.argv[2])), fake_fold)
+    app = create_app(ServiceSettings(workers=2, max_body_bytes=int(sys.argv[2])), fake_fold)
     uvicorn.run(app, port=0, timeout_graceful_shutdown=2)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from service.answers.shape import Shape, model_of
 from service.app import create_app
-from service.settings import Settings
+from service.service_settings import ServiceSettings
 
 RECORDED: dict[str, list[Any]] = json.loads(
     Path(__file__).with_name("recorded_answers.json").read_text(encoding="utf-8")
@@ -25,7 +25,7 @@ FREE = ("/truth", "/problem")
 
 @pytest.fixture(scope="module")
 def document() -> dict[str, Any]:
-    return create_app(Settings(workers=1)).openapi()
+    return create_app(ServiceSettings(workers=1)).openapi()
 
 
 def validator(document: dict[str, Any], operation: str) -> jsonschema.Draft202012Validator:

@@ -9,7 +9,7 @@ import pytest
 
 from service.app import create_app
 from service.cli import main
-from service.settings import Settings
+from service.service_settings import ServiceSettings
 from tests.service.conftest import SENSOR
 
 FRAMES = {"w1": [0.01, 0.02, 0.03], "w2": [0.5, 0.6, 0.7]}
@@ -65,7 +65,7 @@ REFUSED: dict[str, tuple[Body, str]] = {
 
 @pytest.mark.anyio
 async def test_over_http() -> None:
-    app = create_app(Settings(workers=1))
+    app = create_app(ServiceSettings(workers=1))
     async with (
         app.router.lifespan_context(app),
         httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://test") as client,

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from inference.posterior import fold as real_fold
 from inference.posterior.settings import SamplerSettings
 from service.app import create_app
-from service.settings import Settings
+from service.service_settings import ServiceSettings
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
@@ -156,7 +156,7 @@ def loop() -> Iterator[asyncio.Runner]:
 def http(loop: asyncio.Runner) -> Iterator[httpx.AsyncClient]:
     fake_fold.order()
     fold: Any = SimpleNamespace(**vars(fake_fold) | {"prepare": prepare})
-    app = create_app(Settings(workers=1, max_jobs=100_000), fold)
+    app = create_app(ServiceSettings(workers=1, max_jobs=100_000), fold)
     lifespan = app.router.lifespan_context(app)
     loop.run(lifespan.__aenter__())
     # an exception that is not answered fails the test with its own traceback

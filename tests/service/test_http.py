@@ -12,7 +12,7 @@ from service.answers.estimates import EstimatesResponse
 from service.answers.posteriors import PosteriorPage, PosteriorResponse
 from service.answers.simulations import SimulationResponse
 from service.app import create_app
-from service.settings import Settings
+from service.service_settings import ServiceSettings
 from tests.service import fake_fold
 
 pytestmark = pytest.mark.anyio
@@ -213,7 +213,7 @@ async def test_unknown_path_and_method(client: httpx.AsyncClient) -> None:
 
 
 async def test_body_too_large(request_body: dict[str, Any]) -> None:
-    app = create_app(Settings(workers=1, max_body_bytes=1000), fake_fold)
+    app = create_app(ServiceSettings(workers=1, max_body_bytes=1000), fake_fold)
     transport = httpx.ASGITransport(app)
     async with httpx.AsyncClient(transport=transport, base_url="http://test") as small:
         assert (await small.post("/v1/estimates", json=request_body)).status_code == 200
@@ -259,7 +259,7 @@ async def test_health(client: httpx.AsyncClient) -> None:
 
 
 async def test_not_ready_before_the_start() -> None:
-    transport = httpx.ASGITransport(create_app(Settings(workers=1), fake_fold))
+    transport = httpx.ASGITransport(create_app(ServiceSettings(workers=1), fake_fold))
     async with httpx.AsyncClient(transport=transport, base_url="http://test") as http:
         assert (await http.get("/health/live")).status_code == 200
         response = await http.get("/health/ready")
@@ -350,7 +350,7 @@ async def test_draws(
 
 async def test_draws_that_were_dropped(request_body: dict[str, Any]) -> None:
     fake_fold.order()
-    app = create_app(Settings(workers=1, max_draws_bytes=1), fake_fold)
+    app = create_app(ServiceSettings(workers=1, max_draws_bytes=1), fake_fold)
     async with (
         app.router.lifespan_context(app),
         httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://test") as http,

@@ -19,7 +19,7 @@ from service.job_store import MemoryJobStore
 from service.jobs import Jobs
 from service.process_pool import ProcessPool
 from service.requests import PosteriorRequest, SimulationRequest
-from service.settings import Settings
+from service.service_settings import ServiceSettings
 from simulator.frames import frames_from_columns
 from simulator.validated import parse
 from tests.service.conftest import SENSOR
@@ -44,7 +44,7 @@ def request_body() -> dict[str, Any]:
 
 
 async def test_over_http() -> None:
-    app = create_app(Settings(workers=2))
+    app = create_app(ServiceSettings(workers=2))
     transport = httpx.ASGITransport(app)
     async with (
         app.router.lifespan_context(app),
@@ -73,7 +73,7 @@ async def test_over_http() -> None:
 
 
 async def test_refusal_over_http() -> None:
-    app = create_app(Settings(workers=1))
+    app = create_app(ServiceSettings(workers=1))
     transport = httpx.ASGITransport(app)
     async with (
         app.router.lifespan_context(app),

@@ -12,7 +12,7 @@ from service.app import create_app
 from service.bodies import BodyOf
 from service.problems import problem_responses
 from service.routes import ROUTERS
-from service.settings import Settings
+from service.service_settings import ServiceSettings
 from simulator.validated import Validated
 
 pytestmark = pytest.mark.anyio
@@ -63,7 +63,7 @@ async def create(
 
 async def test_a_new_route_is_a_file_and_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(application, "ROUTERS", (*ROUTERS, router))
-    transport = httpx.ASGITransport(create_app(Settings(workers=1)))
+    transport = httpx.ASGITransport(create_app(ServiceSettings(workers=1)))
     async with httpx.AsyncClient(transport=transport, base_url="http://test") as http:
         good = await http.post("/v1/halves", json={"number": 3.0})
         assert (good.status_code, good.json()) == (200, {"half": 1.5})

@@ -7,18 +7,18 @@ import anyio
 from fastapi import Request
 
 from service.jobs import Jobs
-from service.settings import Settings
+from service.service_settings import ServiceSettings
 
-__all__ = ["State", "state_of"]
+__all__ = ["Shared", "shared_of"]
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
-class State:
+class Shared:
     """One application's own.
 
     Attributes
     ----------
-    settings : Settings
+    settings : ServiceSettings
         What the operator chose.
     jobs : Jobs
         Posteriors that run or have run.
@@ -26,11 +26,11 @@ class State:
         Bounds the threads of estimates and simulations.
     """
 
-    settings: Settings
+    settings: ServiceSettings
     jobs: Jobs[Any, Any, Any, Any]  # whatever they compute
     threads: anyio.CapacityLimiter
 
 
-def state_of(request: Request) -> State:
-    """Return the state of the application that got a request."""
-    return cast("State", request.app.state.shared)
+def shared_of(request: Request) -> Shared:
+    """Return what the routes share in the application that got a request."""
+    return cast("Shared", request.app.state.shared)

@@ -1,4 +1,4 @@
-"""Settings of the service, from environment variables ``HYBRIDTOF_<NAME>``."""
+"""ServiceSettings of the service, from environment variables ``HYBRIDTOF_<NAME>``."""
 
 import os
 from collections.abc import Mapping
@@ -8,13 +8,13 @@ import pydantic
 
 from simulator.errors import InvalidInputError, Problem
 
-__all__ = ["PREFIX", "Settings"]
+__all__ = ["PREFIX", "ServiceSettings"]
 
 PREFIX = "HYBRIDTOF_"
 Count = Annotated[int, pydantic.Field(ge=1)]
 
 
-class Settings(pydantic.BaseModel):
+class ServiceSettings(pydantic.BaseModel):
     """What an operator may choose.
 
     Attributes
@@ -43,7 +43,7 @@ class Settings(pydantic.BaseModel):
     shutdown_s: Annotated[float, pydantic.Field(ge=0, le=10)] = 5.0
 
     @classmethod
-    def from_environment(cls, environment: Mapping[str, str]) -> "Settings":
+    def from_environment(cls, environment: Mapping[str, str]) -> "ServiceSettings":
         """Read the settings from environment variables.
 
         Parameters
@@ -53,7 +53,7 @@ class Settings(pydantic.BaseModel):
 
         Returns
         -------
-        Settings
+        ServiceSettings
             Defaults where nothing is said.
 
         Raises

@@ -1,16 +1,16 @@
 import pytest
 
-from service.settings import Settings
+from service.service_settings import ServiceSettings
 from simulator.errors import InvalidInputError
 
 
 def test_defaults_need_nothing() -> None:
-    assert Settings.from_environment({}) == Settings()
+    assert ServiceSettings.from_environment({}) == ServiceSettings()
 
 
 def test_reads_its_prefix_alone() -> None:
     given = {"HYBRIDTOF_WORKERS": "3", "HYBRIDTOF_SHUTDOWN_S": "1.5", "WORKERS": "9"}
-    settings = Settings.from_environment(given)
+    settings = ServiceSettings.from_environment(given)
     assert (settings.workers, settings.shutdown_s) == (3, 1.5)
 
 
@@ -26,5 +26,5 @@ def test_reads_its_prefix_alone() -> None:
 )
 def test_names_the_variable(name: str, value: str) -> None:
     with pytest.raises(InvalidInputError) as caught:
-        Settings.from_environment({f"HYBRIDTOF_{name}": value})
+        ServiceSettings.from_environment({f"HYBRIDTOF_{name}": value})
     assert [p.pointer for p in caught.value.problems] == [f"/HYBRIDTOF_{name}"]

@@ -5,13 +5,13 @@ from simulator.frames import FrameColumns, Frames, frames_from_columns
 from simulator.scene import Scene, check_scene
 from simulator.sensor import PulsedSensor, Sensor
 
-__all__ = ["system", "system_with_frames"]
+__all__ = ["checked_frames", "checked_system"]
 
 # roots that an answer may hold: about a gigabyte
 _MOST_ROOTS = 50_000_000
 
 
-def system(sensor: Sensor, scene: Scene) -> tuple[Sensor, Scene]:
+def checked_system(sensor: Sensor, scene: Scene) -> tuple[Sensor, Scene]:
     """Check a scene against its sensor.
 
     Parameters
@@ -36,7 +36,7 @@ def system(sensor: Sensor, scene: Scene) -> tuple[Sensor, Scene]:
     return sensor, scene
 
 
-def system_with_frames(
+def checked_frames(
     sensor: Sensor, scene: Scene, columns: FrameColumns
 ) -> tuple[Sensor, Scene, Frames]:
     """Check a scene and frames against their sensor.
@@ -61,7 +61,7 @@ def system_with_frames(
     problems: list[Problem] = []
     frames = None
     try:
-        system(sensor, scene)
+        checked_system(sensor, scene)
     except InvalidInputError as error:
         problems += error.problems
     try:
