@@ -107,7 +107,7 @@ def _phases(axes: Axes, episode: Episode) -> None:
 
 
 def draw(episodes: Sequence[Episode], path: Path) -> None:
-    """Draw crosstalk through a glass with its errors, and frames of which two ranges are true.
+    """Draw crosstalk through a glass with its errors, and frames that two ranges explain.
 
     Parameters
     ----------
