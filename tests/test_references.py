@@ -4,6 +4,7 @@ An equation's number, a table, an appendix or a section is an anchor of docs/mod
 ``eq-4-13`` there. ``docs/NAME.md, what`` names the page and the anchor itself.
 """
 
+import functools
 import re
 import tokenize
 from collections.abc import Iterator
@@ -17,13 +18,14 @@ PACKAGES = ("hybridtof", "simulator", "inference", "service", "benchmarks", "tes
 SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 PAGES = sorted([*ROOT.glob("*.md"), *DOCS.glob("*.md"), *(ROOT / "benchmarks").rglob("*.md")])
 
-NUMBER = r"[2-5]\.(?:[1-9]\d?)(?![\d.])"
+NUMBER = r"(?<![\d.])[2-5]\.(?:[1-9]\d?)(?![\d.])"
 NUMBERS = rf"{NUMBER}(?:(?:, | and |, and | to |-){NUMBER})*"
 # (4.13), (2.6-2.10), (4.19 with ...), equations 2.50, 2.57; a length in brackets is no equation
 EQUATION = re.compile(
     rf"(?:\(|\bequations? |\beqs?\. )({NUMBERS})(?=[,;)]| with| as | in the| for |\.\s|$)"
 )
 SECTION = re.compile(r"\((5\.2\.[23])\b")
+EQUATIONS = "equations="  # of a technique: what follows is all numbers of equations
 TABLE = re.compile(r"\bTables? (\d\.\d)(?: and (\d\.\d))?")
 APPENDIX = re.compile(r"\b(?:App\.|[Aa]ppendix) ([AB])(?:, (\d+)(?:-(\d+))?)?")
 # as the code still says, until every reference names a page
@@ -36,6 +38,7 @@ PAGE = re.compile(
 )
 
 
+@functools.cache
 def anchors(page: Path) -> set[str]:
     """Explicit anchors of a page, and those that headings make."""
     text = page.read_text(encoding="utf-8")
@@ -49,11 +52,17 @@ def anchors(page: Path) -> set[str]:
 MODEL = anchors(DOCS / "model.md")
 
 
-def texts(path: Path) -> Iterator[tuple[int, str]]:
+@functools.cache
+def texts(path: Path) -> tuple[tuple[int, str], ...]:
+    return tuple(_texts(path))
+
+
+def _texts(path: Path) -> Iterator[tuple[int, str]]:
     """Comments (those of neighbouring lines joined) and strings of words, in one line each."""
     with tokenize.open(path) as file:
         tokens = list(tokenize.generate_tokens(file.readline))
     first, last, block = 0, -1, ""
+    before = ("", "")
     for token in tokens:
         if token.type == tokenize.COMMENT:
             if token.start[0] != last + 1:
@@ -62,8 +71,12 @@ def texts(path: Path) -> Iterator[tuple[int, str]]:
                 first, block = token.start[0], ""
             last = token.start[0]
             block += " " + token.string.lstrip("# ")
-        elif token.type == tokenize.STRING and " " in token.string:
-            yield token.start[0], " ".join(token.string.split())
+        elif token.type == tokenize.STRING:
+            named = "".join(before) == EQUATIONS
+            if named or " " in token.string:
+                mark = EQUATIONS if named else ""
+                yield token.start[0], mark + " ".join(token.string.split())
+        before = (before[1], token.string)
     if block:
         yield first, block
 
@@ -74,6 +87,10 @@ def numbers(text: str) -> list[str]:
 
 def references(text: str) -> Iterator[tuple[str, str]]:
     """Each reference of a text, and the anchor in the model's page that it means."""
+    if text.startswith(EQUATIONS):
+        yield from (
+            (number, f"eq-{number.replace('.', '-')}") for number in numbers(TABLE.sub("", text))
+        )
     for found in EQUATION.finditer(text):
         yield from ((number, f"eq-{number.replace('.', '-')}") for number in numbers(found[1]))
     for found in SECTION.finditer(text):
@@ -156,6 +173,7 @@ def test_the_grammar_finds_what_is_written() -> None:
     assert found["2.10"] == "eq-2-10"
     assert found["Table 3.1"] == "table-3-1"
     assert "appendix-a-27" in {anchor for _, anchor in references("App. A, 25-27")}
+    assert [number for number, _ in references('equations="4.64-4.68, 5.2.3"')] == ["4.64", "4.68"]
     assert list(references("(3.0), 80 frames in (2.5 m, 3.5 m)")) == []
     (named,) = page_references("see docs/model.md, exact.")
     assert named[1:] == ("model", "exact")
