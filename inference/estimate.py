@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from inference.estimates import Estimates, LeftOut, TechniqueResult
 from inference.known import known_of
-from inference.plan import obstacle, plan
+from inference.plan import cheapest, obstacle, plan
 from inference.realtime.registry import TECHNIQUES
 from inference.technique import Task
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
@@ -79,7 +79,8 @@ def estimate(
             left_out[name] = found
         else:
             served.append(found)
-    return Estimates(choice.chosen, tuple(served), tuple(left_out.values()))
+    chosen = cheapest(result.technique for result in served)
+    return Estimates(chosen, tuple(served), tuple(left_out.values()))
 
 
 def _run(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> TechniqueResult | LeftOut:

@@ -105,7 +105,7 @@ class Estimates:
     Attributes
     ----------
     chosen : str or None
-        The technique that the plan prefers; None if the scene serves none.
+        Of the techniques that have a result the one of least cost; None if none has one.
     results : tuple of TechniqueResult
         In the order asked for.
     left_out : tuple of LeftOut

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Iterable
 
 from inference.estimates import LeftOut
 from inference.known import Known, known_of
@@ -12,7 +13,7 @@ from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor, SineWaveSensor
 
-__all__ = ["Plan", "obstacle", "plan"]
+__all__ = ["Plan", "cheapest", "obstacle", "plan"]
 
 _MOST_HALF_TURNS = 1000.0  # of phase to the background, each of which may hold a root
 
@@ -89,6 +90,17 @@ def obstacle(
     return None
 
 
+def cheapest(names: Iterable[str]) -> str | None:
+    """Return the technique of least cost, None of none.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Techniques by name.
+    """
+    return min(names, key=lambda name: ALL_TECHNIQUES[name].cost, default=None)
+
+
 def plan(sensor: Sensor, scene: Scene, frames: Frames | None = None) -> Plan:
     """Choose the cheapest technique that is immune to what the scene has.
 
@@ -111,8 +123,7 @@ def plan(sensor: Sensor, scene: Scene, frames: Frames | None = None) -> Plan:
         name: obstacle(technique, sensor, scene, known, frames)
         for name, technique in ALL_TECHNIQUES.items()
     }
-    able = [name for name, reason in obstacles.items() if reason is None]
-    chosen = min(able, key=lambda name: ALL_TECHNIQUES[name].cost, default=None)
+    chosen = cheapest(name for name, reason in obstacles.items() if reason is None)
     left_out = [
         LeftOut(name, reason if reason is not None else f"{chosen} serves the scene at less cost")
         for name, reason in obstacles.items()

@@ -58,8 +58,8 @@ class Technique:
         What it uses of a frame.
     needs : tuple of str
         Scene paths that must be known numbers.
-    immune_to : tuple of "crosstalk", "background"
-        Terms that may be present without being known (Table 4.1).
+    immune_to : tuple of "crosstalk", "background", "discrepancy"
+        Terms that may be present without being known (Table 4.1); tests/contract holds it to it.
     uses_background : bool
         Whether the scene must have a background.
     differential : bool

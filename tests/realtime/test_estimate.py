@@ -89,7 +89,7 @@ def test_immunity_is_that_of_table_4_1() -> None:
         "intensity_w1": set(),
         "differential": {"crosstalk"},
         "background_cancelling": {"background"},
-        "background_intensity": {"background"},
+        "background_intensity": {"background", "discrepancy"},
         "background_cancelling_differential": {"crosstalk", "background"},
     }
 
@@ -98,9 +98,24 @@ def test_results_stand_in_the_order_asked_for() -> None:
     asked = ["intensity", "joint_fit", "conventional", "background_cancelling"]
     estimates = estimate(PULSED, parse_scene({"object": OBJECT}), frame(0.1, 2.0), asked)
     assert [result.technique for result in estimates.results] == ["intensity", "conventional"]
+    assert estimates.chosen == "conventional"
     reasons = {item.name: item.reason for item in estimates.left_out}
     assert "the scene states none" in reasons["background_cancelling"]
     assert "nothing but the ranges is unknown" in reasons["joint_fit"]
+
+
+def test_chosen_has_a_result_or_is_none() -> None:
+    known = parse_scene({"object": OBJECT})
+    assert estimate(PULSED, known, frame(0.1, 2.0), ["intensity"]).chosen == "intensity"
+    assert estimate(PULSED, known, frame(0.1, 2.0)).chosen == "conventional"
+    none = estimate(PULSED, known, frame(0.1, 2.0), ["joint_fit", "posterior"])
+    assert none.results == ()
+    assert none.chosen is None
+    # the plan needs no more than the scene; the fit finds that one frame is not enough
+    unknown = parse_scene({"crosstalk": UNKNOWN})
+    refused = estimate(PULSED, unknown, frame(0.1, 2.0), ["crosstalk_fit", "joint_fit"])
+    assert refused.results == ()
+    assert refused.chosen is None
 
 
 def test_unknown_techniques_are_named() -> None:

@@ -106,7 +106,7 @@ BACKGROUND_INTENSITY = Technique(
         "background.shadow.c0",
         "background.shadow.c1",
     ),
-    immune_to=("background",),
+    immune_to=("background", "discrepancy"),  # what the object sends plays no part
     uses_background=True,
     differential=False,
     cost=160.0,
