@@ -139,7 +139,8 @@ def errors_are_right(technique: Technique, kind: str) -> None:
                 truth, frames = _frames(technique, sensor, setting, 100 + seed)
                 misses = _misses(_solve(technique, sensor, setting, frames), truth)
                 sums.append(float(np.nanmean(misses**2)))
-            low, high = (special.chdtri(_SETS, p) / _SETS for p in (1 - _ALARM / 2, _ALARM / 2))
+            low = float(special.chdtri(_SETS, 1 - _ALARM / 2)) / _SETS
+            high = float(special.chdtri(_SETS, _ALARM / 2)) / _SETS
             square = float(np.mean(sums))
             assert low < square < high, (technique.name, setting.name, low, square, high)
 
@@ -213,7 +214,7 @@ def fields_are_those_of_the_contract(technique: Technique, result: TechniqueResu
     bounded: Flags = np.zeros(n, dtype=np.bool_)
     if result.range_bounds_m is not None:
         assert result.range_bounds_m.shape == (n, 2)
-        bounded = np.isfinite(result.range_bounds_m).all(axis=1)
+        bounded = np.asarray(np.isfinite(result.range_bounds_m).all(axis=1))
     expected = np.where(
         count == 1, Status.UNIQUE, np.where((count > 1) | bounded, Status.AMBIGUOUS, Status.NONE)
     )
