@@ -27,16 +27,12 @@ class Observed:
     @property
     def scale(self) -> Array:
         """From readings to units of the noise, shape (2,); 0 for what is not used."""
-        return _scale(self.units, self.used)
+        return np.where(self.used, 1.0 / np.asarray(self.units), 0.0)
 
     @property
     def channels(self) -> int:
         """How many of the two observables are used."""
         return sum(self.used)
-
-
-def _scale(units: tuple[float, float], used: tuple[bool, bool]) -> Array:
-    return np.where(used, 1.0 / np.asarray(units), 0.0)
 
 
 def observed_of(sensor: Sensor, settings: TrackingSettings) -> Observed:
@@ -53,12 +49,11 @@ def observed_of(sensor: Sensor, settings: TrackingSettings) -> Observed:
         units = sensor.noise.derivative
     used = (settings.observables != "w2", settings.observables != "w1")
     relative, shot = (0.0, 0.0) if by_rate else (sensor.noise.relative, sensor.noise.shot)
-    scale1, scale2 = _scale(units, used).tolist()
+    first, second = units
     noise = ReadingsNoise(
         plain=relative == 0.0 and shot == 0.0,
-        shot1=shot * scale1,
-        shot2=shot * scale2,
-        ratio=units[0] / units[1],
+        shot=shot / second,
+        ratio=first / second,
         relative=relative,
         pulsed=isinstance(sensor, PulsedSensor),
     )

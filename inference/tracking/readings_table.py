@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.tracking.roots import UNIT, Root, add_factor
+from inference.tracking.roots import Root, add_factor
 from simulator.compiled import compiled
+from simulator.readings import noise_parts
 
 __all__ = [
     "FIRST",
@@ -36,12 +37,10 @@ MEAN, SIGNAL, LOG_PRIOR, NUISANCE = 0, 4, 8, 9
 
 
 class ReadingsNoise(NamedTuple):
-    """Noise of the two readings, in units of their read noise."""
+    """Noise of the two readings."""
 
     plain: bool  # whether it does not depend on the range
-    # shot noise variance per mean reading, both in units of the read noise
-    shot1: float
-    shot2: float
+    shot: float  # variance per mean reading, in units of the second reading's read noise
     ratio: float  # read noise of the first reading over that of the second
     relative: float  # common relative error of the object's signal
     pulsed: bool  # whether shot noise is shared by both readings
@@ -124,22 +123,20 @@ def nuisance_at(i: int, t: float, j: int, table: ReadingsTable) -> tuple[float, 
 
 @compiled
 def noise_root(m1: float, m2: float, o1: float, o2: float, noise: ReadingsNoise) -> Root:
-    """Return the triangular root of the noise's covariance at mean readings m, object's part o."""
-    root = UNIT
-    if noise.shot1 > 0.0 or noise.shot2 > 0.0:
-        first, second = noise.shot1 * abs(m1), noise.shot2 * abs(m2)
-        if not noise.pulsed:
-            root = Root(math.sqrt(1.0 + first), 0.0, math.sqrt(1.0 + second))
-        elif abs(m1) * noise.ratio <= abs(m2):
-            own = second - first * noise.ratio * noise.ratio
-            root = Root(1.0, 0.0, math.sqrt(1.0 + max(own, 0.0)))
-            shared = math.sqrt(first)
-            root = add_factor(root, shared, shared * noise.ratio)
-        else:
-            own = first - second / noise.ratio / noise.ratio
-            root = Root(math.sqrt(1.0 + max(own, 0.0)), 0.0, 1.0)
-            shared = math.sqrt(second)
-            root = add_factor(root, shared / noise.ratio, shared)
+    """Return the triangular root of the noise's covariance at mean readings m, object's part o.
+
+    The covariance is that of `simulator.readings.noise_parts`. Its root is not
+    `inference.frame.noise.root`: each reading has its own unit here, and what crosstalk and
+    nuisance parameters add goes on by the rotations that add the parts.
+    """
+    ratio = noise.ratio
+    own1, own2, shared, common1, common2 = noise_parts(
+        (ratio, 1.0), noise.shot, noise.relative, noise.pulsed, (m1 * ratio, m2), (o1 * ratio, o2)
+    )
+    root = Root(math.sqrt(own1) / ratio, 0.0, math.sqrt(own2))
+    if shared > 0.0:
+        photons = math.sqrt(shared)
+        root = add_factor(root, photons / ratio, photons)
     if noise.relative > 0.0:
-        root = add_factor(root, noise.relative * o1, noise.relative * o2)
+        root = add_factor(root, common1 / ratio, common2)
     return root
