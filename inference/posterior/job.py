@@ -12,6 +12,7 @@ from inference.density.static import with_common_range
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.posterior.checks import check_scene_for_posterior
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.streams import Stream
 from simulator.errors import RefusedError
 from simulator.frames import Frames, check_frames
 from simulator.scene import Scene, parse_scene
@@ -87,12 +88,12 @@ class Job:
             return density
         return with_discrepancy(density, self.scene.discrepancy)
 
-    def seeds(self, purpose: int, *numbers: int) -> np.random.SeedSequence:
+    def seeds(self, purpose: Stream, *numbers: int) -> np.random.SeedSequence:
         """Return the seed of one purpose; those of different purposes are independent."""
         return np.random.SeedSequence(self.seed, spawn_key=(purpose, *numbers))
 
-    def stream(self, purpose: int, *numbers: int) -> np.random.Generator:
-        """Return the random stream of one purpose, one of `Stream`."""
+    def stream(self, purpose: Stream, *numbers: int) -> np.random.Generator:
+        """Return the random stream of one purpose."""
         return np.random.default_rng(self.seeds(purpose, *numbers))
 
 

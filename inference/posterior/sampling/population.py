@@ -7,52 +7,106 @@ et al. 2022, with polynomials in place of their normalising flow; halves as in F
 2013: a map fitted to the members that it moves draws them together, by a tenth of their spread).
 Where crosstalk and a background are both unknown the posterior is a thin curved sheet, on which
 plain moves stay where they were started.
+
+A few members moved by differential evolution alone, in straight coordinates, cost a tenth: scouts,
+which find optima that a search has missed, and say nothing of how much each of them holds.
 """
 
 import dataclasses
+import functools
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import optimize
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.proposal import log_student, student
-from inference.posterior.sampling.shear import Shear, shear_of
-from inference.posterior.sampling.tempering import next_power
-from inference.posterior.sampling.transport import TriangularMap, fit_map
+from inference.posterior.sampling.shear import shear_of
+from inference.posterior.sampling.transport import TriangularMap, fit_map, straight_map
 
-__all__ = ["Population", "carried", "first_population", "temper"]
+__all__ = ["Effort", "Population", "carried", "effort_of", "first_population", "scouts", "temper"]
 
 Array = NDArray[np.float64]
 
 _SCREEN = 4  # times as many are drawn from the prior
-_REFIT = 4  # sweeps with one map, of which the last is differential evolution
-_SWEEPS = 20.0  # at most, for every accepted move that is wanted
 _LAST = 3.0  # times as many moves at the last temperature
 _HOT = 1e-2  # power up to which one move suffices: what is lost there are not the ends of a sheet
 
 
+Move = Callable[[Array, Array, np.random.Generator], tuple[Array, Array]]
+
+
+def _jump(x: Array, _: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Propose coordinates anew, and the log of the proposal's densities' ratio (old to new)."""
+    new = student(rng, *x.shape)
+    return new, log_student(x) - log_student(new)
+
+
+def _evolve(
+    x: Array,
+    others: Array,
+    rng: np.random.Generator,
+    spread: float = 0.5,
+    noise: float = 1e-4,
+    hops: float = 0.2,
+) -> tuple[Array, Array]:
+    """Propose steps along differences of other members (ter Braak 2006), some from mode to mode."""
+    n, d = x.shape
+    first, second = rng.integers(len(others), size=n), rng.integers(len(others), size=n)
+    scale = 2.38 / math.sqrt(2 * d) * np.exp(spread * rng.standard_normal((n, 1)))
+    if rng.random() < hops:
+        scale = np.ones((n, 1))
+    new = x + scale * (others[first] - others[second]) + noise * rng.standard_normal((n, d))
+    return new, np.zeros(n)
+
+
 @dataclasses.dataclass(frozen=True)
-class _Effort:
-    """Members of a population, and accepted moves of each at a temperature."""
+class Effort:
+    """What a population may take.
+
+    Attributes
+    ----------
+    size : int
+        Members.
+    wanted : float
+        Accepted moves of each at a temperature, beyond the hottest.
+    sweeps : float
+        At most, for every accepted move that is wanted.
+    moves : tuple of callable
+        What is proposed in turn; then maps are fitted anew. Coordinates of the members that move
+        and of others, and a source of randomness, to new ones and the log of the ratio of the
+        proposal's densities (old to new).
+    unbends : bool
+        Whether the maps follow a curved shape.
+    """
 
     size: int
-    moves: float  # beyond `_HOT`
+    wanted: float
+    sweeps: float
+    moves: tuple[Move, ...]
+    unbends: bool
 
 
-_EASY = _Effort(384, 1.0)
-
-
-def _effort(shear: Shear | None, d: int) -> _Effort:
-    """Return what a scene of d unknowns takes.
+def effort_of(density: CollapsedDensity) -> Effort:
+    """Return what it takes that a population stands for the posterior.
 
     Where crosstalk and background are confounded, the ends of the sheet that hold a quarter of the
     posterior are a hundredth of it at higher temperatures: a small population loses them, and one
     that hardly moves does not find them again. Half of it is enough for a whole quadratic map.
     """
-    if shear is None:
-        return _EASY
-    return _Effort(12 * d * (d + 1), 3.0)
+    d = len(density.parameters)
+    easy = shear_of(density) is None
+    size, wanted = (384, 1.0) if easy else (12 * d * (d + 1), 3.0)
+    return Effort(size, wanted, 20.0, (_jump, _jump, _jump, _evolve), True)
+
+
+def scouts(size: int) -> Effort:
+    """Return what finds the optima that hold a share of the posterior, and no more."""
+    step = functools.partial(_evolve, spread=0.3, noise=0.02, hops=0.0)
+    hop = functools.partial(_evolve, noise=0.02, hops=1.0)
+    return Effort(size, 1.0, 2.0, (step, step, step, hop), False)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -89,7 +143,9 @@ class Population:
         return self.power == 1.0 or len(self.z) == 0
 
 
-def first_population(density: CollapsedDensity, rng: np.random.Generator) -> Population:
+def first_population(
+    density: CollapsedDensity, rng: np.random.Generator, effort: Effort
+) -> Population:
     """Draw a population from the prior.
 
     Parameters
@@ -98,13 +154,15 @@ def first_population(density: CollapsedDensity, rng: np.random.Generator) -> Pop
         Target.
     rng : numpy.random.Generator
         Source of randomness.
+    effort : Effort
+        What it may take.
 
     Returns
     -------
     Population
         Empty where the likelihood is zero at nearly every draw.
     """
-    count = _SCREEN * _effort(shear_of(density), len(density.parameters)).size
+    count = _SCREEN * effort.size
     z = density.parameters.sample(rng, count)
     likelihood = density.log_likelihood(z)
     finite = np.isfinite(likelihood)
@@ -115,10 +173,27 @@ def first_population(density: CollapsedDensity, rng: np.random.Generator) -> Pop
     return Population(z, likelihood, density.parameters.log_prior(z), 0.0, share, 0, count)
 
 
+def _next_power(log_likelihood: Array, power: float) -> float:
+    """Return the power at which half of the population still counts."""
+    span = log_likelihood - log_likelihood.max()
+
+    def surplus(step: float) -> float:
+        weights = np.exp(step * span)
+        return float(weights.sum() ** 2 / (weights**2).sum() - 0.5 * span.size)
+
+    rest = 1.0 - power
+    if surplus(rest) >= 0:
+        return 1.0
+    # a step can be far below 1e-12 where the first population fits very badly
+    lower = np.log(rest) - 80.0
+    found = optimize.brentq(lambda x: surplus(float(np.exp(x))), lower, np.log(rest), xtol=1e-3)
+    return power + float(np.exp(found))
+
+
 def _resampled(population: Population, size: int, rng: np.random.Generator) -> Population:
     """Raise the power as far as half of the population still counts, and resample."""
     likelihood = population.log_likelihood
-    power = next_power(likelihood, population.power)
+    power = _next_power(likelihood, population.power)
     top = float(likelihood.max())
     step = power - population.power
     # copies of a member must fall into one half: a map that has seen them does not move them freely
@@ -139,33 +214,19 @@ def _resampled(population: Population, size: int, rng: np.random.Generator) -> P
     )
 
 
-def _trial(x: Array, others: Array, rng: np.random.Generator, jump: bool) -> tuple[Array, Array]:
-    """Propose coordinates, and the log of the proposal's densities' ratio (old to new)."""
-    n, d = x.shape
-    if jump:
-        new = student(rng, n, d)
-        return new, log_student(x) - log_student(new)
-    first, second = rng.integers(len(others), size=n), rng.integers(len(others), size=n)
-    scale = 2.38 / math.sqrt(2 * d) * np.exp(0.5 * rng.standard_normal((n, 1)))
-    if rng.random() < 0.2:
-        scale = np.ones((n, 1))  # from mode to mode
-    noise = 1e-4 * rng.standard_normal((n, d))
-    return x + scale * (others[first] - others[second]) + noise, np.zeros(n)
-
-
-def _half_sweep(
+def _sweep(
     density: CollapsedDensity,
     population: Population,
     moving: slice,
     still: slice,
     transport: TriangularMap,
     rng: np.random.Generator,
-    jump: bool,
+    move: Move,
 ) -> tuple[Population, float]:
-    """Move each member of one half once; return the share that moved."""
+    """Move each member of one part once; return the share that moved."""
     x, old_det = transport.unbend(population.z[moving])
     others = transport.unbend(population.z[still])[0]
-    new, ratio = _trial(x, others, rng, jump)
+    new, ratio = move(x, others, rng)
     z, new_det = transport.bend(new)
     log_prior = density.parameters.log_prior(z)
     likelihood = np.full(len(z), -np.inf)
@@ -194,7 +255,7 @@ def _half_sweep(
 
 
 def temper(
-    density: CollapsedDensity, population: Population, rng: np.random.Generator
+    density: CollapsedDensity, population: Population, rng: np.random.Generator, effort: Effort
 ) -> Population:
     """Carry a population to the next temperature.
 
@@ -206,40 +267,45 @@ def temper(
         From `first_population` or this function; not empty, power below 1.
     rng : numpy.random.Generator
         Source of randomness; one of its own for every temperature makes the steps a fold.
+    effort : Effort
+        What it may take.
 
     Returns
     -------
     Population
         Its power is 1 when it has arrived.
     """
-    shear = shear_of(density)
-    effort = _effort(shear, len(density.parameters))
+    shear = shear_of(density) if effort.unbends else None
     population = _resampled(population, effort.size, rng)
-    wanted = 1.0 if population.power < _HOT else effort.moves
+    wanted = 1.0 if population.power < _HOT else effort.wanted
     if population.power == 1.0:
         wanted *= _LAST
-    halves = (slice(0, effort.size // 2), slice(effort.size // 2, effort.size))
+    parts = [slice(0, effort.size // 2), slice(effort.size // 2, effort.size)]
+    if not effort.unbends:  # a whitening is too stiff to draw members together
+        parts = [slice(0, effort.size)]
     moves = 0.0
-    for sweep in range(int(_SWEEPS * wanted)):
-        if sweep % _REFIT == 0:
-            maps = [fit_map(population.z[half], shear) for half in halves]
-        for k in (0, 1):
-            population, moved = _half_sweep(
+    for sweep in range(int(effort.sweeps * wanted)):
+        turn = sweep % len(effort.moves)
+        if turn == 0:
+            members = [population.z[part] for part in parts]
+            maps = [fit_map(z, shear) if effort.unbends else straight_map(z) for z in members]
+        for moving, still, transport in zip(parts, parts[::-1], maps[::-1], strict=True):
+            population, moved = _sweep(
                 density,
                 population,
-                halves[k],
-                halves[1 - k],
-                maps[1 - k],
+                moving,
+                still,
+                transport,
                 rng,
-                jump=sweep % _REFIT < _REFIT - 1,
+                effort.moves[turn],
             )
-            moves += 0.5 * moved
+            moves += moved / len(parts)
         if moves > wanted:
             break
     return population
 
 
-def carried(density: CollapsedDensity, rng: np.random.Generator) -> Population:
+def carried(density: CollapsedDensity, rng: np.random.Generator, effort: Effort) -> Population:
     """Carry a population all the way from the prior to the posterior.
 
     Parameters
@@ -248,13 +314,15 @@ def carried(density: CollapsedDensity, rng: np.random.Generator) -> Population:
         Target.
     rng : numpy.random.Generator
         Source of randomness.
+    effort : Effort
+        What it may take.
 
     Returns
     -------
     Population
         Empty where the likelihood is zero at nearly every draw of the prior.
     """
-    population = first_population(density, rng)
+    population = first_population(density, rng, effort)
     while not population.ended:
-        population = temper(density, population, rng)
+        population = temper(density, population, rng, effort)
     return population

@@ -17,7 +17,7 @@ from inference.density.triangular import update_factor
 from inference.posterior.sampling.shear import Shear
 from simulator.compiled import compiled
 
-__all__ = ["TriangularMap", "fit_map"]
+__all__ = ["TriangularMap", "fit_map", "straight_map"]
 
 Array = NDArray[np.float64]
 
@@ -193,6 +193,23 @@ def _regression(features: Array, target: Array, strength: float, copies: float) 
     return np.asarray(linalg.solve_triangular(factor[:k, :k], factor[:k, k]) / scale)
 
 
+def _principal_axes(draws: Array) -> tuple[Array, Array]:
+    """Return the centre of a sample and its principal axes times their standard deviations."""
+    centre = draws.mean(axis=0)
+    # singular values, not eigenvalues of the covariance: thin sheets keep their digits
+    _, singular, rows = linalg.svd(draws - centre, full_matrices=False)
+    sd = singular / math.sqrt(len(draws))
+    return centre, rows.T * np.maximum(sd, 1e-12 * sd[0] + 1e-300)
+
+
+def straight_map(draws: Array) -> TriangularMap:
+    """Return the map that whitens a sample of shape (n, d), n > d, and bends nothing."""
+    d = draws.shape[1]
+    centre, axes = _principal_axes(draws)
+    nothing = np.zeros((d, math.comb(d + 1, 2)))
+    return TriangularMap(centre, axes, np.zeros((2, d)), nothing, nothing, 0, None)
+
+
 def fit_map(draws: Array, shear: Shear | None = None) -> TriangularMap:
     """Fit the map that makes a sample nearly standard normal.
 
@@ -210,11 +227,7 @@ def fit_map(draws: Array, shear: Shear | None = None) -> TriangularMap:
     n, d = draws.shape
     if shear is not None:
         draws = shear.forward(draws)
-    centre = draws.mean(axis=0)
-    # singular values, not eigenvalues of the covariance: thin sheets keep their digits
-    _, singular, rows = linalg.svd(draws - centre, full_matrices=False)
-    sd = singular / math.sqrt(n)
-    axes = rows.T * np.maximum(sd, 1e-12 * sd[0] + 1e-300)
+    centre, axes = _principal_axes(draws)
     whitened = (draws - centre) @ (axes / np.einsum("ij,ij->j", axes, axes))
     rest = n // _POINTS - math.comb(d + 1, 2)
     cubic = max((m for m in range(d) if math.comb(m + 2, 3) <= rest), default=0)

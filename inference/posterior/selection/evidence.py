@@ -17,11 +17,10 @@ from scipy.stats import qmc
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.importance import WeightedDraws, draw_weighted
-from inference.posterior.sampling.population import Population, carried
+from inference.posterior.sampling.population import Population, carried, effort_of, scouts
 from inference.posterior.sampling.proposal import Mixture, Proposal, mixture_of
 from inference.posterior.sampling.shear import shear_of
 from inference.posterior.sampling.start import Optimum, climb, find_optima, refine
-from inference.posterior.sampling.tempering import temper
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.selection.bridge import bridge
 from simulator.parameters import Parameters
@@ -34,7 +33,7 @@ Array = NDArray[np.float64]
 _MAX_K_HAT = 0.4
 _DRAWS = 2000
 _LEAST_ESS = 100.0
-_POPULATION = 128  # that looks for optima which the multistart missed
+_SCOUTS = 128  # that look for optima which the multistart missed
 _MAPPED_DRAWS = 4000
 _BRIDGE_DRAWS = 2000
 _PRIOR_POINTS = 13  # log2
@@ -216,10 +215,10 @@ def weigh(
         return Weighed(Evidence(value, 0.0, None), np.empty((1, 0)), np.zeros(1), None, 1)
     constant, constant_error = _constant(density.parameters, rng)
     optima = [*find_optima(density, rng), *fitted]
-    population = temper(density, rng, _POPULATION)
-    calls = population.calls
-    if len(population.z):
-        best = population.z[np.argmax(population.log_likelihood + population.log_prior)]
+    scouted = carried(density, rng, scouts(_SCOUTS))
+    calls = scouted.calls
+    if len(scouted.z):
+        best = scouted.z[np.argmax(scouted.log_likelihood + scouted.log_prior)]
         found = [refine(density, climb(density, best)[0]), refine(density, best)]
         optima += [optimum for optimum in found if optimum is not None]
     optima = _distinct(optima)
@@ -231,7 +230,8 @@ def weigh(
     calls += _DRAWS
     if _trusted(weighted):
         return _by_importance(weighted, laplace, (constant, constant_error), calls)
-    populations = [carried(density, rng) for _ in range(2)]
+    effort = effort_of(density)
+    populations = [carried(density, rng, effort) for _ in range(2)]
     calls += sum(each.calls for each in populations)
     members = np.concatenate([each.z for each in populations])
     if not len(members):

@@ -34,7 +34,7 @@ class AssessTask:
         job = dataclasses.replace(self.job, scene=reduced(self.job.scene, terms))
         density = job.density()
         fitted = fitted_optima(job, density) if len(density.parameters) else []
-        return assess(terms, density, job.stream(Stream.CANDIDATES + self.index), fitted)
+        return assess(terms, density, job.stream(Stream.CANDIDATES, self.index), fitted)
 
 
 def tasks(job: Job) -> tuple[AssessTask, ...]:

@@ -11,9 +11,9 @@ from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
 from inference.posterior.sampling.ensemble import WALKERS
 from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
+from inference.posterior.sampling.population import carried, scouts
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.start import Optimum, climb, find_optima, refine
-from inference.posterior.sampling.tempering import tempered_walkers
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.ensembles import POPULATIONS, new_ensembles
@@ -25,7 +25,8 @@ __all__ = ["StartTask", "begin"]
 
 Array = NDArray[np.float64]
 
-_TEMPERED_FRAMES = 200  # at most; the walkers then start the wider, the more frames there are
+_SCOUTED_FRAMES = 200  # at most; the walkers then start the wider, the more frames there are
+_SCOUTS = 2 * WALKERS
 _IMPORTANCE_DRAWS = 2000
 _MOST_IMPORTANCE_DRAWS = 200_000
 _MOST_IMPORTANCE_FRAMES = 8_000_000  # draws times frames: ten seconds that nothing interrupts
@@ -72,7 +73,7 @@ def begin(job: Job) -> tuple[Drawing, int]:
         if not np.isfinite(density(np.empty((1, 0)))[0]):
             raise RefusedError("no range allowed by the scene explains every frame")
         return Known(), 1
-    optima, tempered, calls = _optima(job, density)
+    optima, scouted, calls = _optima(job, density)
     if not optima:
         raise RefusedError(
             "no parameters within their priors explain the frames; widen the priors, or check the "
@@ -94,7 +95,7 @@ def begin(job: Job) -> tuple[Drawing, int]:
         proposal = dataclasses.replace(proposal, share=_FITTING_SHARE)
     starts = (np.empty((0, len(density.parameters))),) * (job.settings.ensembles - 1)
     seeds = job.seeds(Stream.ENSEMBLES)
-    ensembles = new_ensembles(density, proposal, (*starts, tempered), seeds)
+    ensembles = new_ensembles(density, proposal, (*starts, scouted), seeds)
     return Walking(proposal, ensembles, pending, adaptations=0), calls + WALKERS * len(ensembles)
 
 
@@ -103,19 +104,33 @@ def _optima(job: Job, density: CollapsedDensity) -> tuple[list[Optimum], Array, 
     optima = find_optima(density, job.stream(Stream.SCREEN))
     for fitted in fitted_optima(job, density):
         optima = _with(optima, fitted)
-    tempered, calls = tempered_walkers(_thinned(density), job.stream(Stream.SCOUTS), WALKERS)
-    if len(tempered):
-        optima = _with(optima, refine(density, climb(density, tempered[0])[0]))
-        optima = _with(optima, refine(density, tempered[0]))
-    return optima, tempered, calls
+    found, calls = _scouted(_thinned(density), job.stream(Stream.SCOUTS))
+    if len(found):
+        optima = _with(optima, refine(density, climb(density, found[0])[0]))
+        optima = _with(optima, refine(density, found[0]))
+    return optima, found, calls
+
+
+def _scouted(density: CollapsedDensity, rng: np.random.Generator) -> tuple[Array, int]:
+    """Return where scouts stand, the best first, and the evaluations that it took.
+
+    They come from the prior alone: an ensemble that starts from them can contradict those that
+    start from the optima.
+    """
+    found = carried(density, rng, scouts(_SCOUTS))
+    total = found.log_likelihood + found.log_prior
+    # a random half: the better half would lose a mode of little density, however wide
+    _, first = np.unique(found.z, axis=0, return_index=True)
+    kept = rng.permutation(first)[:WALKERS]
+    return found.z[kept[np.argsort(-total[kept])]], found.calls
 
 
 def _thinned(density: CollapsedDensity) -> CollapsedDensity:
     """Return the density of some of the frames, spread over all: enough to show every branch."""
     n = len(density.frames)
-    if n <= _TEMPERED_FRAMES:
+    if n <= _SCOUTED_FRAMES:
         return density
-    chosen = np.linspace(0, n - 1, _TEMPERED_FRAMES).round().astype(int)
+    chosen = np.linspace(0, n - 1, _SCOUTED_FRAMES).round().astype(int)
     present = None if density.present is None else density.present[chosen]
     frames = np.ascontiguousarray(density.frames[chosen])
     return dataclasses.replace(density, frames=frames, present=present)

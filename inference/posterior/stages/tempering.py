@@ -7,7 +7,12 @@ import numpy as np
 
 from inference.posterior.job import Job
 from inference.posterior.sampling.ensemble import WALKERS
-from inference.posterior.sampling.population import Population, first_population, temper
+from inference.posterior.sampling.population import (
+    Population,
+    effort_of,
+    first_population,
+    temper,
+)
 from inference.posterior.sampling.shear import shear_of
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.stages.chunk import evaluations
@@ -42,11 +47,13 @@ class TemperTask:
     def run(self) -> Population:
         """Carry the population on."""
         density, population = self.job.density(), self.population
+        effort = effort_of(density)
         before = 0 if population is None else population.calls
         if population is None:
-            population = first_population(density, self._stream(0))
+            population = first_population(density, self._stream(0), effort)
         while not population.ended and population.calls - before < self.calls:
-            population = temper(density, population, self._stream(1 + population.steps))
+            stream = self._stream(1 + population.steps)
+            population = temper(density, population, stream, effort)
         return population
 
     def _stream(self, temperature: int) -> np.random.Generator:

@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.sampling.population import Population, first_population, temper
+from inference.posterior.sampling.population import (
+    Population,
+    effort_of,
+    first_population,
+    temper,
+)
 from tests.posterior.scenes import example
 
 
@@ -54,10 +59,11 @@ class _Banana:
 
 def _carried(density: CollapsedDensity, seed: int) -> Population:
     streams = np.random.SeedSequence(seed)
-    population = first_population(density, np.random.default_rng(streams.spawn(1)[0]))
+    effort = effort_of(density)
+    population = first_population(density, np.random.default_rng(streams.spawn(1)[0]), effort)
     while population.power < 1.0:
         rng = np.random.default_rng(streams.spawn(1)[0])
-        population = temper(density, population, rng)
+        population = temper(density, population, rng, effort)
     return population
 
 
@@ -134,17 +140,19 @@ def test_a_prior_that_explains_nothing_leaves_nobody() -> None:
         def log_likelihood(self, z: np.ndarray) -> np.ndarray:
             return np.full(len(z), -np.inf)
 
-    nobody = first_population(_Impossible(), np.random.default_rng(1))  # type: ignore[arg-type]
+    rng = np.random.default_rng(1)
+    nobody = first_population(_Impossible(), rng, effort_of(_Banana()))  # type: ignore[arg-type]
     assert len(nobody.z) == 0
     assert nobody.log_evidence == -math.inf
 
 
 def test_power_never_falls() -> None:
     density = collapsed_density(*example("pulsed", crosstalk=True))
-    population = first_population(density, np.random.default_rng(9))
+    effort = effort_of(density)
+    population = first_population(density, np.random.default_rng(9), effort)
     powers = [population.power]
     while population.power < 1.0:
-        population = temper(density, population, np.random.default_rng(10 + len(powers)))
+        population = temper(density, population, np.random.default_rng(10 + len(powers)), effort)
         powers.append(population.power)
     assert all(np.diff(powers) > 0)
     assert powers[-1] == pytest.approx(1.0, abs=0.0)

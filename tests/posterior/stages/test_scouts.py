@@ -1,4 +1,4 @@
-"""Walkers tempered in from the prior stand where importance sampling says that the mass is."""
+"""Scouts from the prior stand where importance sampling says that the mass is."""
 
 import dataclasses
 import math
@@ -11,8 +11,8 @@ from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.sampling.importance import MAX_K_HAT, draw_weighted
 from inference.posterior.sampling.proposal import mixture_of
 from inference.posterior.sampling.start import find_optima
-from inference.posterior.sampling.tempering import tempered_walkers
-from inference.posterior.stages.starting import _thinned
+from inference.posterior.stages import starting
+from inference.posterior.stages.starting import _scouted, _thinned
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import parse_scene
 from tests.posterior.scenes import KINDS, example, sensor_of
@@ -20,6 +20,13 @@ from tests.posterior.scenes import KINDS, example, sensor_of
 WALKERS = 256
 
 
+@pytest.fixture
+def many(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(starting, "WALKERS", WALKERS)
+    monkeypatch.setattr(starting, "_SCOUTS", 2 * WALKERS)
+
+
+@pytest.mark.usefixtures("many")
 @pytest.mark.parametrize("kind", list(KINDS))
 @pytest.mark.parametrize("crosstalk", [False, True])
 def test_the_same_mean_as_importance_sampling(kind: str, crosstalk: bool) -> None:
@@ -32,7 +39,7 @@ def test_the_same_mean_as_importance_sampling(kind: str, crosstalk: bool) -> Non
     assert weighted.k_hat < MAX_K_HAT
     mean = weighted.weights @ weighted.z
     sd = np.sqrt(weighted.weights @ (weighted.z - mean) ** 2)
-    walkers, calls = tempered_walkers(density, np.random.default_rng(112), WALKERS)
+    walkers, calls = _scouted(density, np.random.default_rng(112))
     assert walkers.shape == (WALKERS, len(mean))
     assert calls > WALKERS
     off = np.abs(walkers.mean(axis=0) - mean) / sd
@@ -45,13 +52,13 @@ def test_the_same_mean_as_importance_sampling(kind: str, crosstalk: bool) -> Non
 
 def test_walkers_are_distinct_and_stand_where_the_density_is_positive() -> None:
     density = collapsed_density(*example("pulsed", crosstalk=True))
-    walkers, _ = tempered_walkers(density, np.random.default_rng(113), 32)
+    walkers, _ = _scouted(density, np.random.default_rng(113))
     assert len(np.unique(walkers, axis=0)) == len(walkers)
     assert np.isfinite(density(walkers)).all()
 
 
 class Bumps:
-    """Two bumps of masses 1 : 3 under a standard normal prior, as `tempered_walkers` asks."""
+    """Two bumps of masses 1 : 3 under a standard normal prior, as scouts ask."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
@@ -62,14 +69,13 @@ class Bumps:
         return np.logaddexp(first, second)
 
 
+@pytest.mark.usefixtures("many")
 def test_both_of_two_modes_are_kept() -> None:
     """Each bump of two has mass 1/4 and 3/4 by symmetry. The share is that of about 50 independent
     draws: five standard errors are 0.3, and none may be lost."""
     scene = parse_scene({"object": {"c0": 0.08, "c1": 0.1}})
     bumps = Bumps(parameters_of(sensor_of("pulsed"), scene))
-    walkers, _ = tempered_walkers(
-        cast("CollapsedDensity", bumps), np.random.default_rng(114), WALKERS
-    )
+    walkers, _ = _scouted(cast("CollapsedDensity", bumps), np.random.default_rng(114))
     assert walkers.shape[1] == 1
     share = float((walkers[:, 0] > 0).mean())
     assert 0.45 < share < 1.0
@@ -83,9 +89,7 @@ def test_an_impossible_density_has_no_walkers() -> None:
 
     scene = parse_scene({"object": {"c0": 0.08, "c1": 0.1}})
     nowhere = Nowhere(parameters_of(sensor_of("pulsed"), scene))
-    walkers, calls = tempered_walkers(
-        cast("CollapsedDensity", nowhere), np.random.default_rng(115), 32
-    )
+    walkers, calls = _scouted(cast("CollapsedDensity", nowhere), np.random.default_rng(115))
     assert walkers.shape == (0, 1)
     assert calls > 0
 
