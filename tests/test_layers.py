@@ -23,6 +23,7 @@ ALLOWED: dict[str, str] = {
     "simulator": "simulator.optics",
     "simulator/priors": "",
     "simulator/optics": "simulator.optics",
+    "simulator/optics/emitters": "simulator.optics",
     "simulator/optics/figures": "simulator.optics",
     "inference": "inference.realtime inference.fits",
     "inference/frame": "",

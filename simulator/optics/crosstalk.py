@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from simulator.errors import InvalidInputError
 from simulator.optics.brdf import fresnel_dielectric
 from simulator.optics.detectors import Detector
-from simulator.optics.emitters import Emitter, Narrow, intensity, pack_pattern
+from simulator.optics.emitters import Emitter, Narrow, intensity
 from simulator.optics.light import Light, Modulation, add
 from simulator.optics.vectors import dot
 from simulator.validated import Validated
@@ -77,7 +77,7 @@ def _order(
     else:
         ray = normal
     ahead = dot(emitter.aim, (ray[0], ray[1], ray[2]))
-    pattern, table = pack_pattern(emitter.pattern)
+    pattern, table = emitter.pattern.pack()
     emitted = intensity(pattern, 0, table, ahead, math.sqrt(max(1.0 - ahead * ahead, 0.0)))
     flux = emitted * strength * spread / slope
     path = 0.5 * (near / cosine + inside * index / inner_cosine)

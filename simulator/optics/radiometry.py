@@ -15,7 +15,7 @@ from simulator.optics import marks as kinds
 from simulator.optics.brdf import pack_material
 from simulator.optics.charts import build_chart
 from simulator.optics.detectors import Detector
-from simulator.optics.emitters import Emitter, Narrow, pack_pattern
+from simulator.optics.emitters import Emitter, Narrow
 from simulator.optics.light import Light, Modulation, Status, dark
 from simulator.optics.narrow import observe_narrow
 from simulator.optics.quadrature import GAUSS_KRONROD, gauss_rule, integrate
@@ -84,7 +84,7 @@ def _observe_many(
 
 
 def _pack_head(emitter: Emitter, detector: Detector) -> tuple[Array, Array]:
-    pattern, table = pack_pattern(emitter.pattern)
+    pattern, table = emitter.pattern.pack()
     head = np.concatenate(
         [emitter.position_m, emitter.aim, detector.position_m, detector.normal, pattern]
     )
