@@ -40,7 +40,7 @@ def eliminate(
     """
     n, _, d = jacobian.shape
     errors = np.empty((n, 2, 0)) if errors is None else errors
-    k = errors.shape[2]
+    k = errors.shape[-1]
     both = np.concatenate([jacobian, errors], axis=2)
     empty = np.asarray(np.isnan(along_range).any(axis=1))
     along = np.where(empty[:, None], 0.0, along_range)

@@ -86,7 +86,7 @@ def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
         # a scale that is known to the room which the support leaves tells of what moves with it
         own = math.sqrt(variance[present].mean() / independent)
         extra.append(response[present].mean(axis=0)[None] / math.hypot(room, own))
-    d, unknowns = len(p), jacobian.shape[2]
+    d, unknowns = len(p), jacobian.shape[-1]
     factor = np.empty((0, 0))
     if unknowns > 0:
         rows = np.concatenate([across.reshape(-1, unknowns), *extra])
@@ -112,7 +112,7 @@ def _rows(experiment: Experiment) -> tuple[Array, Array, list[Array]]:
     """
     p, log_r = experiment.parameters, experiment.log_r
     by_term, by_range, by_error = experiment.whitened_terms()
-    d, n, k = len(p), log_r.size, by_error.shape[2]
+    d, n, k = len(p), log_r.size, by_error.shape[-1]
     jacobian, along = np.zeros((n, 3, d + k)), np.zeros((n, 3))
     with np.errstate(over="ignore", invalid="ignore"):
         jacobian[:, :2, :d] = by_term @ experiment.change

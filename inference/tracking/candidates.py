@@ -10,8 +10,8 @@ from simulator.compiled import compiled
 
 __all__ = [
     "NEW",
-    "Candidate",
-    "Candidates",
+    "TrackCandidate",
+    "TrackCandidates",
     "add_candidate",
     "candidates_for",
     "heaviest_of",
@@ -25,7 +25,7 @@ NEW = 0
 """Parent of a candidate that is an object that has just come."""
 
 
-class Candidate(NamedTuple):
+class TrackCandidate(NamedTuple):
     """One mode of a frame's density under one hypothesis."""
 
     log_mass: float  # log of what the density integrates to
@@ -38,8 +38,8 @@ class Candidate(NamedTuple):
     parent: int
 
 
-class Candidates(NamedTuple):
-    """Room for candidates, an array for each attribute of `Candidate`, shape (capacity,)."""
+class TrackCandidates(NamedTuple):
+    """Room for candidates, an array for each attribute of `TrackCandidate`, shape (capacity,)."""
 
     log_mass: Array
     mean: Array
@@ -49,9 +49,9 @@ class Candidates(NamedTuple):
 
 
 @compiled
-def candidates_for(capacity: int) -> Candidates:
+def candidates_for(capacity: int) -> TrackCandidates:
     """Return room for as many candidates."""
-    return Candidates(
+    return TrackCandidates(
         np.empty(capacity),
         np.empty(capacity),
         np.empty(capacity),
@@ -61,7 +61,7 @@ def candidates_for(capacity: int) -> Candidates:
 
 
 @compiled
-def add_candidate(to: Candidates, count: int, one: Candidate) -> int:
+def add_candidate(to: TrackCandidates, count: int, one: TrackCandidate) -> int:
     """Append a candidate, where there is no room in the place of the lightest; the new length."""
     place = count
     if count == to.log_mass.size:
@@ -75,7 +75,7 @@ def add_candidate(to: Candidates, count: int, one: Candidate) -> int:
 
 
 @compiled
-def log_mass_of(of: Candidates, first: int, last: int, least: float) -> float:
+def log_mass_of(of: TrackCandidates, first: int, last: int, least: float) -> float:
     """Return the greatest log mass from one place to another, or ``least`` where none is."""
     best = least
     for j in range(first, last):
@@ -84,7 +84,7 @@ def log_mass_of(of: Candidates, first: int, last: int, least: float) -> float:
 
 
 @compiled
-def heaviest_of(of: Candidates, count: int) -> int:
+def heaviest_of(of: TrackCandidates, count: int) -> int:
     """Return the place of the heaviest candidate; there must be one."""
     top = 0
     for j in range(1, count):
@@ -94,8 +94,8 @@ def heaviest_of(of: Candidates, count: int) -> int:
 
 
 @compiled
-def take(of: Candidates, place: int) -> Candidate:
+def take(of: TrackCandidates, place: int) -> TrackCandidate:
     """Return a candidate, which then weighs nothing."""
     log_mass = of.log_mass[place]
     of.log_mass[place] = -math.inf
-    return Candidate(log_mass, of.mean[place], of.sd[place], of.mode[place], of.parent[place])
+    return TrackCandidate(log_mass, of.mean[place], of.sd[place], of.mode[place], of.parent[place])

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.tracking.frame_density import Frame
+from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import (
     CROSSTALK1,
     CROSSTALK2,
@@ -37,7 +37,7 @@ class Expected(NamedTuple):
 
 @compiled
 def expect_empty(
-    of: Hypotheses, frame: Frame, table: ReadingsTable, empty: Array, nuisance: Array
+    of: Hypotheses, frame: TrackedFrame, table: ReadingsTable, empty: Array, nuisance: Array
 ) -> Expected:
     """Hold a frame against the empty scene.
 
@@ -45,7 +45,7 @@ def expect_empty(
     ----------
     of : Hypotheses
         Row 0 is the empty scene.
-    frame : Frame
+    frame : TrackedFrame
         The frame.
     table : ReadingsTable
         Known crosstalk, and the noise.
@@ -56,7 +56,7 @@ def expect_empty(
         Filled with that change in this frame.
     """
     x, X, gain = of.x, of.X, frame.gain
-    n, m = X.shape[1], X.shape[2]
+    _, n, m = X.shape
     learns = learns_crosstalk(of)
     m1 = gain * empty[FIRST, 0] + table.crosstalk1
     m2 = gain * empty[SECOND, 0] + table.crosstalk2
@@ -84,7 +84,7 @@ def expect_empty(
 
 @compiled
 def learn_empty(
-    of: Hypotheses, frame: Frame, table: ReadingsTable, empty: Array, scratch: Scratch
+    of: Hypotheses, frame: TrackedFrame, table: ReadingsTable, empty: Array, scratch: Scratch
 ) -> float:
     """Learn the crosstalk from a frame of the empty scene, where it is learnt; its surprise.
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from inference.estimates import Status
 from inference.tracking.empty_scene import learn_empty
-from inference.tracking.frame_density import Frame
+from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import COUNT, PENDING, RUNNING, TIME, Hypotheses
 from inference.tracking.prediction import predict
 from inference.tracking.report import OUTLIER, STATUS, SURPRISE, report
-from inference.tracking.weighing import Model, room_for, weigh
+from inference.tracking.weighing import Model, room_for, weigh_frame
 from simulator.compiled import compiled
 
 __all__ = ["EMPTY", "EMPTY_SATURATED", "SATURATED", "USABLE", "run_filter"]
@@ -65,10 +65,10 @@ def run_filter(
         if math.isfinite(numbers[TIME]):
             predict(times[i] - numbers[TIME], of, rules, room.scratch.work)
         numbers[TIME] = times[i]
-        frame = Frame(frames[i, _FIRST], frames[i, _SECOND], frames[i, _GAIN])
+        frame = TrackedFrame(frames[i, _FIRST], frames[i, _SECOND], frames[i, _GAIN])
         outlier, surprise = 0.0, math.nan
         if kinds[i] == USABLE:
-            outlier, surprise = weigh(frame, of, model, room, full)
+            outlier, surprise = weigh_frame(frame, of, model, room, full)
         elif kinds[i] != SATURATED:
             if kinds[i] == EMPTY:
                 surprise = learn_empty(of, frame, model.table, model.places.empty, room.scratch)

@@ -21,12 +21,12 @@ from inference.tracking.readings_table import (
 from inference.tracking.roots import UNIT, Root, add_factor, add_root
 from simulator.compiled import compiled
 
-__all__ = ["Added", "Frame", "Position", "Prior", "Rate", "expected_at", "log_density"]
+__all__ = ["Added", "Position", "Prior", "Rate", "TrackedFrame", "expected_at", "log_density"]
 
 Array = NDArray[np.float64]
 
 
-class Frame(NamedTuple):
+class TrackedFrame(NamedTuple):
     """One frame: two readings in units of the read noise, and its factor on the sensor's gain."""
 
     first: float
@@ -119,14 +119,14 @@ def _add_at(root: Root, u: float, gain: float, added: Added, table: ReadingsTabl
 
 
 @compiled
-def log_density(u: float, frame: Frame, prior: Prior, table: ReadingsTable) -> float:
+def log_density(u: float, frame: TrackedFrame, prior: Prior, table: ReadingsTable) -> float:
     """Return log p(readings, u), the log of 2 pi per reading left out.
 
     Parameters
     ----------
     u : float
         log r; outside the table the density is zero.
-    frame : Frame
+    frame : TrackedFrame
         The frame.
     prior : Prior
         What is known beforehand.

@@ -68,7 +68,7 @@ class Scratch(NamedTuple):
 @compiled
 def scratch_for(of: Hypotheses) -> Scratch:
     """Return arrays to work in."""
-    n, m = of.X.shape[1], of.X.shape[2]
+    _, n, m = of.X.shape
     return Scratch(
         np.zeros((2, m - n)), np.zeros((n, 4 * n + m + 4)), np.zeros((2, m)), np.zeros((2, m))
     )
@@ -91,7 +91,7 @@ def copy(into: Hypotheses, row: int, of: Hypotheses, other: int) -> None:
     for i in range(of.x.shape[1]):
         into.x[row, i] = of.x[other, i]
     for i in range(of.X.shape[1]):
-        for j in range(of.X.shape[2]):
+        for j in range(of.X.shape[-1]):
             into.X[row, i, j] = of.X[other, i, j]
 
 

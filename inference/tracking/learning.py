@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.tracking.candidates import Candidate
-from inference.tracking.frame_density import Frame, Prior
+from inference.tracking.candidates import TrackCandidate
+from inference.tracking.frame_density import Prior, TrackedFrame
 from inference.tracking.hypotheses import (
     ANCHOR,
     Hypotheses,
@@ -58,14 +58,14 @@ def _begin(of: Hypotheses, row: int, u: float, rate_sd: float) -> None:
     x[row, U], x[row, V] = u, 0.0
     if learns_crosstalk(of):
         x[row, ANCHOR] = u
-    for j in range(X.shape[2]):
+    for j in range(X.shape[-1]):
         X[row, U, j], X[row, V, j] = 0.0, 0.0
     X[row, U, U], X[row, V, V] = _BROAD, rate_sd
 
 
 @compiled
 def _of_derivatives(
-    of: Hypotheses, row: int, tangent: Tangent, frame: Frame, prior: Prior
+    of: Hypotheses, row: int, tangent: Tangent, frame: TrackedFrame, prior: Prior
 ) -> Linear:
     """Linearise derivatives in time at a mode, and at the rate that the frame says there."""
     x, t, expected = of.x, tangent, prior.rate
@@ -86,7 +86,7 @@ def _of_readings(
     of: Hypotheses,
     row: int,
     tangent: Tangent,
-    frame: Frame,
+    frame: TrackedFrame,
     prior: Prior,
     table: ReadingsTable,
     nuisance: Array,
@@ -130,8 +130,8 @@ def _take_moments(of: Hypotheses, row: int, mean: float, sd: float) -> None:
 def learn(
     of: Hypotheses,
     row: int,
-    candidate: Candidate,
-    frame: Frame,
+    candidate: TrackCandidate,
+    frame: TrackedFrame,
     prior: Prior,
     table: ReadingsTable,
     scratch: Scratch,
@@ -145,7 +145,7 @@ def learn(
     ----------
     of, row : Hypotheses, int
         The hypothesis as it was predicted; changed in place.
-    candidate : Candidate
+    candidate : TrackCandidate
         The mode that is taken.
     frame, prior, table
         As for `log_density`.

@@ -34,7 +34,7 @@ def merge(of: Hypotheses, into: int, other: int, share: float, first: int, work:
         Overwritten.
     """
     x, X = of.x, of.X
-    n, m = X.shape[1], X.shape[2]
+    _, n, m = X.shape
     left, right = math.sqrt(1.0 - share), math.sqrt(share)
     for i in range(first, n):
         gap = x[other, i] - x[into, i]
@@ -63,7 +63,7 @@ def _log_determinant(of: Hypotheses, one: int, other: int, share: float) -> floa
     for row, weight in ((one, 1.0 - share), (other, share)):
         if weight == 0.0:
             continue
-        for j in range(X.shape[2]):
+        for j in range(X.shape[-1]):
             p11 += weight * X[row, U, j] * X[row, U, j]
             p12 += weight * X[row, U, j] * X[row, V, j]
             p22 += weight * X[row, V, j] * X[row, V, j]

@@ -6,13 +6,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.tracking.candidates import Candidate, Candidates, add_candidate
-from inference.tracking.frame_density import Frame, Prior, log_density
+from inference.tracking.candidates import TrackCandidate, TrackCandidates, add_candidate
+from inference.tracking.frame_density import Prior, TrackedFrame, log_density
 from inference.tracking.mode_search import edge
 from inference.tracking.readings_table import ReadingsTable
 from simulator.compiled import compiled
 
-__all__ = ["Mode", "integrate"]
+__all__ = ["PeakedMode", "integrate"]
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ _ROOT3 = math.sqrt(3.0)
 _LOG_ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
 
 
-class Mode(NamedTuple):
+class PeakedMode(NamedTuple):
     """One mode of a density along the range."""
 
     # its place and its scale, log range
@@ -40,8 +40,8 @@ def _simpson(
     aways: Array,
     masses: Array,
     top: float,
-    mode: Mode,
-    frame: Frame,
+    mode: PeakedMode,
+    frame: TrackedFrame,
     prior: Prior,
     table: ReadingsTable,
 ) -> tuple[float, float, float]:
@@ -70,11 +70,11 @@ def _simpson(
 
 @compiled
 def _divide(
-    to: Candidates,
+    to: TrackCandidates,
     count: int,
     parent: int,
-    mode: Mode,
-    frame: Frame,
+    mode: PeakedMode,
+    frame: TrackedFrame,
     prior: Prior,
     table: ReadingsTable,
 ) -> int:
@@ -91,7 +91,7 @@ def _divide(
         return count
     if not sd > 0.0:
         log_mass = top + math.log(total)
-        return add_candidate(to, count, Candidate(log_mass, u + mean, sd, u + mean, parent))
+        return add_candidate(to, count, TrackCandidate(log_mass, u + mean, sd, u + mean, parent))
     for window in range(-_WINDOWS, _WINDOWS + 1):
         share, shift, square = 0.0, 0.0, 0.0
         for row in range(aways.size):
@@ -107,18 +107,18 @@ def _divide(
             shift /= share
             own = sd * math.sqrt(max(square / share - shift * shift, 0.0))
             at = u + mean + sd * shift
-            one = Candidate(top + math.log(share), at, own, at, parent)
+            one = TrackCandidate(top + math.log(share), at, own, at, parent)
             count = add_candidate(to, count, one)
     return count
 
 
 @compiled
 def integrate(
-    to: Candidates,
+    to: TrackCandidates,
     count: int,
     parent: int,
-    mode: Mode,
-    frame: Frame,
+    mode: PeakedMode,
+    frame: TrackedFrame,
     prior: Prior,
     table: ReadingsTable,
 ) -> int:
@@ -133,13 +133,13 @@ def integrate(
 
     Parameters
     ----------
-    to : Candidates
+    to : TrackCandidates
         The list; where it is full, its lightest member gives way.
     count : int
         Its length so far.
     parent : int
-        As in `Candidate`.
-    mode : Mode
+        As in `TrackCandidate`.
+    mode : PeakedMode
         The mode.
     frame, prior, table
         As for `log_density`.
@@ -153,7 +153,7 @@ def integrate(
     if prior.added.spread.shape[1] > 2:
         top = log_density(u, frame, prior, table)
         log_mass = top + math.log(scale) + _LOG_ROOT_2PI
-        return add_candidate(to, count, Candidate(log_mass, u, 0.0, u, parent))
+        return add_candidate(to, count, TrackCandidate(log_mass, u, 0.0, u, parent))
     if u - _ROOT3 * scale >= mode.low and u + _ROOT3 * scale <= mode.high:
         top = log_density(u, frame, prior, table)
         left = log_density(u - _ROOT3 * scale, frame, prior, table) - top + 1.5
@@ -164,6 +164,6 @@ def integrate(
             shift = _ROOT3 * (right - left) / (6.0 * mass)
             sd = scale * math.sqrt(0.5 * (left + right) / mass - shift * shift)
             log_mass = top + math.log(mass * scale) + _LOG_ROOT_2PI
-            one = Candidate(log_mass, u + shift * scale, sd, u, parent)
+            one = TrackCandidate(log_mass, u + shift * scale, sd, u, parent)
             return add_candidate(to, count, one)
     return _divide(to, count, parent, mode, frame, prior, table)

@@ -3,18 +3,18 @@
 import math
 from typing import NamedTuple
 
-from inference.tracking.frame_density import Frame, Prior, expected_at, log_density
+from inference.tracking.frame_density import Prior, TrackedFrame, expected_at, log_density
 from inference.tracking.readings_table import ReadingsTable
 from inference.tracking.roots import Root
 from simulator.compiled import compiled
 
-__all__ = ["Bracket", "edge", "mode_by_differences", "mode_of_plain"]
+__all__ = ["ModeBracket", "edge", "mode_by_differences", "mode_of_plain"]
 
 _CLOSE = 0.05  # standard deviations within which a mode has to be found
 _DROP = 18.0  # nats below the top where a numerical integral ends
 
 
-class Bracket(NamedTuple):
+class ModeBracket(NamedTuple):
     """Where to look for a mode: a start, and an interval that holds it; log range."""
 
     start: float
@@ -24,13 +24,13 @@ class Bracket(NamedTuple):
 
 @compiled
 def mode_of_plain(
-    bracket: Bracket, frame: Frame, prior: Prior, root: Root, table: ReadingsTable
+    bracket: ModeBracket, frame: TrackedFrame, prior: Prior, root: Root, table: ReadingsTable
 ) -> tuple[float, float]:
     """Find a mode by bracketed Gauss-Newton where the covariance is constant.
 
     Parameters
     ----------
-    bracket : Bracket
+    bracket : ModeBracket
         Where to look.
     frame, prior, table
         As for `log_density`.
@@ -76,13 +76,13 @@ def mode_of_plain(
 
 @compiled
 def mode_by_differences(
-    bracket: Bracket, scale: float, frame: Frame, prior: Prior, table: ReadingsTable
+    bracket: ModeBracket, scale: float, frame: TrackedFrame, prior: Prior, table: ReadingsTable
 ) -> tuple[float, float]:
     """Find a mode by bracketed Newton with differences: the covariance changes along the way.
 
     Parameters
     ----------
-    bracket : Bracket
+    bracket : ModeBracket
         Where to look.
     scale : float
         A first guess of the width of the mode.
@@ -141,7 +141,7 @@ def edge(
     top: float,
     end: float,
     scale: float,
-    frame: Frame,
+    frame: TrackedFrame,
     prior: Prior,
     table: ReadingsTable,
 ) -> float:

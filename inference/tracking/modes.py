@@ -6,16 +6,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.tracking.candidates import Candidates
-from inference.tracking.frame_density import Frame, Prior, log_density
-from inference.tracking.mode_integration import Mode, integrate
-from inference.tracking.mode_search import Bracket, mode_by_differences, mode_of_plain
+from inference.tracking.candidates import TrackCandidates
+from inference.tracking.frame_density import Prior, TrackedFrame, log_density
+from inference.tracking.mode_integration import PeakedMode, integrate
+from inference.tracking.mode_search import ModeBracket, mode_by_differences, mode_of_plain
 from inference.tracking.places import Scan
 from inference.tracking.readings_table import ReadingsTable, nuisance_count
 from inference.tracking.roots import UNIT, add_root
 from simulator.compiled import compiled
 
-__all__ = ["Scanned", "find_modes", "scanned_for"]
+__all__ = ["Scanned", "find_candidates", "scanned_for"]
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ def _places_within(
 
 @compiled
 def _mode_within(
-    bracket: Bracket, width: float, frame: Frame, prior: Prior, table: ReadingsTable
+    bracket: ModeBracket, width: float, frame: TrackedFrame, prior: Prior, table: ReadingsTable
 ) -> tuple[float, float]:
     """Return a mode and its scale; ``width`` is that of the prior."""
     plain = table.noise.plain and not table.by_rate
@@ -66,11 +66,11 @@ def _mode_within(
 
 
 @compiled
-def find_modes(
-    to: Candidates,
+def find_candidates(
+    to: TrackCandidates,
     count: int,
     parent: int,
-    frame: Frame,
+    frame: TrackedFrame,
     prior: Prior,
     table: ReadingsTable,
     scan: Scan,
@@ -80,12 +80,12 @@ def find_modes(
 
     Parameters
     ----------
-    to : Candidates
+    to : TrackCandidates
         The list; where it is full, its lightest member gives way.
     count : int
         Its length so far.
     parent : int
-        As in `Candidate`.
+        As in `TrackCandidate`.
     frame, prior, table
         As for `log_density`.
     scan : Scan
@@ -111,8 +111,8 @@ def find_modes(
     if points <= 3 and not position.born:
         # with one knot within reach the curve is near straight over all of it
         start = min(max(position.centre, low), high)
-        u, scale = _mode_within(Bracket(start, low, high), width, frame, prior, table)
-        return integrate(to, count, parent, Mode(u, scale, low, high), frame, prior, table)
+        u, scale = _mode_within(ModeBracket(start, low, high), width, frame, prior, table)
+        return integrate(to, count, parent, PeakedMode(u, scale, low, high), frame, prior, table)
     for j in range(points):
         logs[j] = log_density(at[j], frame, prior, table)
     valley = 0
@@ -124,9 +124,9 @@ def find_modes(
         last = j
         while last + 1 < points and logs[last + 1] <= logs[last]:
             last += 1
-        bracket = Bracket(at[j], at[max(j - 1, 0)], at[min(j + 1, points - 1)])
+        bracket = ModeBracket(at[j], at[max(j - 1, 0)], at[min(j + 1, points - 1)])
         u, scale = _mode_within(bracket, width, frame, prior, table)
-        mode = Mode(u, scale, at[valley], at[last])
+        mode = PeakedMode(u, scale, at[valley], at[last])
         valley = last
         count = integrate(to, count, parent, mode, frame, prior, table)
     return count

@@ -2,7 +2,7 @@
 
 import math
 
-from inference.tracking.frame_density import Frame
+from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import (
     CROSSTALK1,
     CROSSTALK2,
@@ -20,7 +20,7 @@ __all__ = ["expected_readings", "log_outlier"]
 
 @compiled
 def log_outlier(
-    frame: Frame, mean1: float, mean2: float, table: ReadingsTable, rules: Rules
+    frame: TrackedFrame, mean1: float, mean2: float, table: ReadingsTable, rules: Rules
 ) -> float:
     """Return the log density of readings that have nothing to do with the scene.
 

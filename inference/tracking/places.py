@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.tracking.frame_density import Frame
+from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.readings_table import ReadingsTable, nuisance_count
 from simulator.compiled import compiled
 
@@ -57,7 +57,7 @@ def _square_gap(y1: float, y2: float, boxes: Array, j: int) -> float:
 
 
 @compiled
-def mass_bound(frame: Frame, states: int, table: ReadingsTable, places: Places) -> float:
+def mass_bound(frame: TrackedFrame, states: int, table: ReadingsTable, places: Places) -> float:
     """Return an upper bound of a frame's density averaged over the prior of the ranges.
 
     A stretch of the curve lies in a box, and no reading is nearer to it than to the box; on a
@@ -67,7 +67,7 @@ def mass_bound(frame: Frame, states: int, table: ReadingsTable, places: Places) 
 
     Parameters
     ----------
-    frame : Frame
+    frame : TrackedFrame
         The frame.
     states : int
         Of a hypothesis: more than 2 where crosstalk is learnt.

@@ -99,7 +99,7 @@ def _add_nuisance(root: Root, of: Hypotheses, row: int, gain: float, table: Read
     n = X.shape[1]
     i, t = cell_of(x[row, U], table)
     _, _, d1, d2 = mean_at(x[row, U], table)
-    for j in range(n, X.shape[2]):
+    for j in range(n, X.shape[-1]):
         f1, f2 = nuisance_at(i, t, j - n, table)
         f1, f2 = gain * (f1 + d1 * X[row, U, j]), gain * (f2 + d2 * X[row, U, j])
         if n > 2:
@@ -113,9 +113,9 @@ def _rate_given_u(of: Hypotheses, row: int, precision: float) -> Rate:
     """Return what a hypothesis says of du/dt given u."""
     X = of.X
     slope, square = 0.0, 0.0
-    for j in range(X.shape[2]):
+    for j in range(X.shape[-1]):
         slope += X[row, U, j] * X[row, V, j] * precision
-    for j in range(X.shape[2]):
+    for j in range(X.shape[-1]):
         square += (X[row, V, j] - slope * X[row, U, j]) ** 2
     return Rate(of.x[row, V], slope, math.sqrt(square))
 
@@ -154,7 +154,7 @@ def prior_of(
         _, _, share = shared_part(of, row)
         _, _, d1, d2 = mean_at(x[row, ANCHOR], table)
         slope1, slope2 = slope1 + gain * share * d1, slope2 + gain * share * d2
-    if of.X.shape[2] > of.X.shape[1]:
+    if of.X.shape[-1] > of.X.shape[1]:
         root = _add_nuisance(root, of, row, gain, table)
     rate = Rate(x[row, V], 0.0, 0.0)
     if table.by_rate:
@@ -188,7 +188,7 @@ def born_prior(of: Hypotheses, log_weight: float, rate_sd: float, table: Reading
     root = Root(0.0, 0.0, 0.0)
     if learns_crosstalk(of):
         offset1, offset2 = offset1 + of.x[0, CROSSTALK1], offset2 + of.x[0, CROSSTALK2]
-        for j in range(of.X.shape[2]):
+        for j in range(of.X.shape[-1]):
             root = add_factor(root, of.X[0, CROSSTALK1, j], of.X[0, CROSSTALK2, j])
     return Prior(
         Position(True, 0.0, 0.0, log_weight),

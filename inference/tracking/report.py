@@ -53,7 +53,7 @@ def _describe(row: Array, of: Hypotheses, j: int) -> None:
     x, X = of.x, of.X
     own, common, rate = 0.0, 0.0, 0.0
     n = X.shape[1]
-    for k in range(X.shape[2]):
+    for k in range(X.shape[-1]):
         square = X[j, U, k] * X[j, U, k]
         if k >= n:
             common += square
@@ -91,7 +91,7 @@ def _describe_crosstalk(out: Array, i: int, of: Hypotheses) -> None:
         mean, square, total = 0.0, 0.0, 0.0
         for j in range(int(of.numbers[COUNT]) + 1):
             variance = 0.0
-            for c in range(X.shape[2]):
+            for c in range(X.shape[-1]):
                 variance += X[j, state, c] * X[j, state, c]
             gap = x[j, state] - x[0, state]
             mean += weight[j] * gap

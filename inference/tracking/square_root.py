@@ -71,7 +71,7 @@ def move(of: Hypotheses, row: int, motion: Motion, work: Array) -> None:
     n = X.shape[1]
     x[row, U] += motion.carry * x[row, V]
     x[row, V] *= motion.decay
-    for j in range(X.shape[2]):
+    for j in range(X.shape[-1]):
         X[row, U, j] += motion.carry * X[row, V, j]
         X[row, V, j] *= motion.decay
     for i in range(n):
@@ -112,7 +112,7 @@ def update(of: Hypotheses, row: int, readings: Linear, scratch: Scratch) -> floa
     x, X = of.x, of.X
     work, factors, pulls = scratch.work, scratch.factors, scratch.pulls
     noise, residual1, residual2 = readings.noise, readings.residual1, readings.residual2
-    n, m = X.shape[1], X.shape[2]
+    _, n, m = X.shape
     root = noise
     for j in range(m):
         f1 = readings.by_u1 * X[row, U, j] + readings.by_v1 * X[row, V, j]

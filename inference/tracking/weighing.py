@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from inference.tracking.candidates import (
     NEW,
-    Candidate,
-    Candidates,
+    TrackCandidate,
+    TrackCandidates,
     add_candidate,
     candidates_for,
     heaviest_of,
@@ -21,7 +21,7 @@ from inference.tracking.candidates import (
     take,
 )
 from inference.tracking.empty_scene import expect_empty, learn_empty
-from inference.tracking.frame_density import Frame
+from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import (
     COUNT,
     PENDING,
@@ -33,7 +33,7 @@ from inference.tracking.hypotheses import (
 )
 from inference.tracking.learning import learn
 from inference.tracking.merging import prune
-from inference.tracking.modes import Scanned, find_modes, scanned_for
+from inference.tracking.modes import Scanned, find_candidates, scanned_for
 from inference.tracking.motion import Rules
 from inference.tracking.outliers import expected_readings, log_outlier
 from inference.tracking.places import Places, mass_bound
@@ -41,7 +41,7 @@ from inference.tracking.prediction import born_prior, prior_of
 from inference.tracking.readings_table import ReadingsTable
 from simulator.compiled import compiled
 
-__all__ = ["Model", "Room", "room_for", "weigh"]
+__all__ = ["Model", "Room", "room_for", "weigh_frame"]
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class Room(NamedTuple):
     """Arrays that are overwritten, made once for many frames."""
 
     after: Hypotheses  # those after the frame
-    candidates: Candidates  # modes that were found
+    candidates: TrackCandidates  # modes that were found
     scanned: Scanned  # where they were looked for
     scratch: Scratch  # for learning
 
@@ -108,19 +108,19 @@ def _log(weight: float) -> float:
 
 
 @compiled
-def _of_followed(frame: Frame, of: Hypotheses, model: Model, room: Room) -> int:
+def _of_followed(frame: TrackedFrame, of: Hypotheses, model: Model, room: Room) -> int:
     """List the modes of the frame under every hypothesis; their number."""
     log_usual = math.log1p(-model.rules.outlier)
     table, scan = model.table, model.places.scan
     found = 0
     for h in range(1, int(of.numbers[COUNT]) + 1):
         prior = prior_of(of, h, frame.gain, _log(of.weight[h]) + log_usual, table)
-        found = find_modes(room.candidates, found, h, frame, prior, table, scan, room.scanned)
+        found = find_candidates(room.candidates, found, h, frame, prior, table, scan, room.scanned)
     return found
 
 
 @compiled
-def _of_empty(frame: Frame, of: Hypotheses, model: Model, room: Room) -> Empty:
+def _of_empty(frame: TrackedFrame, of: Hypotheses, model: Model, room: Room) -> Empty:
     """Weigh the empty scene, and an object that has come and is not seen."""
     rules = model.rules
     log_usual, log_odd = math.log1p(-rules.outlier), math.log(rules.outlier)
@@ -136,19 +136,19 @@ def _of_empty(frame: Frame, of: Hypotheses, model: Model, room: Room) -> Empty:
 
 
 @compiled
-def _of_new(frame: Frame, of: Hypotheses, model: Model, room: Room, found: int) -> int:
+def _of_new(frame: TrackedFrame, of: Hypotheses, model: Model, room: Room, found: int) -> int:
     """List the modes of an object that has just come; the new length of the list."""
     table, rules = model.table, model.rules
     log_weight = _log(of.numbers[PENDING]) + math.log1p(-rules.outlier)
     prior = born_prior(of, log_weight, rules.rate_sd, table)
-    return find_modes(
+    return find_candidates(
         room.candidates, found, NEW, frame, prior, table, model.places.scan, room.scanned
     )
 
 
 @compiled
 def _of_outliers(
-    frame: Frame, of: Hypotheses, model: Model, room: Room, found: int, best: float
+    frame: TrackedFrame, of: Hypotheses, model: Model, room: Room, found: int, best: float
 ) -> tuple[int, float]:
     """List the hypotheses that stay as they were, the frame being an outlier; length and best."""
     candidates, rules = room.candidates, model.rules
@@ -161,14 +161,19 @@ def _of_outliers(
         mean1, mean2 = expected_readings(of, h, frame.gain, model.table)
         odd = log_weight + log_outlier(frame, mean1, mean2, model.table, rules)
         if odd > best + _ODD and found < candidates.log_mass.size:
-            found = add_candidate(candidates, found, Candidate(odd, 0.0, 0.0, 0.0, -h))
+            found = add_candidate(candidates, found, TrackCandidate(odd, 0.0, 0.0, 0.0, -h))
             best = max(best, odd)
     return found, best
 
 
 @compiled
 def _learnt(
-    row: int, candidate: Candidate, frame: Frame, of: Hypotheses, model: Model, room: Room
+    row: int,
+    candidate: TrackCandidate,
+    frame: TrackedFrame,
+    of: Hypotheses,
+    model: Model,
+    room: Room,
 ) -> float:
     """Teach a row of the hypotheses after the frame what its candidate says; its surprise."""
     if candidate.parent == NEW:
@@ -180,7 +185,7 @@ def _learnt(
 
 @compiled
 def _keep(
-    frame: Frame,
+    frame: TrackedFrame,
     of: Hypotheses,
     model: Model,
     room: Room,
@@ -226,14 +231,14 @@ def _take_over(of: Hypotheses, after: Hypotheses, count: int, total: float) -> N
 
 
 @compiled
-def weigh(
-    frame: Frame, of: Hypotheses, model: Model, room: Room, full: bool
+def weigh_frame(
+    frame: TrackedFrame, of: Hypotheses, model: Model, room: Room, full: bool
 ) -> tuple[float, float]:
     """Weigh every hypothesis by a frame.
 
     Parameters
     ----------
-    frame : Frame
+    frame : TrackedFrame
         The frame.
     of : Hypotheses
         As predicted; changed in place.

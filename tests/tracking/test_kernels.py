@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy import integrate, linalg
 
-from inference.tracking.frame_density import Frame
+from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import Hypotheses, scratch_for
 from inference.tracking.merging import merge, merge_equals
 from inference.tracking.motion import Motion, motion_over, presence_over
@@ -183,7 +183,7 @@ def test_the_mass_of_a_new_object_is_bounded(read: float, gain: float) -> None:
         at = table[rng.integers(len(table))] + rng.standard_normal(2) * rng.choice([1, 10])
         density = np.exp(-0.5 * ((table - at) ** 2).sum(axis=1))
         exact = integrate.trapezoid(density, grid) / (grid[-1] - grid[0])
-        bound = mass_bound(Frame(at[0], at[1], gain), 2, model.table, model.places)
+        bound = mass_bound(TrackedFrame(at[0], at[1], gain), 2, model.table, model.places)
         assert bound >= exact * (1 - 1e-6)
         if exact > 1e-6:
             assert bound < 100 * exact
