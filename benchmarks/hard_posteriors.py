@@ -14,6 +14,7 @@ import multiprocessing
 import os
 import time
 from concurrent.futures import Executor, ProcessPoolExecutor
+from typing import Any
 
 import numpy as np
 
@@ -23,9 +24,9 @@ from inference.posterior.infer import infer
 from inference.posterior.sampling.verdict import MAX_R_HAT
 from inference.posterior.settings import SamplerSettings
 from service.worker import THREAD_VARIABLES
-from simulator.scene import parse_scene
-from simulator.sensor import parse_sensor
-from simulator.simulate import simulate
+from simulator.scene import Scene, parse_scene
+from simulator.sensor import Sensor, parse_sensor
+from simulator.simulate import Simulation, simulate
 from simulator.trajectories import RadialTrajectory
 
 SENSORS = {
@@ -35,7 +36,7 @@ SENSORS = {
 CROSSTALK = {"crosstalk": [{"prior": "normal", "mean": 0.0, "sd": 0.1}] * 2}
 STRENGTH = {"prior": "lognormal", "median": 0.02, "sigma": 1.0}
 DISTANCE = {"prior": "lognormal", "median": 3.0, "sigma": 0.5}
-SCENES = {
+SCENES: dict[str, dict[str, Any]] = {
     "object": {},
     "background, R known": {"background": {"strength": STRENGTH, "distance_m": 3.0}},
     "crosstalk, background, R known": {
@@ -48,7 +49,7 @@ SCENES = {
         "background": {"strength": STRENGTH, "distance_m": DISTANCE},
     },
 }
-TRUTH = {
+TRUTH: dict[str, Any] = {
     "object": {"c0": 0.0769, "c1": -0.123, "c2": 0.0957},
     "crosstalk": [5e-4, 0.01],
     "background": {"strength": 0.017, "distance_m": 3.0, "shadow": {"c0": 0.056, "c1": 0.02}},
@@ -56,7 +57,7 @@ TRUTH = {
 READ = 7.7e-6  # a thousandth of the object's w2 at 1 m
 
 
-def _case(kind, name, frames, seed):  # type: ignore[no-untyped-def]
+def _case(kind: str, name: str, frames: int, seed: int) -> tuple[Sensor, Scene, Simulation]:
     sensor = parse_sensor({**SENSORS[kind], "noise": {"read": [READ, READ]}})
     terms = SCENES[name]
     truth = {"object": TRUTH["object"], **{term: TRUTH[term] for term in terms}}
@@ -65,7 +66,7 @@ def _case(kind, name, frames, seed):  # type: ignore[no-untyped-def]
     return sensor, parse_scene(terms), simulation
 
 
-def _warm(kind, name):  # type: ignore[no-untyped-def]
+def _warm(kind: str, name: str) -> None:
     sensor, scene, simulation = _case(kind, name, 12, 0)
     infer(sensor, scene, simulation.frames, SamplerSettings(seed=1, target_ess=10, max_seconds=5))
 

@@ -70,6 +70,7 @@ def main() -> None:
                 )
                 decisions = decide(scene, candidates)
                 found = selection_summary(scene, Selection(candidates, decisions))
+                assert found is not None
                 without, with_it = found.candidates
                 counts += [
                     with_it.log_evidence - without.log_evidence > EVIDENCE_MARGIN,

@@ -10,17 +10,26 @@ import argparse
 import multiprocessing
 import statistics
 import time
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor
 
+from inference.posterior.answer.posterior import Posterior
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
 from simulator.errors import RefusedError
+from simulator.frames import Frames
+from simulator.scene import Scene
+from simulator.sensor import Sensor
 from tests.posterior.scenes import example
 
 
-def _seconds(request, settings, executor=None):  # type: ignore[no-untyped-def]
+def _seconds(
+    request: tuple[Sensor, Scene, Frames],
+    settings: SamplerSettings,
+    executor: Executor | None = None,
+) -> tuple[float, Posterior]:
     begin = time.perf_counter()
-    posterior = infer(*request, settings, executor)
+    sensor, scene, frames = request
+    posterior = infer(sensor, scene, frames, settings, executor)
     return time.perf_counter() - begin, posterior
 
 
@@ -58,7 +67,7 @@ def main() -> None:
                     except RefusedError:
                         continue
                     weighted.append(seconds)
-                    k_hats.append(posterior.runtime.k_hat)
+                    k_hats.append(posterior.runtime.k_hat or 0.0)
                 base = statistics.median(one)
                 both = statistics.median(two)
                 light = statistics.median(weighted) if weighted else float("nan")

@@ -14,6 +14,8 @@ import math
 import time
 import timeit
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,10 +100,10 @@ def roots_loop(name: str, readings: Array, r0: float) -> list[Array]:
     return found
 
 
-def equation(name: str, i: float, q: float, k: float) -> Callable[[Array], Array]:
+def equation(name: str, i: float, q: float, k: float) -> Callable[[Any], Any]:
     """Return a sine wave's equation, which numpy evaluates on a grid and brentq at a point."""
 
-    def f(r: Array) -> Array:
+    def f(r: Any) -> Any:
         quad = r * r + C1 * r + C0
         cos, sin = np.cos(k * r), np.sin(k * r)
         match name:
@@ -173,10 +175,10 @@ def main() -> None:
         first, second = plain.readings[:, 0].copy(), plain.readings[:, 1].copy()
         pulsed = isinstance(sensor, PulsedSensor)
         if pulsed:
-            base, label = best(lambda a=first, b=second: a / b, 200) / n, "w1 / w2"
+            base, label = best(partial(np.divide, first, second), 200) / n, "w1 / w2"
         else:
-            base, label = best(lambda a=first, b=second: np.arctan2(b, a), 50) / n, "arctan2(q, i)"
-        alone = best(lambda s=sensor, f=plain: conventional_range(s, f), 200) / n
+            base, label = best(partial(np.arctan2, second, first), 50) / n, "arctan2(q, i)"
+        alone = best(partial(conventional_range, sensor, plain), 200) / n
         row("conventional, range alone", sensor, alone, "", label, base)
         unit = 0.0
         for name, technique in TECHNIQUES.items():
@@ -189,7 +191,7 @@ def main() -> None:
             scene: Scene = parse_scene(data)
             spent = (
                 best(
-                    lambda s=sensor, c=scene, f=frames, t=name: estimate(s, c, f, [t]),
+                    partial(estimate, sensor, scene, frames, [name]),
                     100 if name == "conventional" else 7,
                 )
                 / n
@@ -203,14 +205,12 @@ def main() -> None:
             assert seen is not None
             if isinstance(sensor, PulsedSensor):
                 some, r0 = seen[:500], sensor.r0
-                loop = best(lambda t=name, s=some, x=r0: roots_loop(t, s, x), 3) / len(some)
+                loop = best(partial(roots_loop, name, some, r0), 3) / len(some)
                 row(name, sensor, spent, cost, "numpy.roots", loop)
             else:
                 some, k = seen[:100], sensor.wave_number
                 high = FAR if technique.uses_background else math.pi / k
-                loop = best(lambda t=name, s=some, x=k, h=high: brentq_loop(t, s, x, h), 3) / len(
-                    some
-                )
+                loop = best(partial(brentq_loop, name, some, k, high), 3) / len(some)
                 row(name, sensor, spent, cost, "scipy brentq", loop)
 
 

@@ -123,7 +123,8 @@ def through_the_fold(name: str, model: Tracker, scene: Any, tracks: int, start: 
     units = np.asarray(model.observed.units)
     rng = np.random.default_rng(7)
     wrong = dict.fromkeys(("frame by frame", "nearest to the last", "particles", "tracker"), 0)
-    total = spent = frames_count = 0
+    total = frames_count = 0
+    spent = 0.0
     for k in range(tracks):
         side = rng.choice([-1.0, 1.0])
         while True:

@@ -16,15 +16,18 @@ import argparse
 import collections
 import dataclasses
 import time
+from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 from inference.posterior.criticism.cross_check import false_branch, moments_disagree
 from inference.posterior.criticism.prior_conflict import parameter_conflicts
 from inference.posterior.sampling.diagnostics import autocorrelation_time, effective_sample_size
 from inference.posterior.sampling.importance import draw_weighted
-from inference.posterior.sampling.verdict import judge
+from inference.posterior.sampling.proposal import Mixture
+from inference.posterior.sampling.verdict import Chains, judge
 from tests.posterior.sampling.surrogate import (
     DISTANCE,
     LAWS,
@@ -37,6 +40,9 @@ from tests.posterior.sampling.surrogate import (
     surrogate,
     target,
 )
+
+Array = NDArray[np.float64]
+Spoil = Callable[[Chains, np.random.Generator], None]
 
 TARGET_ESS = 400
 TAU = 2.0
@@ -66,17 +72,19 @@ GATES = {
 HALF = ("mode weights", "quadrature", "importance sampling")  # asked in every second run
 
 
-def _gate(reason):  # type: ignore[no-untyped-def]
+def _gate(reason: str) -> str:
     return next(gate for gate, words in GATES.items() if words in reason)
 
 
-def _band(count, runs):  # type: ignore[no-untyped-def]
+def _band(count: int, runs: int) -> str:
     low = stats.beta.ppf(0.025, count, runs - count + 1) if count else 0.0
     high = stats.beta.ppf(0.975, count + 1, runs - count)
     return f"{count:>6}{count / runs:>11.1e}   [{low:.1e}, {high:.1e}]"
 
 
-def _density_gates(law, chains, rng, both=True):  # type: ignore[no-untyped-def]
+def _density_gates(
+    law: str, chains: Chains, rng: np.random.Generator, both: bool = True
+) -> list[str]:
     density, optima = target(law), optima_of(law)
     weighted = draw_weighted(cheap(density), optima, rng, 2000)
     found = [false_branch(density, chains, optima)]
@@ -88,8 +96,9 @@ def _density_gates(law, chains, rng, both=True):  # type: ignore[no-untyped-def]
     return [reason for reason in found if reason is not None]
 
 
-def single_looks(runs, seed):  # type: ignore[no-untyped-def]
-    alarms, failed = collections.Counter(), 0
+def single_looks(runs: int, seed: int) -> None:
+    alarms: collections.Counter[str] = collections.Counter()
+    failed = 0
     for run in range(runs):
         rng = np.random.default_rng([seed, run])
         law = LAWS[run % len(LAWS)]
@@ -109,7 +118,7 @@ def single_looks(runs, seed):  # type: ignore[no-untyped-def]
     print(f"{'any':<26}{_band(failed, runs)}", flush=True)
 
 
-def priors(runs, seed):  # type: ignore[no-untyped-def]
+def priors(runs: int, seed: int) -> None:
     alarms = 0
     for run in range(runs):
         rng = np.random.default_rng([seed, 1, run])
@@ -129,7 +138,7 @@ def priors(runs, seed):  # type: ignore[no-untyped-def]
     print(flush=True)
 
 
-def _until(chains, steps):  # type: ignore[no-untyped-def]
+def _until(chains: Chains, steps: int) -> Chains:
     skip = steps // 5
     return dataclasses.replace(
         chains,
@@ -139,9 +148,11 @@ def _until(chains, steps):  # type: ignore[no-untyped-def]
     )
 
 
-def _first_pass(chains, chunk=CHUNK, looks=LOOKS):  # type: ignore[no-untyped-def]
+def _first_pass(
+    chains: Chains, chunk: int = CHUNK, looks: int = LOOKS
+) -> tuple[int, list[tuple[str, ...]]]:
     """The look at which a run passes, its verdicts until then; 0 where it never does."""
-    seen = []
+    seen: list[tuple[str, ...]] = []
     for look in range(1, looks + 1):
         verdict = judge(_until(chains, look * chunk), TARGET_ESS)
         if verdict.converged:
@@ -150,12 +161,13 @@ def _first_pass(chains, chunk=CHUNK, looks=LOOKS):  # type: ignore[no-untyped-de
     return 0, seen
 
 
-def _mean(law):  # type: ignore[no-untyped-def]
+def _mean(law: str) -> Array:
     return np.array([DISTANCE * UPPER if law == "bimodal" else 0.0, 0.0, 0.0])
 
 
-def sequential(runs, seed):  # type: ignore[no-untyped-def]
-    never, looks, late, errors = 0, [], collections.Counter(), []
+def sequential(runs: int, seed: int) -> None:
+    late: collections.Counter[str] = collections.Counter()
+    never, looks, missed = 0, [], []
     for run in range(runs):
         rng = np.random.default_rng([seed, 3, run])
         law = LAWS[run % len(LAWS)]
@@ -171,8 +183,8 @@ def sequential(runs, seed):  # type: ignore[no-untyped-def]
         for j, mean in enumerate(_mean(law)):
             x = kept.z[..., j]
             error = x.std() / np.sqrt(effective_sample_size(x))
-            errors.append((x.mean() - mean) / error)
-    errors = np.array(errors)
+            missed.append((x.mean() - mean) / error)
+    errors = np.array(missed)
     print(f"\nhealthy surrogate runs, judged every {CHUNK / TAU:.0f} autocorrelation times: {runs}")
     print(f"{'never passed in 20 looks':<26}{_band(never, runs)}")
     print(f"passed at look {np.mean(looks):.2f} in the mean, {max(looks)} at the latest")
@@ -185,32 +197,32 @@ def sequential(runs, seed):  # type: ignore[no-untyped-def]
     )
 
 
-def _defects():  # type: ignore[no-untyped-def]
-    def stuck(c, _):
+def _defects() -> dict[str, Spoil]:
+    def stuck(c: Chains, _: np.random.Generator) -> None:
         c.z[1, 7] = c.z[1, 7, :1]
 
-    def shared(c, _):
+    def shared(c: Chains, _: np.random.Generator) -> None:
         c.z[2, :, 40:] = c.z[0, :, 40:]
 
-    def shift(size):
-        def apply(c, _):
+    def shift(size: float) -> Spoil:
+        def apply(c: Chains, _: np.random.Generator) -> None:
             c.z[3, ..., 1] += size
 
         return apply
 
-    def split(c, _):
+    def split(c: Chains, _: np.random.Generator) -> None:
         c.mode[:, :2] = 1
         c.z[:, :2, :, 0] += DISTANCE
 
-    def uneven(c, _):
+    def uneven(c: Chains, _: np.random.Generator) -> None:
         for k, walkers in enumerate((1, 2, 2, 3)):
             c.mode[k, :walkers] = 1
             c.z[k, :walkers, :, 0] += DISTANCE
 
-    def wander(c, rng):
+    def wander(c: Chains, rng: np.random.Generator) -> None:
         c.z[:] = np.cumsum(rng.standard_normal(c.z.shape), axis=2)
 
-    def relax(c, _):
+    def relax(c: Chains, _: np.random.Generator) -> None:
         c.z[..., 2] += 6 * np.exp(-np.arange(c.z.shape[2]) / (50 * TAU))
 
     return {
@@ -228,11 +240,12 @@ def _defects():  # type: ignore[no-untyped-def]
     }
 
 
-def defects(runs, seed):  # type: ignore[no-untyped-def]
+def defects(runs: int, seed: int) -> None:
     print(f"\nruns with a defect, judged at up to {LOOKS} looks: {runs} each")
     print(f"{'defect':<32}{'passed at any look':>20}   first reason at the last look")
     for name, spoil in _defects().items():
-        passed, first = 0, collections.Counter()
+        passed = 0
+        first: collections.Counter[str] = collections.Counter()
         for run in range(runs):
             rng = np.random.default_rng([seed, 4, run])
             chains = surrogate(rng, LOOKS * CHUNK, TAU, walkers=WALKERS)
@@ -262,9 +275,11 @@ def defects(runs, seed):  # type: ignore[no-untyped-def]
         chains = surrogate(rng, int(100 * TAU), TAU, walkers=WALKERS)
         optima = optima_of("bimodal")
 
-        def better(z, optima=optima):
+        def better(z: Array, optima: Mixture = optima) -> Array:
             far = z - optima.centres[1]
-            return np.logaddexp(-0.5 * (z**2).sum(axis=1), 14 - 0.5 * (far**2).sum(axis=1))
+            return np.asarray(
+                np.logaddexp(-0.5 * (z**2).sum(axis=1), 14 - 0.5 * (far**2).sum(axis=1))
+            )
 
         branch += false_branch(better, chains, optima) is None
         entered += not _density_gates("bimodal", chains, rng)
@@ -272,7 +287,7 @@ def defects(runs, seed):  # type: ignore[no-untyped-def]
     print(f"{'a mode that nobody entered':<32}{entered / runs:>20.1%}", flush=True)
 
 
-def real(runs, seed):  # type: ignore[no-untyped-def]
+def real(runs: int, seed: int) -> None:
     print(f"\nreal ensembles, judged every 100 steps: {runs} runs each")
     print(
         f"{'target':<20}{'never passed':>13}{'density':>9}{'look':>6}{'tau':>6}{'inflation':>10}"
@@ -287,7 +302,8 @@ def real(runs, seed):  # type: ignore[no-untyped-def]
     }
     for name, (density, optima) in targets.items():
         never = spoken = 0
-        looks, taus, inflation, acceptance, still, late = [], [], [], [], 0.0, collections.Counter()
+        late: collections.Counter[str] = collections.Counter()
+        looks, taus, inflation, acceptance, still = [], [], [], [], 0.0
         for run in range(runs):
             steps = 1500
             chains = ensembles_of(density, optima, seed * 1_000_003 + run, steps)
@@ -326,7 +342,7 @@ def real(runs, seed):  # type: ignore[no-untyped-def]
         )
 
 
-PARTS = {
+PARTS: dict[str, tuple[Callable[[int, int], None], str]] = {
     "priors": (priors, "runs"),
     "real": (real, "real"),
     "sequential": (sequential, "sequential"),

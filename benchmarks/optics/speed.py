@@ -6,7 +6,9 @@ Run: python -m benchmarks.optics.speed
 import csv
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import integrate
@@ -18,10 +20,17 @@ from simulator.optics.radiometry import observe, observe_batch
 PRINTED = Path(__file__).parents[2].parent / "shared" / "data" / "appendix_b_pulsed.csv"
 
 
+SETTINGS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("10 x 10 a piece", {"points": 10}),
+    ("adaptive to 1e-8", {"tolerance": 1e-8}),
+    ("adaptive to 1e-11", {"tolerance": 1e-11}),
+)
+
+
 def cpu(function: Callable[[], object], repeats: int = 3) -> float:
     """Return the least CPU time of several calls [s]; the first one compiles."""
     function()
-    times = []
+    times: list[float] = []
     for _ in range(repeats):
         start = time.process_time()
         function()
@@ -33,7 +42,7 @@ def reference_flux(width: float, height: float, z: float) -> float:
     """scipy's adaptive quadrature of the kernel of a facing diffuse rectangle."""
 
     def kernel(y: float, x: float) -> float:
-        return z**3 / (2 * np.pi**2 * (x * x + y * y + z * z) ** 3.5)
+        return float(z**3 / (2 * np.pi**2 * (x * x + y * y + z * z) ** 3.5))
 
     return float(
         4 * integrate.dblquad(kernel, 0, width / 2, 0, height / 2, epsabs=0, epsrel=1e-10)[0]
@@ -49,15 +58,11 @@ def main() -> None:
     agreement = observe(plate_scene("W04H08R00T00").plate(0.3)).flux / reference_flux(0.4, 0.8, 0.3)
     print(f"  agreement {abs(agreement - 1):.1e}")
     for name, bodies in (("diffuse", plates), ("Beckmann m = 0.1", glossy)):
-        for label, arguments in (
-            ("10 x 10 a piece", {"points": 10}),
-            ("adaptive to 1e-8", {"tolerance": 1e-8}),
-            ("adaptive to 1e-11", {"tolerance": 1e-11}),
-        ):
-            seconds = cpu(lambda b=bodies, a=arguments: observe_batch(b, **a)) / len(bodies)  # type: ignore[misc]
+        for label, arguments in SETTINGS:
+            seconds = cpu(partial(observe_batch, bodies, **arguments)) / len(bodies)
             line = f"{name}, {label}: {seconds * 1e6:.0f} us a rectangle, batched"
             if name == "diffuse":
-                lights = observe_batch(bodies, **arguments)  # type: ignore[arg-type]
+                lights = observe_batch(bodies, **arguments)
                 worst = max(abs(a.flux / b.flux - 1) for a, b in zip(lights, exact, strict=True))
                 line += f", {baseline / seconds:.0f} times the baseline, worst error {worst:.1e}"
             print(line)

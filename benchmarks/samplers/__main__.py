@@ -31,20 +31,23 @@ import platform
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 from benchmarks.samplers.nested import nested
 from benchmarks.samplers.nuts import nuts
 from benchmarks.samplers.ours import ours, reference
-from benchmarks.samplers.outcome import TARGET_ESS, TARGET_R_HAT
+from benchmarks.samplers.outcome import TARGET_ESS, TARGET_R_HAT, Outcome
 from benchmarks.samplers.plain_emcee import plain_emcee
 from benchmarks.samplers.scenes import FRAMES, SCENES, problem
 from inference.posterior.sampling.start import find_optima
 
+Array = NDArray[np.float64]
+
 PEERS = ("numpyro", "jax", "dynesty")
 
 
-def _wrong(outcome, mean, sd, truth, names):  # type: ignore[no-untyped-def]
+def _wrong(outcome: Outcome, mean: Array, sd: Array, truth: Array, names: tuple[str, ...]) -> str:
     """Say in words what is wrong with a sampler's answer, held to the reference."""
     if len(outcome.z) < 8:
         return "no answer"
@@ -71,7 +74,7 @@ def _wrong(outcome, mean, sd, truth, names):  # type: ignore[no-untyped-def]
     return "; ".join(found)
 
 
-def _row(sampler, outcome, wrong):  # type: ignore[no-untyped-def]
+def _row(sampler: str, outcome: Outcome, wrong: str) -> str:
     r_hat = "-" if not math.isfinite(outcome.r_hat) else f"{outcome.r_hat:.3f}"
     reached = "yes" if outcome.reached else "no"
     return (
@@ -80,12 +83,12 @@ def _row(sampler, outcome, wrong):  # type: ignore[no-untyped-def]
     )
 
 
-def _versions():  # type: ignore[no-untyped-def]
+def _versions() -> str:
     packages = ("numpy", "scipy", "numba", "emcee", *PEERS)
     return ", ".join(f"{name} {importlib.metadata.version(name)}" for name in packages)
 
 
-def measure(name, cap, seed, samplers):  # type: ignore[no-untyped-def]
+def measure(name: str, cap: float, seed: int, samplers: list[str]) -> str:
     """One scene, all samplers: a section of the document."""
     load = os.getloadavg()[0]
     job, density, truth = problem(name, seed)
@@ -134,7 +137,7 @@ shape; ours and nested sampling start from the prior.
 """
 
 
-def _write(path, name, section):  # type: ignore[no-untyped-def]
+def _write(path: Path, name: str, section: str) -> None:
     """Put a scene's section into the document; those of other scenes stay."""
     old = path.read_text().split("\n## ")[1:] if path.exists() else []
     sections = {part.partition("\n")[0]: "## " + part.rstrip("\n") + "\n" for part in old}

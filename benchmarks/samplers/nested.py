@@ -4,18 +4,23 @@ import math
 import time
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from benchmarks.samplers.outcome import TARGET_ESS, Outcome
+from inference.density.collapsed import CollapsedDensity
+from inference.posterior.job import Job
+
+Array = NDArray[np.float64]
 
 
-def nested(job, density, cap):  # type: ignore[no-untyped-def]
+def nested(job: Job, density: CollapsedDensity, cap: float) -> Outcome:
     """Run dynesty from the prior."""
     from dynesty import NestedSampler
 
     d = len(density.parameters)
 
-    def log_likelihood(z):  # type: ignore[no-untyped-def]
+    def log_likelihood(z: Array) -> float:
         return max(float(density(z[None])[0] + 0.5 * z @ z), -1e300)
 
     sampler = NestedSampler(
@@ -44,6 +49,4 @@ def nested(job, density, cap):  # type: ignore[no-untyped-def]
     if not finished:  # the weights of a run that has not arrived say nothing of the posterior
         note += f", stopped with {remaining:.3g} nats of evidence to go"
         return Outcome(seconds, False, ess, math.nan, np.empty((0, d)), np.empty(0), note)
-    return Outcome(
-        seconds, finished and ess >= TARGET_ESS, ess, math.nan, results.samples, weights, note
-    )
+    return Outcome(seconds, bool(ess >= TARGET_ESS), ess, math.nan, results.samples, weights, note)

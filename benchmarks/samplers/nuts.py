@@ -6,12 +6,20 @@ import time
 
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.samplers.outcome import Outcome, enough, equal, judged
+from inference.density.collapsed import CollapsedDensity
+from inference.posterior.job import Job
+from inference.posterior.sampling.start import Optimum
+
+Array = NDArray[np.float64]
 
 
-def nuts(job, density, optima, cap):  # type: ignore[no-untyped-def]
+def nuts(job: Job, density: CollapsedDensity, optima: list[Optimum], cap: float) -> Outcome:
     """NumPyro's NUTS on the collapsed density, whitened."""
     import jax
     import jax.numpy as jnp
@@ -24,7 +32,7 @@ def nuts(job, density, optima, cap):  # type: ignore[no-untyped-def]
     offsets = np.concatenate([np.zeros((1, d)), h * np.eye(d), -h * np.eye(d)])
     evaluations = 0
 
-    def value_and_slope(x):  # type: ignore[no-untyped-def]
+    def value_and_slope(x: Array) -> tuple[np.float64, Array]:
         nonlocal evaluations
         evaluations += 2 * d + 1
         values = -density(centre + (np.asarray(x) + offsets) @ factor.T)
@@ -35,11 +43,11 @@ def nuts(job, density, optima, cap):  # type: ignore[no-untyped-def]
 
     shapes = (jax.ShapeDtypeStruct((), jnp.float64), jax.ShapeDtypeStruct((d,), jnp.float64))
 
-    @jax.custom_vjp
-    def potential(x):  # type: ignore[no-untyped-def]
+    @jax.custom_vjp  # type: ignore[untyped-decorator, unused-ignore]
+    def potential(x: Any) -> Any:
         return jax.pure_callback(value_and_slope, shapes, x)[0]
 
-    def forward(x):  # type: ignore[no-untyped-def]
+    def forward(x: Any) -> Any:
         return jax.pure_callback(value_and_slope, shapes, x)
 
     potential.defvjp(forward, lambda slope, g: (g * slope,))
@@ -53,7 +61,7 @@ def nuts(job, density, optima, cap):  # type: ignore[no-untyped-def]
         kernels.append(jax.jit(lambda s, kernel=kernel: kernel.sample(s, (), {})))
         kernels[-1](states[-1])  # compiles
     evaluations, begin = 0, time.process_time()
-    draws = [[] for _ in range(4)]
+    draws: list[list[Array]] = [[] for _ in range(4)]
     done, reached = 0, False
     while not reached and time.process_time() - begin < cap:
         for k in range(4):  # all chains side by side: a quarter of the time each
@@ -69,13 +77,13 @@ def nuts(job, density, optima, cap):  # type: ignore[no-untyped-def]
             pooled = np.array([x[: done - warmup] for x in draws if len(x) >= done - warmup])
             reached = len(pooled) == 4 and enough(*judged(pooled[:, None]))
     seconds = time.process_time() - begin
-    draws = [np.array(x).reshape(-1, d) for x in draws]
-    steps = min(len(x) for x in draws)
+    drawn = [np.array(x).reshape(-1, d) for x in draws]
+    steps = min(len(x) for x in drawn)
     note = f"{evaluations} density evaluations, {divergent} divergences"
     if steps < 8:
         note += f", {steps} draws after {warmup} of warm-up in the slowest chain"
-        z = centre + np.concatenate(draws) @ factor.T
+        z = centre + np.concatenate(drawn) @ factor.T
         return Outcome(seconds, False, 0.0, math.inf, z, np.full(len(z), 1 / max(len(z), 1)), note)
-    z = centre + np.array([x[:steps] for x in draws])[:, None] @ factor.T
+    z = centre + np.array([x[:steps] for x in drawn])[:, None] @ factor.T
     ess, r_hat = judged(z)
-    return Outcome(seconds, enough(ess, r_hat), ess, r_hat, *equal(z), note)
+    return Outcome(seconds, enough(ess, r_hat), ess, r_hat, *equal(z), note=note)

@@ -5,17 +5,23 @@ import math
 import time
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.samplers.outcome import Outcome, enough, equal, judged
+from inference.density.collapsed import CollapsedDensity
 from inference.posterior import fold
+from inference.posterior.job import Job
 from inference.posterior.sampling.importance import draw_weighted
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.shear import shear_of
+from inference.posterior.sampling.start import Optimum
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.stages.state import Walking
 
+Array = NDArray[np.float64]
 
-def ours(job, cap):  # type: ignore[no-untyped-def]
+
+def ours(job: Job, cap: float) -> tuple[Outcome, fold.Checkpoint]:
     begin = time.process_time()
     checkpoint, earlier = fold.start(job), ""
     while time.process_time() - begin < cap:
@@ -35,10 +41,14 @@ def ours(job, cap):  # type: ignore[no-untyped-def]
         return Outcome(seconds, False, 0.0, math.inf, empty, np.empty(0), note), checkpoint
     kept = stage.chains(job.density().parameters.names).z
     ess, r_hat = judged(kept)
-    return Outcome(seconds, posterior.verdict.converged, ess, r_hat, *equal(kept), note), checkpoint
+    return Outcome(
+        seconds, posterior.verdict.converged, ess, r_hat, *equal(kept), note=note
+    ), checkpoint
 
 
-def reference(job, density, optima, cap):  # type: ignore[no-untyped-def]
+def reference(
+    job: Job, density: CollapsedDensity, optima: list[Optimum], cap: float
+) -> tuple[Array, Array, str]:
     """Mean and sd of every z, and what they rest on."""
     long = job.settings.model_copy(update={"target_ess": 2000, "seed": job.seed + 1000})
     outcome, _ = ours(dataclasses.replace(job, settings=long), cap)

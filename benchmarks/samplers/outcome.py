@@ -3,8 +3,11 @@
 import dataclasses
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inference.posterior.sampling.diagnostics import effective_sample_size, split_r_hat
+
+Array = NDArray[np.float64]
 
 TARGET_ESS = 400
 TARGET_R_HAT = 1.01
@@ -18,22 +21,22 @@ class Outcome:
     reached: bool
     ess: float
     r_hat: float
-    z: np.ndarray
-    weights: np.ndarray
+    z: Array
+    weights: Array
     note: str = ""
 
 
-def judged(z):  # type: ignore[no-untyped-def]
+def judged(z: Array) -> tuple[float, float]:
     """Least effective sample size and largest R-hat of (chains, walkers, steps, d)."""
     columns = np.moveaxis(z, -1, 0)
     sizes = [effective_sample_size(x) for x in columns]
     return float(np.nan_to_num(min(sizes))), float(max(split_r_hat(x) for x in columns))
 
 
-def equal(z):  # type: ignore[no-untyped-def]
+def equal(z: Array) -> tuple[Array, Array]:
     flat = z.reshape(-1, z.shape[-1])
     return flat, np.full(len(flat), 1 / len(flat))
 
 
-def enough(ess, r_hat):  # type: ignore[no-untyped-def]
+def enough(ess: float, r_hat: float) -> bool:
     return ess >= TARGET_ESS and r_hat <= TARGET_R_HAT

@@ -6,16 +6,22 @@ import time
 import emcee
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.samplers.outcome import Outcome, enough, equal, judged
 from benchmarks.samplers.scenes import FRAMES
+from inference.density.collapsed import CollapsedDensity
 from inference.density.integrand import log_integrand
 from inference.density.profile import best_ranges
 from inference.density.rows import background_of, crosstalk_of, law_of
+from inference.posterior.job import Job
 from inference.posterior.sampling.proposal import mixture_of
+from inference.posterior.sampling.start import Optimum
+
+Array = NDArray[np.float64]
 
 
-@numba.njit  # type: ignore[untyped-decorator]
+@numba.njit
 def _joint(out, u, shapes, crosstalks, backgrounds, laws, frames, r0, wave, read, shot, relative):  # type: ignore[no-untyped-def]
     for i in range(u.shape[0]):
         shape = (shapes[i, 0], shapes[i, 1], shapes[i, 2])
@@ -35,7 +41,7 @@ def _joint(out, u, shapes, crosstalks, backgrounds, laws, frames, r0, wave, read
         out[i] = total
 
 
-def _joint_density(density, x):  # type: ignore[no-untyped-def]
+def _joint_density(density: CollapsedDensity, x: Array) -> Array:
     d = len(density.parameters)
     z, u = x[:, :d], x[:, d:]
     value = density.parameters.log_prior(z)
@@ -56,18 +62,18 @@ def _joint_density(density, x):  # type: ignore[no-untyped-def]
     return result
 
 
-def _normal(rng, best):  # type: ignore[no-untyped-def]
+def _normal(rng: np.random.Generator, best: Array) -> Array:
     return rng.standard_normal(best.shape[:2])
 
 
-def plain_emcee(job, density, optima, cap):  # type: ignore[no-untyped-def]
+def plain_emcee(job: Job, density: CollapsedDensity, optima: list[Optimum], cap: float) -> Outcome:
     """All globals and all ranges in one space, emcee's defaults."""
     d = len(density.parameters)
     size = d + FRAMES
     walkers = 4 * size
     rng = np.random.default_rng(job.seed)
     mixture = mixture_of(optima[:1])
-    states, samplers, kept = [], [], []
+    states, samplers = [], []
     for _ in range(4):
         ball = mixture.centres + 0.1 * rng.standard_normal((walkers, d)) @ mixture.factors[0].T
         best = best_ranges(density, ball)
@@ -84,7 +90,6 @@ def plain_emcee(job, density, optima, cap):  # type: ignore[no-untyped-def]
         samplers.append(sampler)
     begin = time.process_time()
     for look in range(1, 11):
-        kept = []
         for k, sampler in enumerate(samplers):
             until = begin + cap * (look - 1 + (k + 1) / 4) / 10
             while time.process_time() < until:
@@ -98,4 +103,4 @@ def plain_emcee(job, density, optima, cap):  # type: ignore[no-untyped-def]
             break
     seconds = time.process_time() - begin
     note = f"{size} dimensions, {steps} steps of {walkers} walkers"
-    return Outcome(seconds, enough(ess, r_hat), ess, r_hat, *equal(kept), note)
+    return Outcome(seconds, enough(ess, r_hat), ess, r_hat, *equal(kept), note=note)

@@ -1,8 +1,13 @@
 """Scenes on which samplers are compared."""
 
-import numpy as np
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.density.collapsed import CollapsedDensity
 from inference.posterior import fold
+from inference.posterior.job import Job
 from inference.posterior.settings import SamplerSettings
 from simulator.scene import parse_scene
 from tests.posterior.scenes import OBJECT, data, sensor_of
@@ -12,7 +17,7 @@ STRENGTH = {"prior": "lognormal", "median": 0.018, "sigma": 0.5}
 CROSSTALK = [{"prior": "normal", "mean": 0.0, "sd": 0.02}] * 2
 TRUE_WALL = {"strength": 0.017, "distance_m": 3.0, "shadow": {"c0": 0.056, "c1": 0.02}}
 # name: what is true beside the object, what is stated; what is left out is unknown
-SCENES = {
+SCENES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "object": ({}, {}),
     "object + crosstalk": ({"crosstalk": [0.002, 0.01]}, {"crosstalk": CROSSTALK}),
     "free shadow": (
@@ -32,14 +37,14 @@ SCENES = {
 }
 
 
-def problem(name, seed):  # type: ignore[no-untyped-def]
+def problem(name: str, seed: int) -> tuple[Job, CollapsedDensity, NDArray[np.float64]]:
     truth, stated = SCENES[name]
     sensor = sensor_of("pulsed")
     simulation = data(sensor, truth, FRAMES, seed)
     scene = parse_scene(stated)
     job = fold.prepare(sensor, scene, simulation.frames, SamplerSettings(seed=seed))
     density = job.density()
-    true = {**{f"object.{k}": v for k, v in OBJECT.items()}}
+    true: dict[str, Any] = {f"object.{k}": v for k, v in OBJECT.items()}
     if "crosstalk" in truth:
         true |= dict(zip(("crosstalk.w1", "crosstalk.w2"), truth["crosstalk"], strict=True))
     if "background" in truth:
