@@ -16,8 +16,8 @@ import time
 import numpy as np
 
 from inference.density.collapsed import collapsed_density
-from inference.posterior.selection.candidates import assess, candidate_terms, reduced
 from inference.posterior.selection.comparison import EVIDENCE_MARGIN, PREDICTIVE_MARGIN
+from inference.posterior.selection.models import assess, candidate_terms, reduced
 from inference.posterior.selection.selection import Selection, decide, selection_summary
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor

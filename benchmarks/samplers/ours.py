@@ -16,7 +16,7 @@ from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.shear import shear_of
 from inference.posterior.sampling.start import Optimum
 from inference.posterior.sampling.transport import fit_map
-from inference.posterior.stages.state import Walking
+from inference.posterior.stages.stage import Walking
 
 Array = NDArray[np.float64]
 

@@ -16,9 +16,9 @@ from inference.posterior.sampling.proposal import Mixture, Proposal
 from inference.posterior.sampling.shear import Shear
 from inference.posterior.sampling.transport import TriangularMap
 from inference.posterior.sampling.verdict import Verdict
-from inference.posterior.selection.candidates import Candidate
+from inference.posterior.selection.models import Candidate
 from inference.posterior.selection.selection import Decision, Selection
-from inference.posterior.stages.state import (
+from inference.posterior.stages.stage import (
     Known,
     Selecting,
     Starting,

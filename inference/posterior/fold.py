@@ -21,12 +21,11 @@ from typing import TypeVar
 from inference.posterior.job import Job, prepare
 from inference.posterior.sampling.ensemble import Ensemble
 from inference.posterior.sampling.population import Population
-from inference.posterior.selection.candidates import Candidate
+from inference.posterior.selection.models import Candidate
 from inference.posterior.stages import selecting, tempering, walking
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.selecting import AssessTask, sampled
-from inference.posterior.stages.starting import StartTask, begin
-from inference.posterior.stages.state import (
+from inference.posterior.stages.stage import (
     Known,
     Progress,
     Selecting,
@@ -35,6 +34,7 @@ from inference.posterior.stages.state import (
     Walking,
     Weighted,
 )
+from inference.posterior.stages.starting import StartTask, begin
 from inference.posterior.stages.tempering import TemperTask
 from inference.posterior.stages.walking import WalkTask
 from inference.posterior.summary import draw, summarise

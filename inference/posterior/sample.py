@@ -9,7 +9,7 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.proposal import Mixture
 from inference.posterior.sampling.verdict import Chains
-from inference.posterior.stages.state import Drawing, Known, Tempering, Walking, Weighted
+from inference.posterior.stages.stage import Drawing, Known, Tempering, Walking, Weighted
 
 __all__ = ["Sample", "sample_of"]
 

@@ -12,7 +12,7 @@ from inference.identifiability.after_data import statuses_of_draws
 from inference.identifiability.status import Identifiability
 from inference.posterior.answer.draws import Draws, draws_of
 from inference.posterior.answer.folds import near_fold
-from inference.posterior.answer.joint_modes import joint_modes
+from inference.posterior.answer.mode_summary import mode_summary
 from inference.posterior.answer.parameter_summary import summaries_of_chains, summaries_of_weights
 from inference.posterior.answer.posterior import (
     Fit,
@@ -28,17 +28,17 @@ from inference.posterior.criticism.discrepancy_check import (
     judge_scale,
     larger_discrepancy,
 )
-from inference.posterior.criticism.law_check import judge_law, law_shift
 from inference.posterior.criticism.predictive_check import predictive_check
 from inference.posterior.criticism.prior_conflict import prior_conflicts
+from inference.posterior.criticism.prior_sensitivity import mark_sensitive, prior_sensitivity
 from inference.posterior.job import Job
 from inference.posterior.sample import Sample, sample_of
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.selection.selection import Selection, selection_summary
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.selecting import sampled
+from inference.posterior.stages.stage import Drawing, Selecting, Starting, Walking, Weighted
 from inference.posterior.stages.starting import begin
-from inference.posterior.stages.state import Drawing, Selecting, Starting, Walking, Weighted
 from inference.posterior.streams import Stream
 from simulator.scene import Scene
 
@@ -92,7 +92,7 @@ def _parameters(density: CollapsedDensity, sample: Sample) -> dict[str, Paramete
 def _judged(
     job: Job, density: CollapsedDensity, z: Array, chosen: Array, log_r: Array
 ) -> tuple[Identifiability, ...]:
-    """Judge every unknown by its draws, and by what it owes to the law of the ranges."""
+    """Judge every unknown by its draws, and by what it owes to the prior of the ranges."""
     rows = statuses_of_draws(
         job.sensor,
         density.parameters,
@@ -103,7 +103,7 @@ def _judged(
         discrepancy=job.scene.discrepancy,
         common_range=job.scene.motion == "static",
     )
-    return judge_law(density.parameters.names, rows, law_shift(density, chosen, log_r))
+    return mark_sensitive(density.parameters.names, rows, prior_sensitivity(density, chosen, log_r))
 
 
 def _unknown_yet(names: tuple[str, ...]) -> tuple[Identifiability, ...]:
@@ -207,7 +207,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
         job.seed,
         Verdict(not reasons, reasons),
         _parameters(density, sample),
-        joint_modes(density, stage, sample),
+        mode_summary(density, stage, sample),
         range_summary(draws, folds, None if sample.weighted is None else sample.weighted.ess),
         judged,
         fit,

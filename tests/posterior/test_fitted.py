@@ -9,8 +9,8 @@ from inference.posterior import fold
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.sampling.start import find_optima
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages.stage import Tempering, Walking
 from inference.posterior.stages.starting import begin
-from inference.posterior.stages.state import Tempering, Walking
 from simulator.scene import parse_scene
 from tests.posterior.scenes import OBJECT, data, sensor_of
 

@@ -14,7 +14,7 @@ from inference.posterior.sampling.importance import WeightedDraws, draw_weighted
 from inference.posterior.sampling.population import Population
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages import starting
-from inference.posterior.stages.state import Tempering, Walking, Weighted
+from inference.posterior.stages.stage import Tempering, Walking, Weighted
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene, Stroke, parse_scene

@@ -7,7 +7,7 @@ from inference.posterior.fold import merge, prepare, progress, run, start, summa
 from inference.posterior.job import Job
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages.checkpoint import Checkpoint
-from inference.posterior.stages.state import Tempering
+from inference.posterior.stages.stage import Tempering
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
 from simulator.simulate import Simulation, simulate

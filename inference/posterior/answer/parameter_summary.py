@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.posterior.answer.modes import boundaries, labels
 from inference.posterior.answer.posterior import ParameterMode, ParameterSummary
 from inference.posterior.answer.quantiles import quantiles, weighted_quantiles
+from inference.posterior.answer.separation import boundaries, labels
 from inference.posterior.answer.shares import share_error, weighted_share_error
 from inference.posterior.sampling.diagnostics import (
     effective_sample_size,

@@ -17,10 +17,10 @@ __all__ = [
     "FitCheck",
     "JointMode",
     "LeftOutTerm",
-    "Mode",
     "ParameterMode",
     "ParameterSummary",
     "Posterior",
+    "RangeMode",
     "RangeSummary",
     "Runtime",
 ]
@@ -100,7 +100,7 @@ class ParameterMode:
 
 
 @dataclasses.dataclass(frozen=True)
-class Mode:
+class RangeMode:
     """One of the separate modes of a range.
 
     Attributes
@@ -157,7 +157,7 @@ class RangeSummary:
         Of the draws; nan where they have several separate modes.
     near_fold : ndarray of bool, shape (frames,)
         Whether noise like that of the frame makes two modes out of one, or one out of two.
-    modes : tuple of tuple of Mode
+    modes : tuple of tuple of RangeMode
         By ascending range, for every frame.
     """
 
@@ -167,7 +167,7 @@ class RangeSummary:
     mean: Array
     sd: Array
     near_fold: NDArray[np.bool_]
-    modes: tuple[tuple[Mode, ...], ...]
+    modes: tuple[tuple[RangeMode, ...], ...]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.answer.draws import Draws
-from inference.posterior.answer.modes import boundaries, labels
-from inference.posterior.answer.posterior import Mode, RangeSummary
+from inference.posterior.answer.posterior import RangeMode, RangeSummary
 from inference.posterior.answer.quantiles import quantiles
+from inference.posterior.answer.separation import boundaries, labels
 from inference.posterior.answer.shares import resampled_share_error, share_error
 
 __all__ = ["range_summary"]
@@ -34,7 +34,7 @@ def range_summary(
     """
     n = draws.range_m.shape[-1]
     columns = {name: np.full(n, np.nan) for name in ("q05", "q50", "q95", "mean", "sd")}
-    modes: list[tuple[Mode, ...]] = [()] * n
+    modes: list[tuple[RangeMode, ...]] = [()] * n
     for frame in np.flatnonzero(np.isfinite(draws.range_m[0, 0, 0])):
         r = draws.range_m[..., frame]
         cuts = boundaries(np.log(r).ravel())
@@ -48,7 +48,7 @@ def range_summary(
 
 def _modes(
     r: Array, label: NDArray[np.intp], count: int, importance_ess: float | None
-) -> tuple[Mode, ...]:
+) -> tuple[RangeMode, ...]:
     result = []
     for k in range(count):
         inside = label == k
@@ -59,5 +59,5 @@ def _modes(
             error = resampled_share_error(weight, r.size, importance_ess)
         q05, q50, q95 = quantiles(r[inside], several_modes=False)
         sd = float(r[inside].std(ddof=1)) if inside.sum() > 1 else 0.0
-        result.append(Mode(q50, weight, error, sd, q05, q95))
+        result.append(RangeMode(q50, weight, error, sd, q05, q95))
     return tuple(result)

@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 
-from inference.posterior.selection.candidates import Candidate
 from inference.posterior.selection.leave_one_out import MAX_K_HAT, standard_error
+from inference.posterior.selection.models import Candidate
 
 __all__ = ["EVIDENCE_MARGIN", "PREDICTIVE_MARGIN", "Comparison", "compare"]
 

@@ -16,8 +16,9 @@ from scipy import special
 from scipy.stats import qmc
 
 from inference.density.collapsed import CollapsedDensity
+from inference.posterior.sampling.effort import effort_of, scouts
 from inference.posterior.sampling.importance import WeightedDraws, draw_weighted
-from inference.posterior.sampling.population import Population, carried, effort_of, scouts
+from inference.posterior.sampling.population import Population, carried
 from inference.posterior.sampling.proposal import Mixture, Proposal, mixture_of
 from inference.posterior.sampling.shear import shear_of
 from inference.posterior.sampling.start import Optimum, climb, find_optima, refine

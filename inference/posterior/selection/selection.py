@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inference.posterior.selection.candidates import Candidate
 from inference.posterior.selection.comparison import EVIDENCE_MARGIN, Comparison, compare
 from inference.posterior.selection.leave_one_out import standard_error
+from inference.posterior.selection.models import Candidate
 from simulator.scene import Scene
 
 __all__ = [

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.posterior.selection.selection import Selection
-from inference.posterior.stages.state import Known, Stage, Weighted
+from inference.posterior.stages.stage import Known, Stage, Weighted
 
 __all__ = ["Checkpoint"]
 

@@ -2,7 +2,7 @@
 
 from inference.posterior.job import Job
 from inference.posterior.sampling.ensemble import WALKERS
-from inference.posterior.stages.state import MOST_STEPS
+from inference.posterior.stages.stage import MOST_STEPS
 
 __all__ = ["evaluations", "steps_from"]
 

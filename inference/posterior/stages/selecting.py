@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
-from inference.posterior.selection.candidates import Candidate, assess, candidate_terms, reduced
+from inference.posterior.selection.models import Candidate, assess, candidate_terms, reduced
 from inference.posterior.selection.selection import Selection, decide
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.streams import Stream

@@ -9,15 +9,16 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.checks import check_best_fit
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
+from inference.posterior.sampling.effort import scouts
 from inference.posterior.sampling.ensemble import WALKERS
 from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
-from inference.posterior.sampling.population import carried, scouts
+from inference.posterior.sampling.population import carried
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.start import Optimum, climb, find_optima, refine
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.ensembles import POPULATIONS, new_ensembles
-from inference.posterior.stages.state import Drawing, Known, Tempering, Walking, Weighted
+from inference.posterior.stages.stage import Drawing, Known, Tempering, Walking, Weighted
 from inference.posterior.streams import Stream
 from simulator.errors import RefusedError
 

@@ -6,18 +6,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from inference.posterior.job import Job
+from inference.posterior.sampling.effort import effort_of
 from inference.posterior.sampling.ensemble import WALKERS
-from inference.posterior.sampling.population import (
-    Population,
-    effort_of,
-    first_population,
-    temper,
-)
+from inference.posterior.sampling.population import Population, first_population, temper
 from inference.posterior.sampling.shear import shear_of
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.stages.chunk import evaluations
 from inference.posterior.stages.ensembles import MAP_SHARE, new_ensembles
-from inference.posterior.stages.state import Tempering, Walking
+from inference.posterior.stages.stage import Tempering, Walking
 from inference.posterior.streams import Stream
 
 __all__ = ["TemperTask", "merge", "tasks"]

@@ -19,7 +19,7 @@ from inference.posterior.sampling.transport import fit_map
 from inference.posterior.sampling.verdict import Chains, Verdict, judge
 from inference.posterior.stages.chunk import steps_from
 from inference.posterior.stages.ensembles import MAP_SHARE, POPULATIONS
-from inference.posterior.stages.state import Tempering, Walking
+from inference.posterior.stages.stage import Tempering, Walking
 from simulator.parameters import parameters_of
 
 __all__ = ["WalkTask", "merge", "tasks"]

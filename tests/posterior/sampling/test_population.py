@@ -7,12 +7,8 @@ import numpy as np
 import pytest
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.sampling.population import (
-    Population,
-    effort_of,
-    first_population,
-    temper,
-)
+from inference.posterior.sampling.effort import effort_of
+from inference.posterior.sampling.population import Population, first_population, temper
 from tests.posterior.scenes import example
 
 

@@ -9,7 +9,7 @@ import pytest
 from inference.density.collapsed import collapsed_density
 from inference.posterior import fold
 from inference.posterior.infer import infer
-from inference.posterior.selection.candidates import Candidate, assess, candidate_terms, reduced
+from inference.posterior.selection.models import Candidate, assess, candidate_terms, reduced
 from inference.posterior.selection.selection import decide
 from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames

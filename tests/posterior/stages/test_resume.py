@@ -8,7 +8,7 @@ import pytest
 from inference.posterior import fold
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages import chunk
-from inference.posterior.stages.state import (
+from inference.posterior.stages.stage import (
     Known,
     Selecting,
     Starting,

@@ -13,7 +13,7 @@ from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.start import find_optima
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages.state import Tempering, Walking
+from inference.posterior.stages.stage import Tempering, Walking
 from inference.posterior.stages.tempering import merge
 from simulator.frames import frames_from_columns
 from simulator.scene import parse_scene

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from inference.posterior.answer.modes import boundaries, labels
+from inference.posterior.answer.separation import boundaries, labels
 
 Array = NDArray[np.float64]
 

@@ -4,12 +4,14 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.answer.posterior import JointMode
 from inference.posterior.answer.shares import share_error, weighted_share_error
 from inference.posterior.sample import Sample
-from inference.posterior.stages.state import Drawing, Known, Weighted
+from inference.posterior.stages.stage import Drawing, Known, Weighted
 
-__all__ = ["joint_modes"]
+__all__ = ["mode_summary"]
 
 
-def joint_modes(density: CollapsedDensity, stage: Drawing, sample: Sample) -> tuple[JointMode, ...]:
+def mode_summary(
+    density: CollapsedDensity, stage: Drawing, sample: Sample
+) -> tuple[JointMode, ...]:
     """Describe every optimum that was found.
 
     Parameters

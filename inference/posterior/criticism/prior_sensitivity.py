@@ -1,4 +1,4 @@
-"""What an answer owes to the law of the ranges: draws weighted to one that says nothing of them.
+"""What an answer owes to the prior of the ranges: draws weighted to one that says nothing of them.
 
 Where every range is an independent draw of `range_m`, how the ranges lie tells something of
 everything else: of crosstalk, say, that it must be such that they spread like that. An object on
@@ -18,7 +18,7 @@ from inference.identifiability.status import Identifiability
 from simulator.priors import UniformDistribution
 from simulator.scene import Reference, Stroke
 
-__all__ = ["LawShift", "judge_law", "law_shift"]
+__all__ = ["PriorSensitivity", "mark_sensitive", "prior_sensitivity"]
 
 Array = NDArray[np.float64]
 
@@ -26,11 +26,11 @@ _DRAWS = 400
 _EVALUATIONS = 60_000  # of frames, above which fewer draws do
 _LEAST_DRAWS = 100
 _MOVED = 1.0  # own standard deviations
-_LOWEST = 1e-6  # of the highest range: a law that begins at zero has next to nothing below
+_LOWEST = 1e-6  # of the highest range: a prior that begins at zero has next to nothing below
 
 
 @dataclasses.dataclass(frozen=True)
-class LawShift:
+class PriorSensitivity:
     """By how much means would move, in standard deviations of the posterior.
 
     Attributes
@@ -45,7 +45,7 @@ class LawShift:
     scale: float
 
 
-def law_shift(density: CollapsedDensity, z: Array, log_r: Array) -> LawShift | None:
+def prior_sensitivity(density: CollapsedDensity, z: Array, log_r: Array) -> PriorSensitivity | None:
     """Weight draws to the reference prior of the ranges.
 
     Parameters
@@ -59,16 +59,16 @@ def law_shift(density: CollapsedDensity, z: Array, log_r: Array) -> LawShift | N
 
     Returns
     -------
-    LawShift or None
+    PriorSensitivity or None
         None where there is nothing to compare: no unknowns, one range for all frames, a reference
-        prior, or a law that is narrow on purpose (normal, log-normal). Where the reference prior
+        prior, or a prior that is narrow on purpose (normal, log-normal). Where the reference prior
         would put the answer beyond all draws, the shifts are too small, never too large.
     """
     parameters = density.parameters
-    law = parameters.range_prior
-    if len(parameters) == 0 or isinstance(density, StaticDensity) or isinstance(law, Reference):
+    stated = parameters.range_prior
+    if len(parameters) == 0 or isinstance(density, StaticDensity) or isinstance(stated, Reference):
         return None
-    if not isinstance(law, Stroke | UniformDistribution):
+    if not isinstance(stated, Stroke | UniformDistribution):
         return None
     count = int(np.clip(_EVALUATIONS // max(len(density.frames), 1), _LEAST_DRAWS, _DRAWS))
     chosen = np.linspace(0, len(z) - 1, min(count, len(z))).astype(int)
@@ -77,7 +77,7 @@ def law_shift(density: CollapsedDensity, z: Array, log_r: Array) -> LawShift | N
         density,
         parameters=dataclasses.replace(
             parameters,
-            range_prior=Reference(low=max(law.low, _LOWEST * law.high), high=law.high),
+            range_prior=Reference(low=max(stated.low, _LOWEST * stated.high), high=stated.high),
         ),
     )
     gain = other.log_likelihood(z) - density.log_likelihood(z)
@@ -92,13 +92,13 @@ def law_shift(density: CollapsedDensity, z: Array, log_r: Array) -> LawShift | N
     moved, sd = weights @ columns - columns.mean(axis=0), columns.std(axis=0)
     shift = np.divide(moved, sd, out=np.zeros_like(moved), where=sd > 0)
     d = len(parameters)
-    return LawShift(shift[:d], float(shift[d]) if present.any() else 0.0)
+    return PriorSensitivity(shift[:d], float(shift[d]) if present.any() else 0.0)
 
 
-def judge_law(
-    names: tuple[str, ...], rows: tuple[Identifiability, ...], shift: LawShift | None
+def mark_sensitive(
+    names: tuple[str, ...], rows: tuple[Identifiability, ...], sensitivity: PriorSensitivity | None
 ) -> tuple[Identifiability, ...]:
-    """Mark as weak at best what rests on the law of the ranges.
+    """Mark as weak at best what rests on the prior of the ranges.
 
     Parameters
     ----------
@@ -106,21 +106,23 @@ def judge_law(
         The unknowns.
     rows : tuple of Identifiability
         As judged by the spread of the draws.
-    shift : LawShift or None
-        From `law_shift`.
+    sensitivity : PriorSensitivity or None
+        From `prior_sensitivity`.
 
     Returns
     -------
     tuple of Identifiability
     """
-    if shift is None:
+    if sensitivity is None:
         return rows
-    by_name = dict(zip(names, shift.parameters.tolist(), strict=True)) | {"range_m": shift.scale}
+    by_name = dict(zip(names, sensitivity.parameters.tolist(), strict=True)) | {
+        "range_m": sensitivity.scale
+    }
     judged = []
     for row in rows:
         moved = abs(by_name[row.parameter])
-        of_law = row.parameter.startswith("range_m.")
-        if row.status == "identified" and moved > _MOVED and not of_law:
+        of_prior = row.parameter.startswith("range_m.")
+        if row.status == "identified" and moved > _MOVED and not of_prior:
             reason = (
                 f"{row.reason}, but under a law that takes nothing from how the ranges are spread "
                 f"it would move by {moved:.1f} or more of its standard deviations: it holds if "
