@@ -166,6 +166,13 @@ def test_paths_in_the_pages(page: Path) -> None:
     assert [name for name in named if not (ROOT / name).exists()] == []
 
 
+def test_every_floor_is_described() -> None:
+    text = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    floors = [path.parent for path in (ROOT / "inference").glob("*/__init__.py")]
+    assert floors
+    assert [floor.name for floor in floors if f"`inference/{floor.name}/`" not in text] == []
+
+
 def test_the_grammar_finds_what_is_written() -> None:
     """Planted references are seen: a test of references that finds none would always pass."""
     found = dict(references("zeta (4.19 with its cubic), Table 3.1, App. A, 25-27, (2.6-2.10)"))
