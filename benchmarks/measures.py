@@ -24,7 +24,7 @@ _MOST_LINES = 300
 _MANY_ARGUMENTS = 10
 _TEMPLATE = 3
 _SLOPE_KERNELS = {"object_slopes", "background_slopes"}
-# optics has electronics of its own: photons and charge, not the two readings of the contract
+# optics has electronics of its own: photons and charge, not the two readings of a frame
 _NOT_READINGS = ("simulator/optics",)
 
 

@@ -4,9 +4,9 @@
 
 Baselines: `w1 / w2` in numpy for the conventional range of a pulse, `arctan2` for a sine wave; a
 loop over frames of `numpy.roots` on the technique's polynomial for a pulse; a loop over frames of
-`scipy.optimize.brentq` on every sign change on a grid for a sine wave. The grid is the errata's:
-logarithmic and linear points merged, 60 a half turn of the phase and never fewer than 120. Loops
-are timed on some hundred frames and scaled.
+`scipy.optimize.brentq` on every sign change on a grid for a sine wave. The grid
+(docs/model.md, exact): logarithmic and linear points merged, 60 a half turn of the phase and never
+fewer than 120. Loops are timed on some hundred frames and scaled.
 """
 
 import argparse

@@ -33,7 +33,7 @@ def estimate(
     frames : Frames
         The readings.
     techniques : sequence of str, optional
-        Names in the contract; left out, the plan chooses one.
+        Names in docs/techniques.md; left out, the plan chooses one.
 
     Returns
     -------

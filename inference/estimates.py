@@ -29,7 +29,7 @@ class TechniqueResult:
     Attributes
     ----------
     technique : str
-        Its name in the contract.
+        Its name in docs/techniques.md.
     status : ndarray of uint8, shape (n,)
         `Status` of each frame.
     roots_m : ndarray, shape (n, m)

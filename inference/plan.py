@@ -27,7 +27,7 @@ class Plan:
     chosen : str or None
         The cheapest technique that is immune to what the scene has; None if there is none.
     left_out : tuple of LeftOut
-        Every other technique of the contract with its reason.
+        Every other technique with its reason.
     """
 
     chosen: str | None

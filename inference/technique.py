@@ -51,7 +51,7 @@ class Technique:
     Attributes
     ----------
     name : str
-        Its name in the contract.
+        Its name in docs/techniques.md.
     kinds : tuple of str
         Sensors that it serves.
     observables : str

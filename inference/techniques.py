@@ -11,7 +11,7 @@ __all__ = ["ALL_TECHNIQUES", "ELSEWHERE"]
 
 ALL_TECHNIQUES: Mapping[str, Technique] = MappingProxyType({**TECHNIQUES, **FITS})
 
-# names of the contract that are not answered at once, and why they are left out
+# techniques that are not answered at once, and why they are left out
 ELSEWHERE: Mapping[str, str] = MappingProxyType(
     {
         "posterior": "is sampled, not solved in real time: ask for a posterior",

@@ -1,4 +1,4 @@
-"""Frames from files and to files: ``.csv``, ``.ndjson``, ``.json``, with the contract's columns."""
+"""Frames from files and to files: ``.csv``, ``.ndjson``, ``.json`` (docs/scenes.md, frames)."""
 
 import csv
 import io

@@ -1,4 +1,4 @@
-"""A stream as lines: one frame a line in, one answer a line out (contract, "Streams")."""
+"""A stream as lines: one frame a line in, one answer a line out (docs/streams.md)."""
 
 import csv
 import json

@@ -11,7 +11,8 @@ from simulator.optics.vectors import Pose
 
 __all__ = ["APPENDIX_B", "PlateScene", "plate_scene"]
 
-# k_s F of the tables; ((n - 1)/(n + 1))^2 at n = 10, and only the product is fixed (errata, 8)
+# k_s F of the tables; ((n - 1)/(n + 1))^2 at n = 10, of which only the product is fixed
+# (docs/model.md, appendix-b)
 _REFLECTANCE = (9 / 11) ** 2
 
 _SIZES = (
@@ -61,7 +62,7 @@ class PlateScene:
     def plate(self, distance_m: float) -> Rectangle:
         """Return the true rectangle whose plane cuts the sensor's axis at a distance [m].
 
-        Its centre is the foot of the perpendicular from the sensor (errata, section 8).
+        Its centre is the foot of the perpendicular from the sensor (docs/model.md, appendix-b).
         """
         s, c = math.sin(self.tilt_rad), math.cos(self.tilt_rad)
         height = distance_m * c

@@ -21,7 +21,7 @@ Column = Annotated[list[float], _BOUNDS]
 
 
 class FrameColumns(Validated):
-    """Frames as columns, the form in which clients send them (contract, "Frames")."""
+    """Frames as columns, the form in which clients send them (docs/scenes.md, frames)."""
 
     time_s: Column | None = None
     w1: Column | None = None
@@ -80,7 +80,7 @@ class Frames:
         return Frames(**parts)
 
     def to_columns(self, sensor: Sensor) -> dict[str, list[float] | list[bool]]:
-        """Return the columns of the contract, those that are present."""
+        """Return the columns by name (docs/scenes.md, frames), those that are present."""
         first, second = sensor.columns
         columns: dict[str, Any] = {} if self.time_s is None else {"time_s": self.time_s}
         columns |= {first: self.readings[:, 0], second: self.readings[:, 1]}
@@ -104,7 +104,7 @@ def frames_from_columns(
     sensor : Sensor
         Decides which columns are readings.
     columns : FrameColumns or mapping
-        Columns by their name in the contract, each of length n.
+        Columns by their name (docs/scenes.md, frames), each of length n.
 
     Returns
     -------

@@ -261,7 +261,7 @@ def parse_scene(data: object) -> Scene:
     Parameters
     ----------
     data : object
-        Decoded JSON of the contract's "Scene".
+        Decoded JSON in the form of docs/scenes.md, scene.
 
     Returns
     -------
@@ -298,7 +298,7 @@ def largest(value: Quantity | None) -> float:
 
 
 def _check_shape(c0: Quantity | None, c1: Quantity | None, where: str) -> list[Problem]:
-    """Check c0 > 0 and c1 > -2 sqrt(c0): below it the flux has poles (errata, section 0)."""
+    """Check c0 > 0 and c1 > -2 sqrt(c0): else the flux has poles (docs/model.md, conventions)."""
     problems = _check_support(c0, 0.0, math.inf, f"{where}/c0")
     if problems or c1 is None:
         return problems

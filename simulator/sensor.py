@@ -127,7 +127,7 @@ def parse_sensor(data: object) -> Sensor:
     Parameters
     ----------
     data : object
-        Decoded JSON of the contract's "Sensor".
+        Decoded JSON in the form of docs/scenes.md, sensor.
 
     Returns
     -------

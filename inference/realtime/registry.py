@@ -1,4 +1,4 @@
-"""Every real-time technique by its name in the contract."""
+"""Every real-time technique by its name."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

@@ -112,7 +112,7 @@ def encode_estimates(estimates: Estimates) -> bytes:
     Returns
     -------
     bytes
-        JSON as in the contract; null where a number is not available.
+        JSON as in docs/http.md, estimates; null where a number is not available.
     """
     left_out = [{"technique": item.name, "reason": item.reason} for item in estimates.left_out]
     parts = [f'{{"chosen": {json.dumps(estimates.chosen)}, "results": [']

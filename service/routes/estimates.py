@@ -31,7 +31,7 @@ def answer(request: EstimateRequest) -> bytes:
     Returns
     -------
     bytes
-        JSON of the contract.
+        JSON as in docs/http.md, estimates.
 
     Raises
     ------

@@ -1,7 +1,8 @@
 """Appendix B: object parameters of 108 plates, as the thesis made them and as they should be.
 
-The thesis's set-up is in errata.md, section 8: a facet grid of 100 x 100 whose outline rule is not
-the rectangle once the plate is tilted, distances logspace(-2, 0, 40) m, and rows divided by 1/Phi.
+The thesis's set-up is in docs/model.md, appendix-b: a facet grid of 100 x 100 whose outline rule is
+not the rectangle once the plate is tilted, distances logspace(-2, 0, 40) m, and rows divided by
+1/Phi.
 """
 
 import csv
@@ -73,7 +74,7 @@ def sweep(
         The plate.
     system : "pulsed" or "sine_wave"
         Pulsed: r_e is the mean of r. Sine wave: r_e = arg(sum dPhi exp(j k r))/k at 5 MHz, while
-        Phi stays the plain sum (errata, section 8).
+        Phi stays the plain sum (docs/model.md, appendix-b).
     converged : bool
         The true rectangle by convergent quadrature instead of the thesis's facets.
     distances_m : ndarray

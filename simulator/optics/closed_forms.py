@@ -1,6 +1,6 @@
 """Closed forms: shell, plane and disk on the axis under axisymmetric emitters.
 
-Tables 3.1 and 3.2 and equations 2.50, 2.57, 3.4 to 3.15, all as corrected in errata.md. The object
+Tables 3.1 and 3.2 and equations 2.50, 2.57, 3.4 to 3.15, all as in docs/model.md. The object
 is diffuse with albedo 1 (f_r = 1/pi); fluxes are per Phi0 A_D [1/m^2].
 
 With t the angle from the axis the kernel of a plane is I_e(t) cos^4(t) sin(t), so that everything
@@ -159,7 +159,7 @@ class Quartic:
         return self.strength * a * a / (r * r * (r * r - self.linear * a * r + self.area * a * a))
 
 
-# 3.9, 3.10, 3.15 with their errata, in z and in r_e
+# docs/model.md, 3.9, 3.10 and 3.15, in z and in r_e
 _QUARTICS: dict[tuple[str, str], Quartic] = {
     ("uniform", "z"): Quartic(1 / (2 * math.pi), 0.35, 2.5),
     ("uniform", "r_e"): Quartic(1 / (2 * math.pi), 0.405, 1.6),

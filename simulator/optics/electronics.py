@@ -54,7 +54,7 @@ def physical_gain(emitter: Emitter, detector: Detector, integration_s: float) ->
     emitter, detector : Emitter, Detector
         Power, area and response.
     integration_s : float
-        T_p times the number of pulses, or T_int/2 of a sine wave (errata, section 0, gain G) [s].
+        T_p times the number of pulses, or T_int/2 of a sine wave (docs/model.md, conventions) [s].
 
     Returns
     -------
@@ -85,7 +85,7 @@ def saturation(emitter: Emitter, detector: Detector, flux: float) -> float:
 
 
 def mean_pair(light: Light, sensor: Sensor, delay_s: float = 0.0) -> Pair:
-    """Return the mean readings of light: w1 late and w2 whole, or i and q (errata, section 0).
+    """Return the mean readings of light: late and whole, or i and q (docs/model.md, conventions).
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def mean_pair(light: Light, sensor: Sensor, delay_s: float = 0.0) -> Pair:
 
 
 def draw_noise(sensor: Sensor, mean: Pair, signal: Pair, rng: np.random.Generator) -> Pair:
-    """Draw the noise of one frame (contract, "Sensor").
+    """Draw the noise of one frame (docs/scenes.md, sensor).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Extended emitters as an area quadrature of points (2.17 with its erratum)."""
+"""Extended emitters as an area quadrature of points (docs/model.md, 2.17)."""
 
 import math
 

@@ -58,9 +58,9 @@ class Light:
         Effective distance of a long pulse, the flux-weighted mean of (r_i + r_o)/2 (3.2) [m]; nan
         where there is no light.
     late : float
-        int min(r/r0, 1) dPhi (2.33 with its erratum); nan without a pulse.
+        int min(r/r0, 1) dPhi (docs/model.md, 2.33); nan without a pulse.
     phasor : complex
-        int exp(j k r) dPhi (3.19 with its erratum); nan without a sine wave.
+        int exp(j k r) dPhi (docs/model.md, 3.19); nan without a sine wave.
     error : float
         Estimated relative error of the flux.
     status : str

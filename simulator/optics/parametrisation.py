@@ -2,7 +2,7 @@
 
 Phi0 A_D / Phi = x1 r^2 + x2 r^3 + x3 r^4 is linear, with c2 = 1/x1, c1 = x2/x3, c0 = x1/x3. It is
 solved by QR with scaled columns; normal equations would lose digits on data near a square law
-(errata, 5.7).
+(docs/model.md, 5.7).
 """
 
 import math
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 Weights = Literal["proportional", "additive"]
 
 # share of 1/Phi below which curvature away from the square law is told neither from the model's own
-# misfit (1.6 % on average, errata, section 8) nor from rounding
+# misfit (1.6 % on average, docs/model.md, appendix-b) nor from rounding
 _CURVED = 0.01
 # t-statistic below which a coefficient is not told from zero (about 1e-3 false alarms a fit of 40)
 _SIGNIFICANT = 3.5
@@ -172,7 +172,7 @@ def fit_object(range_m: Array, flux: Array, weights: Weights = "proportional") -
         Phi / (Phi0 A_D) [1/m^2], positive.
     weights : "proportional" or "additive"
         Noise in proportion to the flux (rows divided by b = 1/Phi, as the thesis does), or of one
-        size for every flux (rows divided by b^2; errata, 5.7).
+        size for every flux (rows divided by b^2; docs/model.md, 5.7).
 
     Returns
     -------

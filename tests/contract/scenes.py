@@ -1,4 +1,4 @@
-"""Scenes that a technique may serve, and readings of them, written straight from the contract.
+"""Scenes that a technique may serve, and readings of them, written straight from docs/model.md.
 
 The menu is what a technique finds its scenes in: each is tried in all of those that its own needs,
 immunities and obstacle allow. A technique that serves none of them needs a scene here.

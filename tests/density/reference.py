@@ -36,7 +36,7 @@ class Case:
 
 
 def mean_readings(case: Case, u: Array) -> tuple[Array, Array, Array, Array]:
-    """Mean readings of scene and object, written anew from the errata."""
+    """Mean readings of scene and object, written anew from docs/model.md."""
     r = np.exp(u)
     c0, c1, c2 = case.c
     flux = case.sensor.gain * c0 * c2 / (r**2 * ((r + c1 / 2) ** 2 + (c0 - c1**2 / 4)))

@@ -46,7 +46,7 @@ class Moments:
 
 
 def moments(case: Case, u: Any) -> Moments:
-    """What the errata say of a frame, section 0, and the contract of its noise."""
+    """What docs/model.md, conventions, says of a frame, and docs/model.md, noise, of its noise."""
     mp = mpmath.mp
     r = mp.exp(u)
     strength, c0, c1 = (mp.mpf(x) for x in case.shape)

@@ -20,7 +20,7 @@ OBJECT = ("object.c0", "object.c1", "object.c2")
 def precise_readings(
     sensor: Sensor, values: dict[str, mp.mpf], r: mp.mpf | None, gain: float = 1.0
 ) -> list[mp.mpf]:
-    """Mean readings of one frame; without an object where r is None. Errata, section 0."""
+    """Mean readings of one frame; without an object where r is None. docs/model.md, conventions."""
 
     def carrier(length: mp.mpf) -> list[mp.mpf]:
         if isinstance(sensor, PulsedSensor):

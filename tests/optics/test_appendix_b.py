@@ -60,7 +60,7 @@ def test_sine_wave_rows_have_the_printed_summary() -> None:
 
 
 def test_sine_wave_outline_differs_once_the_plate_is_tilted() -> None:
-    """Errata, section 7: W16H01R00T12 has c0 = 1.50e-2 pulsed and 9.07e-2 as a sine wave."""
+    """docs/model.md, appendix-b: W16H01R00T12 has c0 = 1.50e-2 pulsed, 9.07e-2 as a sine wave."""
     scene = [plate_scene("W16H01R00T12")]
     (pulse,), (sine,) = simulate("pulsed", scenes=scene), simulate("sine_wave", scenes=scene)
     assert f"{pulse.fit.c0:.2E}" == "1.50E-02"
@@ -68,7 +68,7 @@ def test_sine_wave_outline_differs_once_the_plate_is_tilted() -> None:
 
 
 def test_true_rectangles_against_the_untilted_rows(printed: dict[str, dict[str, str]]) -> None:
-    """Errata, section 8: c2 to 0.7 %, c0 to 3 % (7.6 % for W01H16), c0 > 1e3 left out."""
+    """docs/model.md, appendix-b: c2 to 0.7 %, c0 to 3 % (7.6 % for W01H16), c0 > 1e3 left out."""
     for row in simulate("pulsed", converged=True, scenes=APPENDIX_B[:27]):
         want = printed[row.code]
         assert row.fit.c2 == pytest.approx(float(want["c2"]), rel=0.007), row.code

@@ -81,7 +81,7 @@ def test_exact_shadow_of_a_disk(z: float, radius: float) -> None:
     assert cf.disk_shadow(z, radius) == pytest.approx(1 - share, abs=TOLERANCE)
 
 
-def test_constants_of_the_errata() -> None:
+def test_constants_of_the_model() -> None:
     assert cf.plane_distance(1.0) == pytest.approx(5 / 4)
     assert cf.plane_distance(1.0, lambertian()) == pytest.approx(6 / 5)
     assert cf.plane_distance(1.0, CosinePower(exponent=3)) == pytest.approx(8 / 7)
@@ -131,7 +131,7 @@ def test_narrow_beam_is_the_limit_of_powers() -> None:
 def test_quartic_approximations(
     emitter: str, variable: str, pattern: cf.ClosedPattern, worst: float
 ) -> None:
-    """The errata give 4.0, 5.0, 4.5 and 5.4 % at worst."""
+    """docs/model.md, 3.9, gives 4.0, 5.0, 4.5 and 5.4 % at worst."""
     errors = []
     for i in range(200):
         z = 10 ** (-2 + 4 * i / 199)

@@ -71,7 +71,7 @@ def test_standard_errors_are_the_spread(weights: Weights) -> None:
 
 
 def test_weights_of_additive_noise() -> None:
-    """Errata, 5.7: dividing by b^2 is an order of magnitude better for additive noise."""
+    """docs/model.md, 5.7: dividing by b^2 is an order of magnitude better for additive noise."""
     rng = np.random.default_rng(3)
     truth = _flux(0.1, 0.05, 0.1)
     errors: dict[str, list[float]] = {"proportional": [], "additive": []}
@@ -124,7 +124,7 @@ def test_three_points_leave_no_standard_error() -> None:
 
 
 def test_shadow_of_a_disk() -> None:
-    """Errata, after 3.30: the best fit in r_e is c0' = 1.14 a^2, c1' = -0.11 a."""
+    """docs/model.md, 3.30: the best fit in r_e is c0' = 1.14 a^2, c1' = -0.11 a."""
     z = np.logspace(-2, 2, 200)
     r = np.array([disk_distance(float(x), 1.0) for x in z])
     visible = np.array([disk_shadow(float(x), 1.0) for x in z])
@@ -145,8 +145,8 @@ def test_shadow_parameters_are_recovered() -> None:
         fit_shadow(RANGES, np.ones(40))
 
 
-def test_disk_object_parameters_of_the_errata() -> None:
-    """Errata, 3.2 (c1): a disk has c1 = -0.41 a to -0.47 a, c0 about 1.6 a^2."""
+def test_disk_object_parameters_of_the_model() -> None:
+    """docs/model.md, object: a disk has c1 = -0.41 a to -0.47 a, c0 about 1.6 a^2."""
     z = np.logspace(-2, 2, 200)
     r = np.array([disk_distance(float(x), 1.0) for x in z])
     fit = fit_object(r, np.array([disk_flux(float(x), 1.0) for x in z]))
@@ -176,7 +176,7 @@ def test_committed_misfit_table_is_what_the_code_measures() -> None:
 
 
 def test_the_misfit_is_one_to_several_percent() -> None:
-    """Errata, section 8: 1.6 % on average, 7.7 % rms of the worst scene."""
+    """docs/model.md, appendix-b: 1.6 % on average, 7.7 % rms of the worst scene."""
     every: Misfit = model_misfit()["all"]
     assert 0.01 < every.mean_absolute < 0.03
     assert every.rms > every.mean_absolute

@@ -1,4 +1,4 @@
-"""The whole posterior: held to quadrature, to the truth, to the contract's shape."""
+"""The whole posterior: held to quadrature, to the truth, to docs/http.md, posteriors."""
 
 import json
 import math

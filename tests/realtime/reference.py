@@ -1,4 +1,4 @@
-"""A slow, obvious reference: the techniques' equations as the errata print them, in mpmath.
+"""A slow, obvious reference: the techniques' equations as docs/model.md has them, in mpmath.
 
 Polynomials go through `mpmath.polyroots` at 80 digits; equations of a sine wave through a dense
 scan of their sign (and of their dips) in float64, each crossing bisected at 40 digits.
@@ -55,7 +55,7 @@ class Case:
 
     @property
     def high(self) -> float:
-        """Upper end of the technique's interval (contract)."""
+        """Upper end of the technique's interval (docs/http.md, estimates)."""
         limit = math.inf
         if self.has_background:
             limit = self.distance
@@ -155,7 +155,7 @@ def forward(case: Case) -> tuple[float, float]:
 
 
 def _polynomial(case: Case, m1: Any, m2: Any) -> list[Any]:
-    """Coefficients of a pulsed technique's equation, highest power first (errata)."""
+    """Coefficients of a pulse's equation, highest power first (docs/model.md, single-frames)."""
     c0, c1, c2, gain = (mp.mpf(x) for x in (case.c0, case.c1, case.c2, case.gain))
     strength = gain * c2 * c0
     far, b, c0s, c1s = (mp.mpf(x) for x in (case.distance, case.strength, case.c0s, case.c1s))

@@ -183,7 +183,7 @@ def test_only_a_stated_support_limits_the_roots() -> None:
 
 
 def test_a_pulse_does_not_limit_intensity() -> None:
-    """`intensity` works beyond r0; the others do not (contract)."""
+    """`intensity` works beyond r0; the others do not (docs/http.md, estimates)."""
     sensor = sensor_of("pulsed", pulse_width_s=1e-9)  # r0 = 0.15 m
     r, (c0, c1, c2) = 2.0, OBJECT.values()
     flux = c0 * c2 / (r * r * (r * r + c1 * r + c0))
@@ -221,7 +221,7 @@ def test_sd_of_single_frames_is_that_of_the_scatter(kind: str) -> None:
 
 
 def _noisy(sensor: Sensor, background: bool, r: float, rng: np.random.Generator, n: int) -> Frames:
-    """Draw frames from the noise model as the contract states it."""
+    """Draw frames from the noise model as docs/model.md, noise, states it."""
     c0, c1, c2 = OBJECT.values()
     flux = c0 * c2 / (r * r * (r * r + c1 * r + c0))
     back = 0.0177 * (r * r + 0.013 * r) / (r * r + 0.013 * r + 0.056) if background else 0.0

@@ -32,7 +32,7 @@ def test_sensors_survive_the_way_through_json(document: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("kind", SENSORS)
 @pytest.mark.parametrize("document", SCENES, ids=str)
-def test_scenes_of_the_contract(kind: str, document: dict[str, Any]) -> None:
+def test_scenes_of_the_documents(kind: str, document: dict[str, Any]) -> None:
     scene = parse_scene(document)
     check_scene(parse_sensor(SENSORS[kind]), scene)
     for written in (scene.model_dump_json(), scene.model_dump_json(exclude_none=True)):

@@ -251,7 +251,7 @@ def test_noise_is_a_covariance(
     mean: Pair,
     signal: Pair,
 ) -> None:
-    """Against the contract's sentences, and positive semidefinite whatever the means."""
+    """Against docs/model.md, noise, and positive semidefinite whatever the means."""
     parts = noise_parts(read, shot, relative, pulsed, mean, signal)
     assert min(parts[:3]) >= 0.0
     v1, v2, v12 = covariance(read, shot, relative, pulsed, mean, signal)

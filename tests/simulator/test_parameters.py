@@ -107,7 +107,7 @@ def test_terms_hold_the_known_numbers_and_the_unknown_ones() -> None:
     np.testing.assert_array_equal(terms.background, np.column_stack(columns))
 
 
-def test_default_priors_are_those_of_the_contract() -> None:
+def test_default_priors_are_those_of_the_documents() -> None:
     parameters = made({"background": {"strength": 1.0, "distance_m": 3.0}})
     z = np.random.default_rng(1).standard_normal((50, 5))
     c0, c1, c2, s0, s1 = parameters.natural(z).T

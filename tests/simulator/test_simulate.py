@@ -48,7 +48,7 @@ def test_slopes_are_derivatives() -> None:
 
 
 @pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
-def test_readings_are_those_of_the_errata(kind: str) -> None:
+def test_readings_are_those_of_the_model(kind: str) -> None:
     given = {"kind": kind, "gain": 2.0, "noise": TINY}
     if kind == "pulsed":
         sensor = parse_sensor({**given, "pulse_width_s": 1e-7})

@@ -1,4 +1,4 @@
-"""Every technique of many frames by its name in the contract."""
+"""Every technique of many frames by its name."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

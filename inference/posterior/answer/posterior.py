@@ -268,7 +268,7 @@ class Posterior:
     selection: SelectionSummary | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain JSON data in the shape of the contract; non-finite values become null."""
+        """Return plain JSON data (docs/http.md, posteriors); non-finite values become null."""
         document: dict[str, Any] = {
             "method": self.method,
             "seed": self.seed,

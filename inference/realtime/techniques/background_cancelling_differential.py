@@ -89,7 +89,7 @@ BACKGROUND_CANCELLING_DIFFERENTIAL = Technique(
     uses_background=True,
     differential=True,
     cost=400.0,
-    equations="4.83; for a sine wave errata section 5",
+    equations="4.83; of a sine wave docs/model.md, exact",
     roots="2 as a rule, 1 for a bright object, up to 3; sine wave: more at high frequencies",
     solve=_solve,
 )

@@ -110,7 +110,7 @@ BACKGROUND_INTENSITY = Technique(
     uses_background=True,
     differential=False,
     cost=160.0,
-    equations="4.76; for a sine wave errata section 5",
+    equations="4.76; of a sine wave docs/model.md, exact",
     roots="1 in (0, R) for c1' >= 0; sine wave: 1 if kR <= pi and c1' >= 0, else several",
     solve=_solve,
 )

@@ -235,7 +235,7 @@ DIFFERENTIAL = Technique(
     uses_background=False,
     differential=True,
     cost=160.0,
-    equations="4.64-4.68, exact form for a sine wave in errata section 5",
+    equations="4.64-4.68, of a sine wave docs/model.md, exact",
     roots=(
         "1 if c1 >= -1.633 sqrt(c0), else up to 3; without c0 and c1 bounds only; "
         "1 at a fixed range"

@@ -1,7 +1,7 @@
 """Light sources: radiant intensity against the angle from the aim, normalised to the power.
 
 2 pi int I_e(alpha) sin(alpha) d alpha = Phi0 over the front hemisphere (2.11); no cosine of the
-emitter is part of the kernel, it lives in I_e (errata, section 0).
+emitter is part of the kernel, it lives in I_e (docs/model.md, conventions).
 
 A pattern is a file: its model, and its kernel. `intensity` holds the registry.
 """

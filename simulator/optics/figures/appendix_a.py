@@ -69,8 +69,8 @@ def _figure_a_6(figure: Figure) -> None:
         x = x + _NOISE * (rng.standard_normal(count) + 1j * rng.standard_normal(count))
         change = x[_WINDOW:] - x[:-_WINDOW]
         middle = 0.5 * (r[_WINDOW:] + r[:-_WINDOW])
-        # A'/A = -N/r turns the derivative by atan(k r / N) back (errata, first 23); it approaches,
-        # so that the amplitude grows and the phase is not turned by pi
+        # A'/A = -N/r turns the derivative by atan(k r / N) back (docs/model.md, appendix-a-23); it
+        # approaches, so that the amplitude grows and the phase is not turned by pi
         n = np.interp(middle, grid, power)
         half = _WINDOW // 2
         return middle, x[half : half + middle.size], np.angle(change) + np.arctan(_K * middle / n)

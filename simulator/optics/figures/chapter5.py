@@ -65,7 +65,7 @@ def _iterate(w1: Array, w2: Array, q: Array) -> tuple[float, float, int]:
 
     c0, c1 = _START
     start = np.array([np.log(c0), np.log1p(c1 / (2.0 * np.sqrt(c0)))])
-    # D-TOF is unique for c1 >= -1.633 sqrt(c0) (errata, 4.68)
+    # D-TOF is unique for c1 >= -1.633 sqrt(c0) (docs/model.md, 4.68)
     fit = least_squares(
         residuals,
         start,

@@ -18,14 +18,14 @@ Array = NDArray[np.float64]
 
 
 def conventional(w1: Array, w2: Array, r0: float) -> Array:
-    """Return r0 w1 / w2 (4.60 with its erratum) [m]."""
+    """Return r0 w1 / w2 (docs/model.md, 4.60) [m]."""
     return np.asarray(r0 * w1 / w2)
 
 
 def differential(slope: Array, c0: float, c1: float) -> Array:
     """Return r with zeta(r) r = q, q = r0 dW1/dW2 (4.68) [m]; nan where there is none.
 
-    Unique for c1 >= -1.633 sqrt(c0) (errata, 4.68).
+    Unique for c1 >= -1.633 sqrt(c0) (docs/model.md, 4.68).
     """
 
     def solve(q: float) -> float:

@@ -10,11 +10,11 @@ curve                     value at u                                            
 intensity                 c0 / (u^2 Q)                                                4.1
 intensity_w1              c0 / (u Q)                                                  4.4
 differential_ratio        u (3u^2 + 2 c1 u + c0) / (4u^2 + 3 c1 u + 2 c0)             4.68
-differential_phase        k u - atan2(k u Q, 4u^2 + 3 c1 u + 2 c0), modulo pi         errata, 5
+differential_phase        k u - atan2(k u Q, 4u^2 + 3 c1 u + 2 c0), modulo pi         exact
 cancelling_ratio          (1 - u/R) c0 / (u^2 Q)                                      4.73
-cancelling_quadrature     sin(k (R - u)) c0 / (u^2 Q)                                 errata, 5
+cancelling_quadrature     sin(k (R - u)) c0 / (u^2 Q)                                 exact
 both_ratio                d(u Phi + R Phi_bg) / d(Phi + Phi_bg)                       4.83
-both_phase                arg d(Phi e^jku + Phi_bg e^jkR), modulo pi                  errata, 5
+both_phase                arg d(Phi e^jku + Phi_bg e^jkR), modulo pi                  exact
 ========================  ==========================================================  ============
 
 A file holds the curve's kernels and, as a `Curve`, what is known of its shape:
