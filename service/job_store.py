@@ -28,8 +28,6 @@ class JobRecord:
         Sampling method.
     seed : int
         Its seed.
-    max_seconds : float
-        Time limit [s] of the running time.
     key, digest : str or None, str
         Idempotency key, and a digest of the request that came with it.
     status : str
@@ -52,7 +50,6 @@ class JobRecord:
     job: bytes
     method: str
     seed: int
-    max_seconds: float
     key: str | None
     digest: str
     sequence: int = 0

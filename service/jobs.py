@@ -122,7 +122,6 @@ class Jobs(Generic[J, C, T, P]):
             job=await asyncio.to_thread(job.to_bytes),
             method=job.settings.method,
             seed=seed,
-            max_seconds=job.settings.max_seconds,
             key=key,
             digest=digest,
         )

@@ -236,7 +236,7 @@ def test_pages_are_stable() -> None:
     store = MemoryJobStore(10)
 
     def add(name: str) -> JobRecord:
-        fields: dict[str, Any] = {"job": b"", "method": "emcee", "seed": 1, "max_seconds": 1.0}
+        fields: dict[str, Any] = {"job": b"", "method": "emcee", "seed": 1}
         return store.add(JobRecord(id=name, key=None, digest="", **fields))
 
     for name in "abcde":
