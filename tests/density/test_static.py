@@ -166,7 +166,7 @@ def test_at_rest_with_unknown_crosstalk_the_answer_says_what_it_cannot_tell() ->
     sensor = sensor_of("pulsed", 100.0)
     frames = standing(sensor, 16, scene={"crosstalk": [0.002, 0.01]})
     scene = parse_scene({"crosstalk": UNKNOWN_CROSSTALK, "motion": "static"})
-    posterior = infer(sensor, scene, frames, QUICK.model_copy(update={"max_seconds": 8.0}))
+    posterior = infer(sensor, scene, frames, QUICK.model_copy(update={"max_seconds": 3.0}))
     status = {row.parameter: row.status for row in posterior.identifiability}
     assert status["range_m"] != "identified"
     assert status["object.c2"] != "identified"

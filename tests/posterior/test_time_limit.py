@@ -36,7 +36,7 @@ async def _by_jobs(request: Any, settings: SamplerSettings) -> dict[str, Any]:
     try:
         sensor, scene, frames = request
         record = await jobs.submit(sensor, scene, frames, settings)
-        assert await jobs.wait(record.id, timeout_s=600)
+        assert await jobs.wait(record.id)
         result = (await jobs.get(record.id)).result
     finally:
         await jobs.close()
