@@ -245,7 +245,7 @@ def _measured(sensor: Sensor, frames: Frames) -> Net:
     n = len(frames)
     with np.errstate(all="ignore"):
         gain = np.ones(n) if frames.gain is None else frames.gain
-        first, second = frames.derivatives[:, 0] / gain, frames.derivatives[:, 1] / gain
+        first, second = frames.derivatives.T / gain
         var1, var2 = (sd1 / gain) ** 2, (sd2 / gain) ** 2
     state = rule_out(sensor, frames)
     bad = ~(np.isfinite(first) & np.isfinite(second))

@@ -17,7 +17,7 @@ from inference.realtime.solving.bracketing import (
     start,
 )
 from inference.realtime.solving.known_background import Found, KnownBackground
-from inference.realtime.solving.polynomials import real_roots
+from inference.realtime.solving.polynomials import fill, real_roots
 from simulator.background import shadow, shadow_slope
 from simulator.compiled import compiled
 
@@ -26,7 +26,7 @@ __all__ = ["solve_balance"]
 Array = NDArray[np.float64]
 
 
-class _Frame(NamedTuple):
+class _ScaledFrame(NamedTuple):
     """A frame in units of its largest reading; w1 is already times r0, and so is its noise."""
 
     w1: float
@@ -38,11 +38,11 @@ class _Frame(NamedTuple):
 
 
 @compiled
-def _frame(net: Net, i: int, strength: float, r0: float) -> _Frame:
+def _frame(net: Net, i: int, strength: float, r0: float) -> _ScaledFrame:
     first, second = net.first[i], net.second[i]
     # so that nothing overflows
     size = max(abs(second), abs(first), strength)
-    return _Frame(
+    return _ScaledFrame(
         r0 * (first / size),
         second / size,
         strength / size,
@@ -53,19 +53,19 @@ def _frame(net: Net, i: int, strength: float, r0: float) -> _Frame:
 
 
 @compiled
-def _balance(r: float, frame: _Frame, far: KnownBackground) -> float:
+def _balance(r: float, frame: _ScaledFrame, far: KnownBackground) -> float:
     """Return (r w2 - w1) + b S(r) (R - r)."""
     return (r * frame.w2 - frame.w1) + frame.b * shadow(r, far.c0, far.c1) * (far.distance - r)
 
 
 @compiled
-def _spread(r: float, frame: _Frame) -> float:
+def _spread(r: float, frame: _ScaledFrame) -> float:
     """Return the standard deviation of r w2 - w1."""
     return math.sqrt(max(frame.v1 + r * r * frame.v2 - 2.0 * r * frame.v12, 0.0))
 
 
 @compiled
-def _between(low: float, high: float, frame: _Frame, far: KnownBackground) -> float:
+def _between(low: float, high: float, frame: _ScaledFrame, far: KnownBackground) -> float:
     """Return the root between two points of opposite sign."""
     # Newton from the conventional range, which is the root where there is no background
     w1, w2, b = frame.w1, frame.w2, frame.b
@@ -91,17 +91,19 @@ def _between(low: float, high: float, frame: _Frame, far: KnownBackground) -> fl
 
 
 @compiled
-def _turns(frame: _Frame, far: KnownBackground, slope: Array, turns: Array) -> int:
+def _turns(frame: _ScaledFrame, far: KnownBackground, slope: Array, turns: Array) -> int:
     """Fill in the cubic's slope and where it turns before the background; return how often."""
     w1, w2, b = frame.w1, frame.w2, frame.b
     a2 = (w2 - b) * far.c1 - (w1 - b * far.distance)
     a1 = w2 * far.c0 - far.c1 * (w1 - b * far.distance)
-    slope[:] = (3.0 * (w2 - b), 2.0 * a2, a1)
+    fill(slope, (3.0 * (w2 - b), 2.0 * a2, a1))
     return real_roots(slope, 0.0, far.distance, turns)
 
 
 @compiled
-def _error_bar(r: float, frame: _Frame, far: KnownBackground, band: float) -> tuple[float, bool]:
+def _error_bar(
+    r: float, frame: _ScaledFrame, far: KnownBackground, band: float
+) -> tuple[float, bool]:
     """Return a root's standard deviation and whether it is physical, to within the noise."""
     slope = frame.b * shadow_slope(r, far.c0, far.c1)
     flux = frame.w2 - frame.b * shadow(r, far.c0, far.c1)

@@ -14,11 +14,20 @@ from numpy.typing import NDArray
 from inference.realtime.net import Net
 from inference.realtime.solving.bracketing import STEPS, best, narrowed, next_point, start
 from inference.realtime.solving.known_background import KnownBackground
-from inference.realtime.solving.polynomials import real_roots
+from inference.realtime.solving.polynomials import fill, real_roots
 from simulator.background import shadow
 from simulator.compiled import compiled
 
-__all__ = ["Direction", "Frame", "Line", "frame_of", "line_of", "range_at", "theta", "turns_of"]
+__all__ = [
+    "Direction",
+    "Line",
+    "ScaledFrame",
+    "frame_of",
+    "line_of",
+    "range_at",
+    "theta",
+    "turns_of",
+]
 
 Array = NDArray[np.float64]
 
@@ -30,7 +39,7 @@ class Direction(NamedTuple):
     sine: float
 
 
-class Frame(NamedTuple):
+class ScaledFrame(NamedTuple):
     """A frame in units of its largest reading, or of the background's: x + jy, its modulus rho."""
 
     x: float
@@ -58,12 +67,12 @@ class Line(NamedTuple):
 
 
 @compiled
-def frame_of(net: Net, i: int, strength: float) -> Frame:
+def frame_of(net: Net, i: int, strength: float) -> ScaledFrame:
     """Return frame i in units of its largest reading, or of the background's strength."""
     first, second = net.first[i], net.second[i]
     largest = max(abs(first), abs(second))
     size = max(largest, strength)
-    return Frame(
+    return ScaledFrame(
         first / size,
         second / size,
         largest / size * math.hypot(first / largest, second / largest),
@@ -75,7 +84,7 @@ def frame_of(net: Net, i: int, strength: float) -> Frame:
 
 
 @compiled
-def line_of(frame: Frame, offset: float, far: Direction) -> Line:
+def line_of(frame: ScaledFrame, offset: float, far: Direction) -> Line:
     """Return the geometry of a frame."""
     x, y, rho = frame.x, frame.y, frame.rho
     psi = (math.atan2(y, x) - offset) % (2.0 * math.pi)
@@ -104,13 +113,14 @@ def turns_of(line: Line, back: KnownBackground, k: float, quartic: Array, turns:
     least = mu * c0 - 0.25 * c1 * c1 * math.sqrt(whole)
     if not twist < 0.0 and least > 0.0 and k * least * least > -twist * c0 * min(c1, 0.0):
         return 0
-    quartic[:] = (
+    coefficients = (
         k * whole,
         2.0 * k * whole * c1,
         k * (whole * c1 * c1 + 2.0 * real * c0),
         2.0 * c0 * (k * real * c1 + twist),
         c0 * (k * mu * mu * c0 + twist * c1),
     )
+    fill(quartic, coefficients)
     return real_roots(quartic, 0.0, back.distance, turns)
 
 

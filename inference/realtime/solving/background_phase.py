@@ -12,7 +12,7 @@ import numpy as np
 from inference.realtime.net import Net
 from inference.realtime.solving.background_line import (
     Direction,
-    Frame,
+    ScaledFrame,
     frame_of,
     line_of,
     range_at,
@@ -44,14 +44,14 @@ class Phase(NamedTuple):
 
 
 @compiled
-def _length(r: float, frame: Frame, far: Direction, back: KnownBackground) -> float:
+def _length(r: float, frame: ScaledFrame, far: Direction, back: KnownBackground) -> float:
     """Return abs(x - B S(r) e^jkR), which turns an angle into a reading."""
     hidden = frame.b * shadow(r, back.c0, back.c1)
     return math.hypot(frame.x - hidden * far.cosine, frame.y - hidden * far.sine)
 
 
 @compiled
-def _spread(along: Direction, frame: Frame) -> float:
+def _spread(along: Direction, frame: ScaledFrame) -> float:
     """Return the standard deviation of a reading across a direction."""
     cs, sn = along.cosine, along.sine
     variance = sn * sn * frame.v1 + cs * cs * frame.v2 - 2.0 * sn * cs * frame.v12
@@ -60,7 +60,7 @@ def _spread(along: Direction, frame: Frame) -> float:
 
 @compiled
 def _own_direction(
-    r: float, hidden: float, turn: float, frame: Frame, far: Direction, phase: Phase
+    r: float, hidden: float, turn: float, frame: ScaledFrame, far: Direction, phase: Phase
 ) -> Direction:
     """Return the direction of the object's own readings at a root."""
     cs, sn = frame.x - hidden * far.cosine, frame.y - hidden * far.sine
@@ -82,7 +82,13 @@ class _Reach(NamedTuple):
 
 @compiled
 def _reach(
-    hidden: float, slope: float, frame: Frame, far: Direction, own: Direction, k: float, band: float
+    hidden: float,
+    slope: float,
+    frame: ScaledFrame,
+    far: Direction,
+    own: Direction,
+    k: float,
+    band: float,
 ) -> _Reach:
     """Return what errors of the readings do at a root; ``slope`` is that of ``hidden``."""
     cs, sn = own.cosine, own.sine

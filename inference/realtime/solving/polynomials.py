@@ -9,9 +9,16 @@ from inference.realtime.solving.bracketing import STEPS, best, narrowed, next_po
 from inference.realtime.solving.exact import difference_of_products
 from simulator.compiled import compiled
 
-__all__ = ["horner", "real_roots"]
+__all__ = ["fill", "horner", "real_roots"]
 
 Array = NDArray[np.float64]
+
+
+@compiled
+def fill(coefficients: Array, values: tuple[float, ...]) -> None:
+    """Write a tuple into an array: a slice would compile numpy's errors, for seconds."""
+    for i in range(len(values)):
+        coefficients[i] = values[i]
 
 
 @compiled

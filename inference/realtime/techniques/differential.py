@@ -82,7 +82,7 @@ def target_of(task: Task, rate: Net) -> Targets:
         # scaled by a power of two, so that nothing overflows or rounds
         size = np.maximum(np.abs(rate.first), np.abs(rate.second))
         still = size == 0
-        exponent = np.frexp(np.where(np.isfinite(size), size, 1.0))[1]
+        _, exponent = np.frexp(np.where(np.isfinite(size), size, 1.0))
         d1, d2 = np.ldexp(rate.first, -exponent), np.ldexp(rate.second, -exponent)
         usable = (rate.state == 0) & ~still
         if isinstance(sensor, PulsedSensor):
@@ -130,7 +130,8 @@ def _solve(task: Task) -> TechniqueResult:
                 task, differential_phase.CURVE, high, targets.top, targets.sd
             )
     else:
-        candidates = _no_candidates(targets.top.size)
+        nothing = np.full((targets.top.size, 1), np.nan)
+        candidates = _without_folds(nothing, nothing)
         bounds = _bounds(task, targets, high)
     if task.physical and not pulsed:
         candidates.roots[targets.contact] = np.nan
@@ -156,30 +157,29 @@ def _fixed_distance(task: Task, targets: Targets, high: float) -> Candidates:
             roots = (targets.top[:, None] + math.pi * np.arange(turns)) / k
             sd = targets.sd / k
         roots = np.where((roots > 0) & (roots <= high), roots, np.nan)
-    never = np.zeros(roots.shape, dtype=np.bool_)
-    return Candidates(roots, np.broadcast_to(sd[:, None], roots.shape), never, never[:, 0])
+    return _without_folds(roots, np.broadcast_to(sd[:, None], roots.shape))
 
 
-def _no_candidates(n: int) -> Candidates:
-    nothing, never = np.full((n, 1), np.nan), np.zeros((n, 1), dtype=np.bool_)
-    return Candidates(nothing, nothing, never, never[:, 0])
+def _without_folds(roots: Array, sd: Array) -> Candidates:
+    n, m = roots.shape
+    return Candidates(roots, sd, np.zeros((n, m), np.bool_), np.zeros(n, np.bool_))
 
 
-def _bounds(task: Task, targets: Targets, high: float) -> Array:
-    """Bounds of the range for a power law between -2 and -4 (zeta in [1/2, 3/4])."""
+def _bounds(task: Task, targets: Targets, high: float) -> tuple[Array, Array]:
+    """Bounds of the range for a power law between -2 and -4 (zeta in [1/2, 3/4]), each (n,)."""
     with np.errstate(all="ignore"):
         if isinstance(task.sensor, PulsedSensor):
             q = targets.top / targets.bottom
-            bounds = np.column_stack([q / 0.75, q / 0.5])
+            near, far = q / 0.75, q / 0.5
         else:
             # exactly: psi = k r - atan(k r / N) with N between 2 and 4
-            turns = [_turn_of(targets.top, power) for power in (4.0, 2.0)]
-            bounds = np.column_stack(turns) / task.sensor.wave_number
-        bounds[:, 1] = np.minimum(bounds[:, 1], high)
-        good = (bounds[:, 0] > 0) & (bounds[:, 0] <= bounds[:, 1])
+            k = task.sensor.wave_number
+            near, far = _turn_of(targets.top, 4.0) / k, _turn_of(targets.top, 2.0) / k
+        far = np.minimum(far, high)
+        good = (near > 0) & (near <= far)
         if task.physical:
             good &= ~targets.contact
-    return np.where(good[:, None], bounds, np.nan)
+    return np.where(good, near, np.nan), np.where(good, far, np.nan)
 
 
 def _turn_of(psi: Array, power: float) -> Array:
@@ -196,12 +196,12 @@ def _turn_of(psi: Array, power: float) -> Array:
 
 
 def _bounded(
-    result: TechniqueResult, bounds: Array, support: tuple[float, float]
+    result: TechniqueResult, bounds: tuple[Array, Array], support: tuple[float, float]
 ) -> TechniqueResult:
     """Answer with bounds: ambiguous where there are any, of the ranges that the scene allows."""
+    (near, far), (nearest, farthest) = bounds, support
     with np.errstate(invalid="ignore"):
-        low = np.maximum(bounds[:, 0], support[0])
-        high = np.minimum(bounds[:, 1], support[1])
+        low, high = np.maximum(near, nearest), np.minimum(far, farthest)
         inside = (low <= high) & ((result.reason == 0) | (result.reason >= OWN))
         inside &= result.status == Status.NONE
     cut = np.where(inside[:, None], np.column_stack([low, high]), np.nan)
