@@ -10,6 +10,9 @@ from inference.frame.sensitivity import Value
 
 __all__ = ["CROSSTALK", "SLOTS", "Bounds", "Fit", "Layout", "Place"]
 
+# kernels freeze what stands here into machine code, so that this file is hashed with them, as every
+# file is that holds the line `from simulator.compiled import compiled`
+
 Array = NDArray[np.float64]
 
 SLOTS = int(Value.LOG_RANGE)

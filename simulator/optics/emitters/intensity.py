@@ -14,7 +14,7 @@ from simulator.optics.emitters.linear import LINEAR, Linear, linear_intensity
 from simulator.optics.emitters.narrow import Narrow
 from simulator.optics.emitters.raised_cosine import RAISED, RaisedCosine, raised_cosine_intensity
 from simulator.optics.emitters.table import TABLE, Table, table_intensity
-from simulator.optics.emitters.uniform import UNIFORM, Uniform
+from simulator.optics.emitters.uniform import UNIFORM, Uniform, uniform_intensity
 from simulator.optics.vectors import Vector
 
 __all__ = ["PATTERNS", "Pattern", "intensity", "radiant_intensity"]
@@ -48,7 +48,7 @@ def intensity(pattern: Array, at: int, table: Array, cosine: float, sine: float)
         return 0.0
     code, parameter, norm = float(pattern[at]), float(pattern[at + 1]), float(pattern[at + 2])
     if code == UNIFORM:
-        return norm
+        return uniform_intensity(norm)
     if code == COSINE:
         return cosine_intensity(norm, parameter, cosine)
     if code == LINEAR:

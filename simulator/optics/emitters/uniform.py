@@ -6,13 +6,20 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from simulator.compiled import compiled
 from simulator.optics.emitters.form import PatternForm, packed
 
-__all__ = ["UNIFORM", "Uniform"]
+__all__ = ["UNIFORM", "Uniform", "uniform_intensity"]
 
 Array = NDArray[np.float64]
 
 UNIFORM = 0.0
+
+
+@compiled
+def uniform_intensity(norm: float) -> float:
+    """Return 1 / (2 pi)."""
+    return norm
 
 
 class Uniform(PatternForm):
