@@ -118,7 +118,9 @@ def frames_from_columns(
         finite, empty, or (gain) not positive.
     """
     if isinstance(columns, FrameColumns):
-        columns = {name: getattr(columns, name) for name in columns.model_fields_set}
+        # in the order of the fields, which a set has not: an answer has its problems in one order
+        named = [name for name in FrameColumns.model_fields if name in columns.model_fields_set]
+        columns = {name: getattr(columns, name) for name in named}
     given = {name: column for name, column in columns.items() if column is not None}
     first, second = sensor.columns
     slopes = (f"d{first}_dt", f"d{second}_dt")

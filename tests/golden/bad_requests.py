@@ -285,7 +285,7 @@ async def answers() -> dict[str, Any]:
             found[name] = {
                 "status": response.status_code,
                 "type": body["type"],
-                "pointers": sorted(error["pointer"] for error in body["errors"]),
+                "pointers": [error["pointer"] for error in body["errors"]],
             }
     return found
 
