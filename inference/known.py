@@ -1,4 +1,4 @@
-"""What a scene states as known numbers, which is all that real-time techniques can use."""
+"""What a scene states as known numbers, which is all that techniques of single frames can use."""
 
 import dataclasses
 import math

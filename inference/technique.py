@@ -1,4 +1,4 @@
-"""The template of a real-time technique."""
+"""The template of a technique, of single frames and of many alike."""
 
 import dataclasses
 from collections.abc import Callable
