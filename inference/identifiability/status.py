@@ -143,8 +143,10 @@ def spread_of_fit(
     value = values[name]
     if not (math.isfinite(value) and 0.0 < sd < math.inf) or (positive and not value > 0.0):
         return 1.0
-    medians = parameters.natural(np.zeros((1, len(parameters))))[0].tolist()
-    others = {**parameters.known, **dict(zip(parameters.names, medians, strict=True)), **values}
+    others = {**parameters.known, **values}
+    if not set(parameters.names) <= others.keys():
+        medians = parameters.natural(np.zeros((1, len(parameters))))[0].tolist()
+        others = dict(zip(parameters.names, medians, strict=True)) | others
     held = {path: np.full(_NODES.size, other) for path, other in others.items()}
     with np.errstate(all="ignore"):
         x = unknown.from_normal(_NODES, held)

@@ -23,6 +23,7 @@ from simulator.compiled import compiled
 __all__ = ["fill_projected", "rows_of", "whitened_slopes"]
 
 Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
 
 # columns of frames, and of slopes: the readings, then the object's part of them
 _FIRST, _SECOND, _GAIN = 0, 1, 2
@@ -94,11 +95,23 @@ def _whiten(rows: Array, slopes: Array, frame: Pair, instrument: Instrument) -> 
 
 
 @compiled
-def _fill_frame(rows: Array, slopes: Array, i: int, u: float, values: Array, fit: Fit) -> None:
-    """Fill the slopes and the whitened rows of frame i at log range u."""
-    frame, instrument = fit.data.frames[i], fit.instrument
-    fill_slopes(slopes, u, values, fit.gain, frame[_GAIN], fit.background, instrument)
-    _whiten(rows, slopes, (frame[_FIRST], frame[_SECOND]), instrument)
+def _fill_frame(
+    rows: Array,
+    slopes: Array,
+    frame: Triple,
+    u: float,
+    values: Array,
+    gain: float,
+    background: bool | None,
+    instrument: Instrument,
+) -> None:
+    """Fill the slopes and the whitened rows of a frame at log range u.
+
+    It takes members of `Fit` alone: numba counts references to the arrays of all others.
+    """
+    first, second, factor = frame
+    fill_slopes(slopes, u, values, gain, factor, background, instrument)
+    _whiten(rows, slopes, (first, second), instrument)
 
 
 @compiled
@@ -112,11 +125,10 @@ def _along_coordinates(out: Array, rows: Array, a: int, chained: Array) -> None:
 
 
 @compiled
-def _gives_way(u: float, values: Array, fit: Fit) -> bool:
-    """Tell whether a range lies within its support, not at an end of it."""
-    near, far = fit.support
-    near = nearest_range(values, near, fit.background)
-    return math.log(near) + _EDGE < u < math.log(far) - _EDGE
+def _inside(values: Array, fit: Fit) -> Pair:
+    """Return the log ranges between which a range can give way."""
+    near = nearest_range(values, fit.support[0], fit.background)
+    return math.log(near) + _EDGE, math.log(fit.support[1]) - _EDGE
 
 
 @compiled
@@ -138,19 +150,22 @@ def fill_projected(matrix: Array, place: Place, bounds: Bounds, fit: Fit) -> Non
     bounds_of(bounds, values, fit.layout)
     chained = np.empty((SLOTS, d))
     chain(chained, values, place.x, fit.layout, bounds)
-    n = fit.data.frames.shape[0]
+    frames, gain, background, instrument = fit.data.frames, fit.gain, fit.background, fit.instrument
+    low, high = _inside(values, fit)
+    n = frames.shape[0]
     m = matrix.shape[0] // n
     slopes, rows = np.empty((SLOPES, 4)), np.zeros((_ALL, SLOPES))
     for i in range(n):
         u = place.best[0, i, POSITION]
-        _fill_frame(rows, slopes, i, u, values, fit)
+        frame = (frames[i, _FIRST], frames[i, _SECOND], frames[i, _GAIN])
+        _fill_frame(rows, slopes, frame, u, values, gain, background, instrument)
         first = i * m
         length = 0.0
         for a in range(m):
             _along_coordinates(matrix[first + a], rows, a, chained)
             matrix[first + a, d] = rows[a, Value.READINGS]
             length += rows[a, Value.LOG_RANGE] ** 2
-        if not (math.isfinite(u) and length > 0.0 and _gives_way(u, values, fit)):
+        if not (math.isfinite(u) and length > 0.0 and low < u < high):
             continue
         for j in range(d + 1):
             along = 0.0
@@ -190,14 +205,16 @@ def whitened_slopes(
     fit : Fit
         The fit.
     """
+    frames, gain, background, instrument = fit.data.frames, fit.gain, fit.background, fit.instrument
+    low, high = _inside(values, fit)
     slopes, rows = np.empty((SLOPES, 4)), np.zeros((_ALL, SLOPES))
     for i in range(positions.size):
         u = positions[i]
-        _fill_frame(rows, slopes, i, u, values, fit)
+        frame = (frames[i, _FIRST], frames[i, _SECOND], frames[i, _GAIN])
+        _fill_frame(rows, slopes, frame, u, values, gain, background, instrument)
         for a in range(_READINGS):
             _along_coordinates(jacobian[i, a], rows, a, chained)
             residual[i, a] = rows[a, Value.READINGS]
             along_range[i, a] = math.nan
             if math.isfinite(u):
-                inside = _gives_way(u, values, fit)
-                along_range[i, a] = rows[a, Value.LOG_RANGE] if inside else 0.0
+                along_range[i, a] = rows[a, Value.LOG_RANGE] if low < u < high else 0.0
