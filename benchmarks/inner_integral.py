@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.frame.arguments import prior_of
 from inference.posterior.sampling.start import find_optima
 from simulator.sensor import PulsedSensor
 from tests.density.reference import Case, random_case, reference
@@ -55,25 +56,27 @@ def accuracy(count: int, seed: int, worst: int) -> None:
 def fixed_grid(density: CollapsedDensity, z: Array) -> Array:
     """Log likelihoods on a fixed grid in log r: what a plain numpy program would do."""
     terms = density.parameters.terms(z)
-    low, high = (np.log(terms.ranges[0, k]) for k in (6, 7))
+    prior = prior_of(terms.ranges[0])
+    low, high = math.log(prior.low), math.log(prior.high)
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     u = low + 0.5 * (high - low) * (1 + nodes)
     r = np.exp(u)
     c0, c1, c2 = (column[:, None] for column in terms.object.T)
-    flux = density.gain * c0 * c2 / (r**2 * (r**2 + c1 * r + c0))
-    if density.wave is None:
-        means = np.stack([flux * r / density.r0, flux])
+    r0, wave, read, _, _ = density.instrument
+    flux = density.sensor.gain * c0 * c2 / (r**2 * (r**2 + c1 * r + c0))
+    if wave is None:
+        means = np.stack([flux * r / r0, flux])
     else:
-        phase = density.wave[0] * r + density.wave[1]
+        phase = wave[0] * r + wave[1]
         means = np.stack([flux * np.cos(phase), flux * np.sin(phase)])
     if terms.crosstalk is not None:
         means = means + terms.crosstalk.T[:, :, None]
     square = np.zeros((len(z), density.frames.shape[0], NODES))
     for k in range(2):
-        square += ((density.frames[:, k, None] - means[k][:, None, :]) / density.read[k]) ** 2
+        square += ((density.frames[:, k, None] - means[k][:, None, :]) / read[k]) ** 2
     lowest = square.min(axis=2)
     mass = np.exp(-0.5 * (square - lowest[:, :, None])) @ (0.5 * weights)
-    constant = math.log(2 * math.pi * density.read[0] * density.read[1])
+    constant = math.log(2 * math.pi * read[0] * read[1])
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(mass) - 0.5 * lowest - constant)
 

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from benchmarks.samplers.outcome import Outcome, enough, equal, judged
 from benchmarks.samplers.scenes import FRAMES
 from inference.density.collapsed import CollapsedDensity
-from inference.density.integrand import log_integrand
 from inference.density.profile import best_ranges
-from inference.density.rows import background_of, crosstalk_of, law_of
+from inference.frame.arguments import scene_of
+from inference.frame.blocks import block_of
+from inference.frame.log_density import log_density
 from inference.posterior.job import Job
 from inference.posterior.sampling.proposal import mixture_of
 from inference.posterior.sampling.start import Optimum
@@ -22,22 +23,17 @@ Array = NDArray[np.float64]
 
 
 @numba.njit
-def _joint(out, u, shapes, crosstalks, backgrounds, laws, frames, r0, wave, read, shot, relative):  # type: ignore[no-untyped-def]
+def _joint(out, u, rows, data, instrument):  # type: ignore[no-untyped-def]
     for i in range(u.shape[0]):
-        shape = (shapes[i, 0], shapes[i, 1], shapes[i, 2])
-        crosstalk = crosstalk_of(crosstalks, i)
-        background = background_of(backgrounds, i)
-        law = law_of(laws, i)
-        low, high = math.log(max(law[6], 1e-300)), math.log(law[7])
+        scene = scene_of(rows, instrument, i)
+        prior = scene.range_prior
+        low, high = math.log(max(prior.low, 1e-300)), math.log(prior.high)
         total = 0.0
         for j in range(u.shape[1]):
             if not low <= u[i, j] <= high:
                 total = -math.inf
                 break
-            frame = (frames[j, 0], frames[j, 1], frames[j, 2])
-            total += log_integrand(
-                u[i, j], frame, shape, crosstalk, background, law, r0, wave, read, shot, relative
-            )
+            total += log_density(u[i, j], block_of(data, j), scene)
         out[i] = total
 
 
@@ -51,12 +47,9 @@ def _joint_density(density: CollapsedDensity, x: Array) -> Array:
     good &= c1 > -2 * np.sqrt(np.where(good, c0, 1.0))
     if not good.any():
         return np.full(len(x), -np.inf)
-    shapes, crosstalk, background, laws, frames, _, *sensor = density.arguments(
-        density.parameters.terms(z[good])
-    )
+    rows = density.rows(density.parameters.terms(z[good]))
     out = np.empty(int(good.sum()))
-    sensor = sensor[:5]  # r0, wave, read, shot, relative
-    _joint(out, np.ascontiguousarray(u[good]), shapes, crosstalk, background, laws, frames, *sensor)
+    _joint(out, np.ascontiguousarray(u[good]), rows, density.data, density.instrument)
     result = np.full(len(x), -np.inf)
     result[good] = value[good] + np.where(np.isnan(out), -np.inf, out)
     return result

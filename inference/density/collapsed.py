@@ -1,92 +1,75 @@
 """The collapsed posterior density: the ranges of all frames integrated out of it."""
 
 import dataclasses
+import functools
 import math
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.density.curve_table import integration_bounds, tabulate
-from inference.density.frame_integral import frame_log_likelihood
-from inference.density.gaussian import Pair, gaussian, log_top
-from inference.density.integrand import Quad, Triple
-from inference.density.range_modes import find_modes
-from inference.density.rows import background_of, crosstalk_of, law_of, row_of
-from inference.frame.arguments import Instrument, instrument_of
+from inference.density.best_ranges import fill_best_ranges
+from inference.density.range_draw import fill_range_draws
+from inference.density.range_integral import integrate_range
+from inference.frame.arguments import (
+    Instrument,
+    ReferencePrior,
+    Rows,
+    instrument_of,
+    row_of,
+    scene_of,
+)
+from inference.frame.blocks import GAIN, Data, block_of, is_empty, own_blocks
+from inference.frame.log_density import empty_log_likelihood
+from inference.frame.modes import find_modes, room_for_modes
+from inference.frame.range_prior import integration_bounds
+from inference.frame.table import tabulate
 from simulator.compiled import compiled
 from simulator.frames import Frames
 from simulator.parameters import Parameters, Terms, parameters_of
-from simulator.readings import background_readings
 from simulator.scene import Reference, Scene
 from simulator.sensor import Sensor
 
-__all__ = ["CollapsedDensity", "collapsed_density"]
+__all__ = ["CollapsedDensity", "FluxBasis", "collapsed_density"]
 
 Array = NDArray[np.float64]
 
 
 @compiled
-def empty_frame_log_likelihood(
-    frame: Triple,
-    crosstalk: Pair | None,
-    background: Quad | None,
-    r0: float,
-    wave: Pair | None,
-    read: Pair,
-    shot: float | None,
-) -> float:
-    """Return the log density of a frame of which it is known that no object is in it."""
-    m1, m2 = 0.0, 0.0
-    if background is not None:
-        b1, b2 = background_readings(math.inf, r0, wave, background)
-        m1, m2 = frame[2] * b1, frame[2] * b2
-    if crosstalk is not None:
-        m1, m2 = m1 + crosstalk[0], m2 + crosstalk[1]
-    residual = (frame[0] - m1, frame[1] - m2)
-    density = gaussian(residual, (m1, m2), (0.0, 0.0), read, shot, None, wave is None)
-    return density + log_top(read)
-
-
-@compiled
-def _log_likelihoods(
-    out: Array,
-    shapes: Array,
-    crosstalks: Array | None,
-    backgrounds: Array | None,
-    laws: Array | tuple[Array],
-    frames: Array,
-    present: NDArray[np.bool_] | None,
-    r0: float,
-    wave: Pair | None,
-    read: Pair,
-    shot: float | None,
-    relative: float | None,
-) -> None:
-    """Fill out[i, j] with the log likelihood of frame j under parameter vector i."""
-    strongest = frames[:, 2].max()
-    for i in range(shapes.shape[0]):
-        shape = (shapes[i, 0], shapes[i, 1], shapes[i, 2])
-        crosstalk = crosstalk_of(crosstalks, i)
-        background = background_of(backgrounds, i)
-        law = law_of(laws, i)
-        bounds = integration_bounds(law)
-        if not bounds[1] > bounds[0] or not math.isfinite(law[0]):
+def _log_likelihoods(out: Array, rows: Rows, data: Data, instrument: Instrument) -> None:
+    """Fill out[i, b] with the log likelihood of block b under parameter vector i."""
+    for i in range(out.shape[0]):
+        scene = scene_of(rows, instrument, i)
+        bounds = integration_bounds(scene.range_prior)
+        if not bounds[1] > bounds[0]:
             out[i, :] = -math.inf
             continue
-        table = tabulate(bounds, shape, crosstalk, background, law, r0, wave, read, shot, strongest)
+        table = tabulate(bounds, scene, data.strongest)
         values = np.empty(table.shape[1])
-        modes = np.empty((values.size // 2 + 1, 6))
-        scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative, None)
-        for j in range(frames.shape[0]):
-            frame = (frames[j, 0], frames[j, 1], frames[j, 2])
-            if present is not None and not present[j]:
-                out[i, j] = empty_frame_log_likelihood(
-                    frame, crosstalk, background, r0, wave, read, shot
-                )
+        modes = room_for_modes(table)
+        for b in range(out.shape[1]):
+            block = block_of(data, b)
+            if is_empty(data, b):
+                out[i, b] = empty_log_likelihood(block, scene)
                 continue
-            count = find_modes(modes, values, table, frame, scene)
-            out[i, j] = frame_log_likelihood(modes, count, frame, scene)
+            count = find_modes(modes, values, table, block, scene)
+            out[i, b] = integrate_range(modes, count, block, scene)
+
+
+class FluxBasis(NamedTuple):
+    """The error of the object's log flux at the frames' ranges: functions times coefficients.
+
+    Attributes
+    ----------
+    coefficients : ndarray, shape (functions,)
+        At the joint maximum over them and all ranges; their priors are standard normal.
+    values, slopes : ndarray, shape (frames, functions)
+        Of the functions, along log r; zero for a frame without object.
+    """
+
+    coefficients: Array
+    values: Array
+    slopes: Array
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -110,80 +93,78 @@ class CollapsedDensity:
     present: NDArray[np.bool_] | None
     sensor: Sensor
 
-    @property
+    @functools.cached_property
     def instrument(self) -> Instrument:
         """The sensor as the kernels take it."""
         return instrument_of(self.sensor)
 
-    @property
-    def gain(self) -> float:
-        """The sensor's gain."""
-        return self.sensor.gain
+    @functools.cached_property
+    def data(self) -> Data:
+        """The frames as the kernels take them."""
+        return self.blocks_of(self.frames)
 
-    @property
-    def r0(self) -> float:
-        """As `Instrument.r0`."""
-        return self.instrument.r0
+    def blocks_of(self, frames: Array) -> Data:
+        """Return frames, shape (n, 3), as blocks that have a range of their own."""
+        return own_blocks(frames, self.present)
 
-    @property
-    def wave(self) -> Pair | None:
-        """As `Instrument.wave`."""
-        return self.instrument.wave
+    def rows(self, terms: Terms) -> Rows:
+        """Return parameter vectors for maxima over ranges, and for linearisations.
 
-    @property
-    def read(self) -> Pair:
-        """As `Instrument.read`."""
-        return self.instrument.read
-
-    @property
-    def shot(self) -> float | None:
-        """As `Instrument.shot`."""
-        return self.instrument.shot
-
-    def arguments(self, terms: Terms) -> tuple[Any, ...]:
-        """Return the kernels' arguments for given terms: scene first, then frames and sensor."""
+        A reference prior is a density for integrals; here it is flat in log r.
+        """
         c0, c1, c2 = terms.object.T
         with np.errstate(over="ignore", invalid="ignore"):
-            shapes = np.column_stack([self.gain * c0 * c2, c0, c1])
-        return (
-            shapes,
-            terms.crosstalk,
-            terms.background,
-            terms.ranges,
-            self.frames,
-            self.present,
-            *self.instrument,
-        )
+            shapes = np.column_stack([self.sensor.gain * c0 * c2, c0, c1])
+        return Rows(shapes, terms.crosstalk, terms.background, terms.ranges)
 
-    def integrals(self, terms: Terms) -> tuple[Any, ...]:
-        """Return the arguments of kernels that integrate ranges out, or draw them.
-
-        A reference prior is a density for integrals; maxima over ranges and linearisations take
-        `arguments`, whose law is then flat in log r.
-        """
-        arguments = self.arguments(terms)
+    def integral_rows(self, terms: Terms) -> Rows:
+        """Return parameter vectors for kernels that integrate ranges out, or draw them."""
+        rows = self.rows(terms)
         if isinstance(self.parameters.range_prior, Reference):
-            return (*arguments[:3], (terms.ranges,), *arguments[4:])
-        return arguments
+            return rows._replace(reference=ReferencePrior(True))
+        return rows
+
+    def _of_rows(self, rows: Rows, data: Data) -> Array:
+        """Return log p(block of frames | vector), shape (n, blocks)."""
+        out = np.empty((len(rows.shapes), data.blocks))
+        _log_likelihoods(out, rows, data, self.instrument)
+        return out
+
+    def shared(self, values: Array) -> Array:
+        """Return log densities of blocks, shape (n, blocks), as shares of frames, (n, frames)."""
+        return values
+
+    def of_frames(self, found: Array) -> Array:
+        """Return best ranges of blocks, shape (n, blocks, 3), as those of frames."""
+        return found
+
+    def common(self, values: Array) -> Array:
+        """Return for every frame what its block has, shape (n, frames)."""
+        return values
+
+    @property
+    def holds(self) -> NDArray[np.bool_]:
+        """Which frames may hold the object, shape (frames,)."""
+        return np.ones(len(self.frames), dtype=bool) if self.present is None else self.present
+
+    @property
+    def range_of_frame(self) -> NDArray[np.intp]:
+        """Which of the ranges each frame has, shape (frames,)."""
+        return np.arange(len(self.frames))
 
     def paired_log_likelihood(self, z: Array, readings: Array) -> Array:
         """Return log p(readings_i | z_i) for readings of shape (n, frames, 2), shape (n,)."""
-        arguments = self.integrals(self.parameters.terms(z))
-        scene, sensor = arguments[:4], arguments[5:]
-        out = np.empty((len(z), self.frames.shape[0]))
-        frames = self.frames.copy()
+        rows = self.integral_rows(self.parameters.terms(z))
+        out = np.empty(len(z))
         for i in range(len(z)):
-            frames[:, :2] = readings[i]
-            row = [row_of(part, i) for part in scene]
-            everything: list[Any] = [*row, frames, *sensor]
-            _log_likelihoods(out[i : i + 1], *everything)
-        return np.asarray(out.sum(axis=1))
+            frames = self.frames.copy()
+            frames[:, :GAIN] = readings[i]
+            out[i] = self._of_rows(row_of(rows, i), self.blocks_of(frames)).sum()
+        return out
 
     def _of_terms(self, terms: Terms) -> Array:
         """Return log p(y_j | terms_i) for physical terms."""
-        out = np.empty((terms.object.shape[0], self.frames.shape[0]))
-        _log_likelihoods(out, *self.integrals(terms))
-        return out
+        return self.shared(self._of_rows(self.integral_rows(terms), self.data))
 
     def frame_log_likelihoods(self, z: Array) -> Array:
         """Return log p(y_j | z_i), shape (len(z), frames); -inf where physics forbids z."""
@@ -201,22 +182,40 @@ class CollapsedDensity:
             out[good] = self.frame_log_likelihoods(z[good])
         return out
 
-    def curves(self, z: Array, rng: np.random.Generator) -> tuple[Array | None, Pair | None]:  # noqa: ARG002
-        """Draw what multiplies the object's flux given each z: here nothing.
+    def _with_flux_errors(self, rows: Rows, z: Array, rng: np.random.Generator) -> Rows:  # noqa: ARG002
+        """Draw what multiplies the object's flux given each z: here nothing."""
+        return rows
+
+    def draw_log_ranges(self, z: Array, rng: np.random.Generator) -> Array:
+        """Draw the range of every frame given each parameter vector.
 
         Parameters
         ----------
         z : ndarray, shape (n, d)
-            Parameter vectors.
+            Draws of the parameters, of positive density.
         rng : numpy.random.Generator
             Source of randomness.
 
         Returns
         -------
-        (ndarray, (float, float)) or (None, None)
-            Knots of shape (n, knots, 2) and their grid (`inference.density.warp.Curve`).
+        ndarray, shape (n, frames)
+            log r; nan for a frame without object.
         """
-        return None, None
+        rows = self._with_flux_errors(self.integral_rows(self.parameters.terms(z)), z, rng)
+        out = np.empty((len(z), self.data.blocks))
+        fill_range_draws(out, rng.random((*out.shape, 2)), rows, self.data, self.instrument)
+        return self.common(out)
+
+    def best_ranges(self, z: Array) -> Array:
+        """Find each frame's best range (`inference.density.profile.best_ranges`)."""
+        rows = self.rows(self.parameters.terms(z))
+        found = np.empty((len(z), self.data.blocks, 3))
+        fill_best_ranges(found, rows, self.data, self.instrument)
+        return self.of_frames(found)
+
+    def flux_basis(self, z: Array, log_r: Array) -> FluxBasis | None:  # noqa: ARG002
+        """Return what the error of the object's flux is made of at given ranges: here none."""
+        return None
 
     def flux_errors(self, log_r: Array, rng: np.random.Generator) -> Array | None:  # noqa: ARG002
         """Draw errors of the object's log flux at given log ranges from their prior: here none."""

@@ -11,17 +11,24 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.density.collapsed import empty_frame_log_likelihood
-from inference.density.curve_table import integration_bounds, tabulate
-from inference.density.discrepancy_climb import best_positions, climb_jointly
-from inference.density.flux_error import add_mode, add_row, expand
-from inference.density.frame_integral import frame_log_likelihood
-from inference.density.gaussian import LOG_2PI, Pair, log_top
-from inference.density.integrand import WarpedArguments
-from inference.density.range_modes import find_modes
-from inference.density.rows import background_of, crosstalk_of, law_of
+from inference.density.flux_expansion import FluxFunctions, add_mode, add_row, expand
+from inference.density.joint_maximum import best_positions, climb_jointly, with_error
+from inference.density.range_integral import integrate_range
 from inference.density.triangular import solve_factor, update_factor
-from inference.density.warp import fill_curve
+from inference.frame.arguments import (
+    FrameScene,
+    Instrument,
+    RangePrior,
+    Rows,
+    scene_of,
+)
+from inference.frame.blocks import Data, block_of, is_empty
+from inference.frame.flux_error import fill_knots
+from inference.frame.gaussian import LOG_2PI, log_top
+from inference.frame.log_density import empty_log_likelihood
+from inference.frame.modes import LOG_MASS, find_modes, room_for_modes
+from inference.frame.range_prior import integration_bounds
+from inference.frame.table import tabulate
 from simulator.compiled import compiled
 
 __all__ = ["integrate_flux_error"]
@@ -47,25 +54,19 @@ def _round(
     gradient: Array,
     factor: Array,
     coefficients: Array,
-    frames: Array,
-    present: NDArray[np.bool_] | None,
-    bounds: Pair,
-    strongest: float,
-    basis: Array,
-    scene: WarpedArguments,
+    data: Data,
+    scene: FrameScene,
+    functions: FluxFunctions,
 ) -> float:
     """Integrate every frame under given coefficients; the log density of both.
 
     Filled are the frames' log likelihoods, the gradient, and the factor of the precision.
     """
-    shape, crosstalk, background, law, r0, wave, read, shot, _, delta = scene
-    fill_curve(delta[0], basis, coefficients)
-    table = tabulate(
-        bounds, shape, crosstalk, background, law, r0, wave, read, shot, strongest, delta
-    )
+    fill_knots(functions.error.knots, functions.basis, coefficients)
+    table = tabulate(integration_bounds(scene.range_prior), scene, data.strongest)
     work = np.empty(table.shape[1])
-    modes = np.empty((work.size // 2 + 1, 6))
-    n, size = frames.shape[0], coefficients.size
+    modes = room_for_modes(table)
+    n, size = values.size, coefficients.size
     rows = np.empty((size, n))
     row = np.empty(size)
     count, total = 0, 0.0
@@ -75,28 +76,26 @@ def _round(
         gradient[k] = -coefficients[k]
         total -= 0.5 * coefficients[k] * coefficients[k]
     for j in range(n):
-        frame = (frames[j, 0], frames[j, 1], frames[j, 2])
-        if present is not None and not present[j]:
-            values[j] = empty_frame_log_likelihood(
-                frame, crosstalk, background, r0, wave, read, shot
-            )
+        block = block_of(data, j)
+        if is_empty(data, j):
+            values[j] = empty_log_likelihood(block, scene)
             total += values[j]
             continue
-        found = find_modes(modes, work, table, frame, scene)
-        values[j] = frame_log_likelihood(modes, found, frame, scene)
+        found = find_modes(modes, work, table, block, scene)
+        values[j] = integrate_range(modes, found, block, scene)
         total += values[j]
         if not math.isfinite(values[j]):
             return -math.inf
         highest, mass = -math.inf, 0.0
         for m in range(found):
-            highest = max(highest, modes[m, 5])
+            highest = max(highest, modes[m, LOG_MASS])
         for m in range(found):
-            mass += math.exp(modes[m, 5] - highest)
+            mass += math.exp(modes[m, LOG_MASS] - highest)
         for m in range(found):
-            weight = math.exp(modes[m, 5] - highest) / mass
+            weight = math.exp(modes[m, LOG_MASS] - highest) / mass
             if weight < _FEW:
                 continue
-            add_mode(gradient, row, weight, modes[m], frame, scene, basis, delta)
+            add_mode(gradient, row, weight, modes[m], block, scene, functions)
             rows[:, count] = row
             count += 1
             if count == n:
@@ -111,12 +110,9 @@ def _newton(
     values: Array,
     coefficients: Array,
     factor: Array,
-    frames: Array,
-    present: NDArray[np.bool_] | None,
-    bounds: Pair,
-    strongest: float,
-    basis: Array,
-    scene: WarpedArguments,
+    data: Data,
+    scene: FrameScene,
+    functions: FluxFunctions,
 ) -> float:
     """Climb the integrated density; return its Laplace integral over the coefficients.
 
@@ -128,20 +124,9 @@ def _newton(
     trial_values, trial_factor = np.empty(values.size), np.empty((size, size))
     best, gain = -math.inf, 0.0
     last = np.zeros(size)
-    curve = np.empty((basis.shape[0], 2))
+    curve = np.empty((functions.basis.shape[0], 2))
     for _ in range(_ROUNDS):
-        value = _round(
-            trial_values,
-            step,
-            trial_factor,
-            trial,
-            frames,
-            present,
-            bounds,
-            strongest,
-            basis,
-            scene,
-        )
+        value = _round(trial_values, step, trial_factor, trial, data, scene, functions)
         if not value > best - 1e-9 * (1.0 + abs(best)):
             if best == -math.inf:
                 return -math.inf
@@ -155,7 +140,7 @@ def _newton(
         coefficients[:] = trial
         factor[:] = trial_factor
         gain = solve_factor(factor, step)
-        fill_curve(curve, basis, step)
+        fill_knots(curve, functions.basis, step)
         longest = np.abs(curve[:, 0]).max()
         if not math.isfinite(longest):
             return -math.inf
@@ -176,18 +161,16 @@ def _laplace(
     coefficients: Array,
     factor: Array,
     positions: Array,
-    frames: Array,
-    present: NDArray[np.bool_] | None,
-    basis: Array,
-    scene: WarpedArguments,
+    data: Data,
+    scene: FrameScene,
+    functions: FluxFunctions,
 ) -> float:
     """Return Laplace's integral over coefficients and ranges around their joint maximum.
 
     Filled are the frames' shares and the factor of the precision.
     """
-    _, crosstalk, background, _, r0, wave, read, shot, _, delta = scene
-    n, size = frames.shape[0], coefficients.size
-    fill_curve(delta[0], basis, coefficients)
+    n, size = values.size, coefficients.size
+    fill_knots(functions.error.knots, functions.basis, coefficients)
     rows = np.zeros((size, n))
     row = np.empty(size)
     total = 0.0
@@ -196,23 +179,19 @@ def _laplace(
         factor[k, k] = 1.0
         total -= 0.5 * coefficients[k] * coefficients[k]
     for j in range(n):
-        frame = (frames[j, 0], frames[j, 1], frames[j, 2])
+        block = block_of(data, j)
         if not math.isfinite(positions[j]):
-            values[j] = -math.inf
-            if present is not None and not present[j]:
-                values[j] = empty_frame_log_likelihood(
-                    frame, crosstalk, background, r0, wave, read, shot
-                )
+            values[j] = empty_log_likelihood(block, scene) if is_empty(data, j) else -math.inf
             total += values[j]
             continue
-        density, _, bend, _, _, stiff, free, _ = expand(positions[j], frame, *scene)
+        density, _, bend, _, _, stiff, free, _ = expand(positions[j], block, scene)
         # where nothing bends the range does not follow, and its prior is as wide as it can be
-        values[j] = density + log_top(read)
+        values[j] = density + log_top(scene.instrument.read)
         if bend > 0.0:
             values[j] += 0.5 * (LOG_2PI - math.log(bend))
         total += values[j]
         row[:] = 0.0
-        add_row(row, basis, positions[j], delta, math.sqrt(free if bend > 0.0 else stiff))
+        add_row(row, functions, positions[j], math.sqrt(free if bend > 0.0 else stiff))
         rows[:, j] = row
     update_factor(factor, rows, n)
     for k in range(size):
@@ -221,23 +200,31 @@ def _laplace(
 
 
 @compiled
+def _without_reference(scene: FrameScene) -> FrameScene:
+    """Return a scene whose ranges have no reference prior.
+
+    A maximum over ranges knows none, which is a density for integrals.
+    """
+    constant, power, mean, inverse_sd, log_mean, log_inverse_sd, low, high, _ = scene.range_prior
+    return FrameScene(
+        scene.shape,
+        scene.crosstalk,
+        scene.background,
+        RangePrior(constant, power, mean, inverse_sd, log_mean, log_inverse_sd, low, high, None),
+        scene.instrument,
+        scene.flux_error,
+    )
+
+
+@compiled
 def integrate_flux_error(
     out: Array,
     centres: Array,
     factors: Array,
-    shapes: Array,
-    crosstalks: Array | None,
-    backgrounds: Array | None,
-    laws: Array | tuple[Array],
-    frames: Array,
-    present: NDArray[np.bool_] | None,
-    r0: float,
-    wave: Pair | None,
-    read: Pair,
-    shot: float | None,
-    relative: float | None,
-    basis: Array,
-    grid: Pair,
+    rows: Rows,
+    data: Data,
+    instrument: Instrument,
+    functions: FluxFunctions,
 ) -> None:
     """Fill out[i, j] with frame j's share of the log likelihood of parameter vector i.
 
@@ -249,42 +236,30 @@ def integrate_flux_error(
     centres, factors : ndarray, shape (n, functions) and (n, functions, functions)
         Filled with the mean of the coefficients and the upper triangular factor of their precision;
         of length 1 where they are not wanted.
-    shapes, crosstalks, backgrounds, laws, frames, present, r0, wave, read, shot, relative
-        As from `CollapsedDensity.arguments`.
-    basis : ndarray, shape (knots, 2, functions)
-        Knots of the functions, multiplied by the standard deviation of the error.
-    grid : (float, float)
-        log r of the first knot, one over their spacing.
+    rows, data, instrument
+        Parameters, frames and sensor.
+    functions : FluxFunctions
+        What the error is made of; its sum is overwritten.
     """
-    strongest = frames[:, 2].max()
-    n = frames.shape[0]
-    knots = np.empty((basis.shape[0], 2))
-    delta = (knots, grid[0], grid[1])
+    n = out.shape[1]
     positions = np.empty(n)
-    for i in range(shapes.shape[0]):
-        shape = (shapes[i, 0], shapes[i, 1], shapes[i, 2])
-        crosstalk = crosstalk_of(crosstalks, i)
-        background = background_of(backgrounds, i)
-        law = law_of(laws, i)
-        bounds = integration_bounds(law)
+    for i in range(out.shape[0]):
+        scene = with_error(scene_of(rows, instrument, i), functions.error)
+        bounds = integration_bounds(scene.range_prior)
         slot = i if centres.shape[0] > 1 else 0
         centre, factor = centres[slot], factors[slot]
         centre[:] = 0.0
         out[i, :] = -math.inf
-        if not bounds[1] > bounds[0] or not math.isfinite(law[0]):
+        if not bounds[1] > bounds[0]:
             continue
-        scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative, delta)
-        fill_curve(knots, basis, centre)
-        # a maximum over ranges knows no reference prior, which is a density for integrals
-        flat = (shape, crosstalk, background, law[:8], r0, wave, read, shot, relative, delta)
-        best_positions(positions, frames, present, bounds, strongest, flat)
-        best = climb_jointly(centre, positions, frames, bounds, basis, flat)
+        fill_knots(functions.error.knots, functions.basis, centre)
+        flat = _without_reference(scene)
+        best_positions(positions, data, flat)
+        best = climb_jointly(centre, positions, data, flat, functions)
         if best < -_HOPELESS * n:
-            total = _laplace(out[i], centre, factor, positions, frames, present, basis, scene)
+            total = _laplace(out[i], centre, factor, positions, data, scene, functions)
         else:
-            total = _newton(
-                out[i], centre, factor, frames, present, bounds, strongest, basis, scene
-            )
+            total = _newton(out[i], centre, factor, data, scene, functions)
         if not math.isfinite(total):
             out[i, :] = -math.inf
             continue

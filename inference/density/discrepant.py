@@ -1,18 +1,17 @@
 """The collapsed density where the object's flux may differ smoothly from the model's."""
 
 import dataclasses
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.density.collapsed import CollapsedDensity
-from inference.density.discrepancy_climb import best_under_flux_error
+from inference.density.collapsed import CollapsedDensity, FluxBasis
 from inference.density.discrepancy_integral import integrate_flux_error
-from inference.density.gaussian import Pair
-from inference.density.rows import row_of
+from inference.density.flux_expansion import FluxFunctions
+from inference.density.joint_maximum import fill_joint_maxima
+from inference.frame.arguments import FluxError, Rows
+from inference.frame.blocks import Data
 from simulator.discrepancy import DiscrepancyBasis, discrepancy_basis
-from simulator.parameters import Terms
 
 __all__ = ["DiscrepantDensity", "with_discrepancy"]
 
@@ -38,39 +37,22 @@ class DiscrepantDensity(CollapsedDensity):
     basis: DiscrepancyBasis
 
     @property
-    def grid(self) -> tuple[float, float]:
-        """First knot of the basis, and one over the knots' spacing."""
-        return self.basis.first, 1.0 / self.basis.spacing
-
-    @property
     def knots(self) -> Array:
         """Knots of the basis functions of an error of this size."""
         return self.discrepancy * self.basis.knots
 
-    def _integrate(self, terms: Terms, readings: Array | None = None) -> Array:
-        """Frames' shares of the log likelihood; readings instead of the frames' own, one a row."""
-        n = terms.object.shape[0]
-        size = self.basis.size
-        out = np.empty((n, self.frames.shape[0]))
-        work: list[Any] = [np.empty((1, size)), np.empty((1, size, size))]
-        arguments = [*self.integrals(terms), self.knots, self.grid]
-        if readings is None:
-            integrate_flux_error(out, *work, *arguments)
-            return out
-        frames = self.frames.copy()
-        for i in range(n):
-            frames[:, :2] = readings[i]
-            row = [row_of(part, i) for part in arguments[:4]]
-            everything: list[Any] = [out[i : i + 1], *work, *row, frames, *arguments[5:]]
-            integrate_flux_error(*everything)
+    @property
+    def functions(self) -> FluxFunctions:
+        """What the error is made of, as the kernels take it, with work space of its own."""
+        knots = self.knots
+        curve = np.empty(knots.shape[:2])
+        return FluxFunctions(knots, FluxError(curve, self.basis.first, 1.0 / self.basis.spacing))
+
+    def _of_rows(self, rows: Rows, data: Data) -> Array:
+        out = np.empty((len(rows.shapes), len(self.frames)))
+        work = np.empty((1, self.basis.size)), np.empty((1, self.basis.size, self.basis.size))
+        integrate_flux_error(out, *work, rows, data, self.instrument, self.functions)
         return out
-
-    def paired_log_likelihood(self, z: Array, readings: Array) -> Array:
-        """Return log p(readings_i | z_i) for readings of shape (n, frames, 2), shape (n,)."""
-        return np.asarray(self._integrate(self.parameters.terms(z), readings).sum(axis=1))
-
-    def _of_terms(self, terms: Terms) -> Array:
-        return self._integrate(terms)
 
     def expansions(self, z: Array) -> tuple[Array, Array]:
         """Return the error's coefficients given each z: what of them is known.
@@ -89,17 +71,22 @@ class DiscrepantDensity(CollapsedDensity):
         n, size = len(z), self.basis.size
         # a single row would be taken as work space by all vectors
         centres, factors = np.empty((max(n, 2), size)), np.empty((max(n, 2), size, size))
-        out = np.empty((n, self.frames.shape[0]))
-        arguments: list[Any] = [*self.integrals(self.parameters.terms(z)), self.knots, self.grid]
-        integrate_flux_error(out, centres, factors, *arguments)
+        out = np.empty((n, len(self.frames)))
+        rows = self.integral_rows(self.parameters.terms(z))
+        integrate_flux_error(
+            out, centres, factors, rows, self.data, self.instrument, self.functions
+        )
         return centres[:n], factors[:n]
 
-    def curves(self, z: Array, rng: np.random.Generator) -> tuple[Array, Pair]:
-        """Draw the error's curve given each z (`CollapsedDensity.curves`)."""
+    def _with_flux_errors(self, rows: Rows, z: Array, rng: np.random.Generator) -> Rows:
+        """Draw the error's curve given each z."""
         centres, factors = self.expansions(z)
         noise = rng.standard_normal(centres.shape)
         coefficients = centres + np.linalg.solve(factors, noise[:, :, None])[:, :, 0]
-        return np.einsum("gpk,nk->ngp", self.knots, coefficients), self.grid
+        return rows._replace(
+            flux_errors=np.ascontiguousarray(np.einsum("gpk,nk->ngp", self.knots, coefficients)),
+            flux_grid=(self.basis.first, 1.0 / self.basis.spacing),
+        )
 
     def flux_errors(self, log_r: Array, rng: np.random.Generator) -> Array:
         """Draw errors of the log flux at given log ranges from their prior; nan at nan."""
@@ -110,7 +97,11 @@ class DiscrepantDensity(CollapsedDensity):
         ]
         return np.where(np.isfinite(log_r), np.array(rows), np.nan)
 
-    def functions(self, log_r: Array) -> tuple[Array, Array]:
+    def flux_basis(self, z: Array, log_r: Array) -> FluxBasis:
+        """Return what the error is made of at given ranges (`FluxBasis`)."""
+        return FluxBasis(self.joint_maxima(z[None])[1][0], *self.functions_at(log_r))
+
+    def functions_at(self, log_r: Array) -> tuple[Array, Array]:
         """Return all functions of the error and their slopes at given log ranges.
 
         Parameters
@@ -123,13 +114,12 @@ class DiscrepantDensity(CollapsedDensity):
         (ndarray, ndarray)
             Each of shape (frames, functions).
         """
-        finite = np.isfinite(log_r)[:, None]
-        u = np.where(np.isfinite(log_r), log_r, self.basis.first)
-        values, slopes = self.basis.values(u), self.basis.slopes(u)
-        scale = np.where(finite, self.discrepancy, 0.0)
-        return scale * values, scale * slopes
+        present = np.isfinite(log_r)
+        u = np.where(present, log_r, self.basis.first)
+        scale = np.where(present[:, None], self.discrepancy, 0.0)
+        return scale * self.basis.values(u), scale * self.basis.slopes(u)
 
-    def best(self, z: Array) -> tuple[Array, Array]:
+    def joint_maxima(self, z: Array) -> tuple[Array, Array]:
         """Find the joint maximum over ranges and coefficients for each z.
 
         Parameters
@@ -143,11 +133,15 @@ class DiscrepantDensity(CollapsedDensity):
             What `inference.density.profile.best_ranges` returns, shape (n, frames, 3), and the
             coefficients, shape (n, functions).
         """
-        out = np.empty((len(z), self.frames.shape[0], 3))
+        out = np.empty((len(z), len(self.frames), 3))
         centres = np.empty((len(z), self.basis.size))
-        arguments: list[Any] = [*self.arguments(self.parameters.terms(z)), self.knots, self.grid]
-        best_under_flux_error(out, centres, *arguments)
+        rows = self.rows(self.parameters.terms(z))
+        fill_joint_maxima(out, centres, rows, self.data, self.instrument, self.functions)
         return out, centres
+
+    def best_ranges(self, z: Array) -> Array:
+        """Find each frame's best range (`inference.density.profile.best_ranges`)."""
+        return self.joint_maxima(z)[0]
 
 
 def with_discrepancy(density: CollapsedDensity, discrepancy: float) -> DiscrepantDensity:

@@ -1,72 +1,17 @@
 """The likelihood with every range at its best value, and its linearisation: for starting points."""
 
 import dataclasses
-import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.density.collapsed import CollapsedDensity, empty_frame_log_likelihood
-from inference.density.curve_table import integration_bounds, tabulate
-from inference.density.discrepant import DiscrepantDensity
-from inference.density.gaussian import Pair, log_top
-from inference.density.range_modes import find_modes
-from inference.density.rows import background_of, crosstalk_of, law_of
-from inference.density.static import StaticDensity
+from inference.density.collapsed import CollapsedDensity, FluxBasis
 from inference.density.whitened import whitened
-from simulator.compiled import compiled
+from inference.frame.arguments import prior_of
 
-__all__ = ["Linearisation", "best_ranges", "fill_best_ranges", "linearise"]
+__all__ = ["Linearisation", "best_ranges", "linearise"]
 
 Array = NDArray[np.float64]
-
-
-@compiled
-def fill_best_ranges(
-    out: Array,
-    shapes: Array,
-    crosstalks: Array | None,
-    backgrounds: Array | None,
-    laws: Array,
-    frames: Array,
-    present: NDArray[np.bool_] | None,
-    r0: float,
-    wave: Pair | None,
-    read: Pair,
-    shot: float | None,
-    relative: float | None,
-) -> None:
-    """Fill out[i, j] with u, log density and standard deviation of frame j's best mode."""
-    strongest = frames[:, 2].max()
-    for i in range(shapes.shape[0]):
-        shape = (shapes[i, 0], shapes[i, 1], shapes[i, 2])
-        crosstalk = crosstalk_of(crosstalks, i)
-        background = background_of(backgrounds, i)
-        law = law_of(laws, i)
-        bounds = integration_bounds(law)
-        out[i, :, 0], out[i, :, 1], out[i, :, 2] = math.nan, -math.inf, math.nan
-        if not bounds[1] > bounds[0] or not math.isfinite(law[0]):
-            continue
-        table = tabulate(bounds, shape, crosstalk, background, law, r0, wave, read, shot, strongest)
-        values = np.empty(table.shape[1])
-        modes = np.empty((values.size // 2 + 1, 6))
-        scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative, None)
-        for j in range(frames.shape[0]):
-            frame = (frames[j, 0], frames[j, 1], frames[j, 2])
-            if present is not None and not present[j]:
-                out[i, j, 1] = empty_frame_log_likelihood(
-                    frame, crosstalk, background, r0, wave, read, shot
-                )
-                continue
-            count = find_modes(modes, values, table, frame, scene)
-            for k in range(count):
-                if modes[k, 1] > out[i, j, 1]:
-                    out[i, j, 0], out[i, j, 1], out[i, j, 2] = (
-                        modes[k, 0],
-                        modes[k, 1],
-                        modes[k, 2],
-                    )
-            out[i, j, 1] += log_top(read)
 
 
 def best_ranges(density: CollapsedDensity, z: Array) -> Array:
@@ -85,14 +30,7 @@ def best_ranges(density: CollapsedDensity, z: Array) -> Array:
         log r, log p(y, log r | z) and its standard deviation in log r; nan, log likelihood and
         nan for a frame without object.
     """
-    if isinstance(density, StaticDensity):
-        return density.best(z)
-    if isinstance(density, DiscrepantDensity):
-        return density.best(z)[0]
-    terms = density.parameters.terms(z)
-    out = np.empty((z.shape[0], density.frames.shape[0], 3))
-    fill_best_ranges(out, *density.arguments(terms))
-    return out
+    return density.best_ranges(z)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -128,42 +66,41 @@ def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearis
     -------
     Linearisation
     """
-    flux_error = basis = None
-    coefficients = np.empty(0)
-    if isinstance(density, DiscrepantDensity):
-        coefficients = density.best(z[None])[1][0]
-        basis, slope = density.functions(positions)
-        flux_error = (basis @ coefficients, slope @ coefficients)
-    at = whitened(density.sensor, density.parameters, density.frames, z, positions, flux_error)
-    residual, jacobian, direction = at.residual, -at.jacobian, at.along
-    length = np.linalg.norm(direction, axis=1)
+    basis = density.flux_basis(z, positions)
+    error = None
+    if basis is not None:
+        error = (basis.values @ basis.coefficients, basis.slopes @ basis.coefficients)
+    at = whitened(density.sensor, density.parameters, density.frames, z, positions, error)
     # a frame at the edge of its prior, or without object, has no range to give way
-    bounds = density.parameters.terms(z[None]).ranges[0, 6:8]
+    prior = prior_of(density.parameters.terms(z[None]).ranges[0])
+    low, high = prior.low, prior.high
     with np.errstate(divide="ignore", invalid="ignore"):
-        inside = (np.exp(positions) > bounds[0] * (1 + 1e-9)) & (
-            np.exp(positions) < bounds[1] * (1 - 1e-9)
-        )
-    usable = inside & (length > 0)
-    unit = np.where(usable[:, None], direction / np.where(usable, length, 1.0)[:, None], 0.0)
-    if isinstance(density, StaticDensity):
-        # one range gives way for all frames together
-        together = np.where(usable[:, None], direction, 0.0)
-        together = together / max(float(np.linalg.norm(together)), 1e-300)
-        residual = residual - together * np.sum(together * residual)
-        jacobian = jacobian - together[:, :, None] * np.einsum("ni,nid->d", together, jacobian)
-        return Linearisation(residual, jacobian)
-    residual = residual - unit * np.einsum("ni,ni->n", unit, residual)[:, None]
-    jacobian = jacobian - unit[:, :, None] * np.einsum("ni,nid->nd", unit, jacobian)[:, None, :]
+        inside = (np.exp(positions) > low * (1 + 1e-9)) & (np.exp(positions) < high * (1 - 1e-9))
+    ranges = density.range_of_frame
+    direction = np.where(inside[:, None], at.along, 0.0)
+    length = np.sqrt(_sums(ranges, np.sum(direction * direction, axis=1)))[:, None]
+    unit = np.divide(direction, length, out=np.zeros_like(direction), where=length > 0)
+
+    def across(vectors: Array) -> Array:
+        """Project the directions of the ranges out of vectors of shape (frames, 2, k)."""
+        shares = _sums(ranges, np.einsum("ni,nid->nd", unit, vectors))
+        return np.asarray(vectors - unit[:, :, None] * shares[:, None, :])
+
+    residual, jacobian = across(at.residual[:, :, None])[:, :, 0], across(-at.jacobian)
     if basis is None:
         return Linearisation(residual, jacobian)
-    flux = -at.signal
-    flux = flux - unit * np.einsum("ni,ni->n", unit, flux)[:, None]
-    return _eliminate(residual, jacobian, flux[:, :, None] * basis[:, None, :], coefficients)
+    flux = across(-at.signal[:, :, None])
+    return _eliminate(residual, jacobian, flux * basis.values[:, None, :], basis)
 
 
-def _eliminate(
-    residual: Array, jacobian: Array, other: Array, coefficients: Array
-) -> Linearisation:
+def _sums(ranges: NDArray[np.intp], values: Array) -> Array:
+    """Return for every frame the sum of values over the frames that have the same range."""
+    total = np.zeros((ranges.max() + 1, *values.shape[1:]))
+    np.add.at(total, ranges, values)
+    return total[ranges]
+
+
+def _eliminate(residual: Array, jacobian: Array, other: Array, basis: FluxBasis) -> Linearisation:
     """Project out coefficients with standard normal priors, which add residuals of their own.
 
     Parameters
@@ -172,7 +109,7 @@ def _eliminate(
         Of what stays.
     other : ndarray, shape (frames, 2, k)
         Derivative of the residual along the coefficients.
-    coefficients : ndarray, shape (k,)
+    basis : FluxBasis
         Where.
 
     Returns
@@ -180,10 +117,10 @@ def _eliminate(
     Linearisation
         With half as many rows more as there are coefficients.
     """
-    d, k = jacobian.shape[2], coefficients.size
+    d, k = jacobian.shape[2], basis.coefficients.size
     q = np.linalg.qr(np.concatenate([other.reshape(-1, k), np.eye(k)]))[0]
     pad = k % 2
-    rows = np.concatenate([residual.ravel(), coefficients])
+    rows = np.concatenate([residual.ravel(), basis.coefficients])
     rows = rows - q @ (q.T @ rows)
     matrix = np.concatenate([jacobian.reshape(-1, d), np.zeros((k, d))])
     matrix = matrix - q @ (q.T @ matrix)

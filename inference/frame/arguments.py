@@ -20,7 +20,6 @@ from simulator.sensor import Sensor, instrument
 
 __all__ = [
     "Background",
-    "Data",
     "FluxError",
     "FrameScene",
     "Instrument",
@@ -30,6 +29,7 @@ __all__ = [
     "Rows",
     "Shape",
     "instrument_of",
+    "prior_of",
     "row_of",
     "scene_of",
 ]
@@ -192,26 +192,17 @@ class Rows(NamedTuple):
     flux_grid: Pair | None = None
 
 
-class Data(NamedTuple):
-    """The frames that a kernel runs over.
-
-    Attributes
-    ----------
-    frames : ndarray, shape (n, 3)
-        Two readings [reading units] and the factor on the sensor's gain.
-    present : ndarray of bool, shape (n,), or None
-        False where it is known that no object is there; None where one may be in all frames.
-    """
-
-    frames: Array
-    present: NDArray[np.bool_] | None
-
-
 def instrument_of(sensor: Sensor) -> Instrument:
     """Return a sensor as the kernels take it; noise of size zero is none."""
     r0, wave = instrument(sensor)
     noise = sensor.noise
     return Instrument(r0, wave, noise.read, noise.shot or None, noise.relative or None)
+
+
+def prior_of(numbers: Array) -> RangePrior:
+    """Return a row of `simulator.parameters.Terms.ranges` as a prior, not a reference prior."""
+    constant, power, mean, inverse_sd, log_mean, log_inverse_sd, low, high = numbers.tolist()
+    return RangePrior(constant, power, mean, inverse_sd, log_mean, log_inverse_sd, low, high, None)
 
 
 def row_of(rows: Rows, i: int) -> Rows:

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.density.gaussian import log_top
+from inference.frame.gaussian import log_top
 from inference.identifiability.before_data import check_discrepancy
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
@@ -86,7 +86,7 @@ def check_best_fit(density: CollapsedDensity, z: Array) -> None:
         With the frame that fits worst. A misfit that is merely too large to be noise is answered,
         and flagged in `Fit`.
     """
-    shares = log_top(density.read) - density.frame_log_likelihoods(z[None])[0]
+    shares = log_top(density.instrument.read) - density.frame_log_likelihoods(z[None])[0]
     misfit = float(np.sqrt(max(shares.mean(), 0.0)))
     if misfit > _MOST_MISFIT:
         raise RefusedError(

@@ -6,8 +6,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.density.curve_table import integration_bounds
-from inference.density.integrand import Law, Quad, Triple, log_range_density
+from inference.frame.arguments import Background, RangePrior, Shape
+from inference.frame.range_prior import integration_bounds, log_range_density
 from inference.tracking.observed import Observed
 from inference.tracking.places import Places, Scan, boxes_of
 from inference.tracking.readings_table import ReadingsTable
@@ -54,14 +54,14 @@ def _fill(
     positions: Array,
     r0: float,
     wave: Pair | None,
-    shape: Triple,
-    background: Quad | None,
+    shape: Shape,
+    background: Background | None,
 ) -> None:
     """Fill out (n, 8): mean readings, their derivatives along u, the object's part of both."""
     for k in range(positions.size):
         r = math.exp(positions[k])
-        o1, o2 = object_readings(r, r0, wave, shape[0], shape[1], shape[2])
-        d1, d2 = object_slopes(r, r0, wave, shape[0], shape[1], shape[2])
+        o1, o2 = object_readings(r, r0, wave, shape.strength, shape.c0, shape.c1)
+        d1, d2 = object_slopes(r, r0, wave, shape.strength, shape.c0, shape.c1)
         out[k, 4], out[k, 5], out[k, 6], out[k, 7] = o1, o2, d1, d2
         if background is not None:
             b1, b2 = background_readings(r, r0, wave, background)
@@ -71,7 +71,7 @@ def _fill(
 
 
 @compiled
-def _fill_prior(out: Array, positions: Array, law: Law) -> None:
+def _fill_prior(out: Array, positions: Array, law: RangePrior) -> None:
     for k in range(positions.size):
         out[k] = log_range_density(math.exp(positions[k]), positions[k], law)
 
@@ -96,10 +96,10 @@ def means_over(positions: Array, sensor: Sensor, terms: Terms, by_rate: bool) ->
         Means, their derivatives along u, the object's part of both.
     """
     c0, c1, c2 = terms.object[0].tolist()
-    background = None if terms.background is None else tuple(terms.background[0].tolist())
+    background = None if terms.background is None else Background(*terms.background[0].tolist())
     r0, wave = instrument(sensor)
     out = np.empty((positions.size, 8))
-    shape = (sensor.gain * c0 * c2, c0, c1)
+    shape = Shape(sensor.gain * c0 * c2, c0, c1)
     _fill(out, positions, r0, wave, shape, background)
     if not by_rate:
         return out
@@ -120,7 +120,7 @@ def empty_readings(sensor: Sensor, terms: Terms, by_rate: bool) -> Array:
     return np.asarray(background_readings(math.inf, r0, wave, tuple(terms.background[0].tolist())))
 
 
-def _bounds(sensor: Sensor, law: Law) -> tuple[float, float]:
+def _bounds(sensor: Sensor, law: RangePrior) -> tuple[float, float]:
     low, high = integration_bounds(law)
     if isinstance(sensor, PulsedSensor):
         # the late window's kink at r0 belongs to neither side
@@ -142,7 +142,9 @@ class Knots:
         return float((self.positions[-1] - self.positions[0]) / (self.positions.size - 1))
 
 
-def knots_of(sensor: Sensor, terms: Terms, law: Law, observed: Observed, rate_sd: float) -> Knots:
+def knots_of(
+    sensor: Sensor, terms: Terms, law: RangePrior, observed: Observed, rate_sd: float
+) -> Knots:
     """Choose as many knots as the noise asks for.
 
     Parameters

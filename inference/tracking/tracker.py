@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.density.rows import law_of
+from inference.frame.arguments import prior_of
 from inference.posterior.answer.posterior import Posterior
 from inference.tracking.first_state import first_state
 from inference.tracking.hypotheses import Hypotheses, learns_crosstalk
@@ -174,7 +174,7 @@ def _law(scene: Scene, centre: Terms) -> Any:
     if isinstance(scene.range_m, Stroke | Reference):
         low, high = law[0, 6], law[0, 7]
         law[0] = [-math.log(math.log(high / low)), -1.0, 0.0, 0.0, 0.0, 0.0, low, high]
-    return law_of(law, 0)
+    return prior_of(law[0])
 
 
 def _signature(table: ReadingsTable, places: Places, rules: Rules, hypotheses: Hypotheses) -> str:

@@ -9,8 +9,8 @@ from scipy import stats
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.density.discrepant import DiscrepantDensity, with_discrepancy
-from inference.density.gaussian import log_top
 from inference.density.profile import best_ranges, linearise
+from inference.frame.gaussian import log_top
 from inference.posterior import fold
 from inference.posterior.answer.ranges import draw_ranges, replicate
 from inference.posterior.settings import SamplerSettings
@@ -171,8 +171,8 @@ def test_where_nothing_fits_laplace_takes_over_without_a_step() -> None:
     frames = data(sensor, {}, 10, span=(0.4, 1.2)).frames
     density = density_of(sensor, scene, frames, 0.05)
     z = np.linspace(6.0, 9.0, 61)[:, None]
-    joint = density.best(z)[0][:, :, 1].sum(axis=1)
-    below = joint - 10 * log_top(density.read)
+    joint = best_ranges(density, z)[:, :, 1].sum(axis=1)
+    below = joint - 10 * log_top(density.instrument.read)
     assert below.min() < -1000.0 < below.max()
     steps = np.abs(np.diff(density.log_likelihood(z) - joint))
     # ranges are nearly normal: what their curvature leaves out is below half a nat a frame

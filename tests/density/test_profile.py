@@ -34,15 +34,16 @@ def means(density: CollapsedDensity, z: Array, positions: Array) -> Array:
     """Mean readings of every frame at given ranges, shape (frames, 2)."""
     terms = density.parameters.terms(z[None])
     c0, c1, c2 = terms.object[0]
+    r0, wave = density.instrument.r0, density.instrument.wave
     out = []
     for u, gain in zip(positions, density.frames[:, 2], strict=True):
         r, mean = math.exp(u), np.zeros(2)
-        strength = density.gain * c0 * c2 * gain
-        mean += object_readings(r, density.r0, density.wave, strength, c0, c1)
+        strength = density.sensor.gain * c0 * c2 * gain
+        mean += object_readings(r, r0, wave, strength, c0, c1)
         if terms.background is not None:
             background = tuple(terms.background[0])
             assert len(background) == 4
-            mean += gain * np.array(background_readings(r, density.r0, density.wave, background))
+            mean += gain * np.array(background_readings(r, r0, wave, background))
         if terms.crosstalk is not None:
             mean += terms.crosstalk[0]
         out.append(mean)
@@ -117,11 +118,10 @@ def test_residuals_are_white(kind: str) -> None:
     assert terms.background is not None
     background = tuple(terms.background[0])
     assert len(background) == 4
-    bare = background_readings(math.inf, density.r0, density.wave, background)
+    r0, wave, read, shot, _ = density.instrument
+    bare = background_readings(math.inf, r0, wave, background)
     mean = terms.crosstalk[0] + bare
-    v1, v2, v12 = covariance(
-        density.read, density.shot, None, density.wave is None, (mean[0], mean[1]), (0.0, 0.0)
-    )
+    v1, v2, v12 = covariance(read, shot, None, wave is None, (mean[0], mean[1]), (0.0, 0.0))
     line = linearise(density, z, np.full(2, np.nan))
     for k in range(2):
         e = readings[k] - mean

@@ -9,11 +9,14 @@ from numpy.typing import NDArray
 from scipy import special
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
-from inference.density.gaussian import log_top
-from inference.density.integrand import log_integrand, log_range_density
 from inference.density.profile import best_ranges, linearise
 from inference.density.static import with_common_range
 from inference.density.whitened import whitened
+from inference.frame.arguments import scene_of
+from inference.frame.blocks import Block, Frame
+from inference.frame.gaussian import log_top
+from inference.frame.log_density import log_density
+from inference.frame.range_prior import log_range_density
 from inference.posterior.answer.ranges import draw_ranges
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
@@ -44,18 +47,14 @@ def standing(
 
 def along(density: CollapsedDensity, z: Array, u: Array) -> Array:
     """Log joint density of all frames and of log r, less the top of the read noise's."""
-    arguments = density.arguments(density.parameters.terms(z[None]))
-    shape, crosstalk, background = (
-        None if part is None else tuple(part[0].tolist()) for part in arguments[:3]
-    )
-    law = tuple(arguments[3][0].tolist())
-    scene = (shape, crosstalk, background, law, *arguments[6:])
+    rows = density.rows(density.parameters.terms(z[None]))
+    scene = scene_of(rows, density.instrument, 0)
     values = np.zeros(u.size)
     for k in range(u.size):
-        prior = log_range_density(math.exp(u[k]), u[k], law)
+        prior = log_range_density(math.exp(u[k]), u[k], scene.range_prior)
         values[k] = prior
         for frame in density.frames:
-            values[k] += log_integrand(u[k], tuple(frame.tolist()), *scene) - prior
+            values[k] += log_density(u[k], Block(Frame(*frame.tolist()), None), scene) - prior
     return values
 
 
@@ -64,7 +63,7 @@ def by_quadrature(density: CollapsedDensity, z: Array) -> tuple[float, Array, Ar
     u = np.linspace(math.log(0.05), math.log(5.0), 20_001)
     values = along(density, z, u)
     # the trapezoidal rule is exact to rounding for peaks wider than two steps
-    constant = len(density.frames) * log_top(density.read) + math.log(u[1] - u[0])
+    constant = len(density.frames) * log_top(density.instrument.read) + math.log(u[1] - u[0])
     return float(special.logsumexp(values) + constant), u, values
 
 
@@ -95,7 +94,7 @@ def test_one_range_of_all_frames_is_integrated_out_as_by_quadrature(name: str) -
         top = best_ranges(static, z[None])[0]
         assert (top[:, 0] == top[0, 0]).all()
         # shot noise leaves kinks, at which the best of two neighbouring tops may be missed
-        highest = float(values.max()) + 6 * log_top(static.read)
+        highest = float(values.max()) + 6 * log_top(static.instrument.read)
         assert top[:, 1].sum() == pytest.approx(highest, abs=0.1)
         assert top[0, 0] == pytest.approx(u[values.argmax()], abs=0.01)
         # not the product of integrals of their own, which reward every frame for its own range

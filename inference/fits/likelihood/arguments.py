@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.frame.arguments import Data, Instrument, Pair, Rows
+from inference.frame.arguments import Instrument, Pair, Rows
+from inference.frame.blocks import Data
 from inference.frame.sensitivity import Value
 
 __all__ = ["CROSSTALK", "SLOTS", "Bounds", "Fit", "Layout", "Place"]

@@ -5,13 +5,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.density.gaussian import log_top
-from inference.density.integrand import log_integrand, slope_and_curvature
-from inference.density.profile import fill_best_ranges
-from inference.density.rows import background_of, crosstalk_of, law_of
+from inference.density.best_ranges import fill_best_ranges
 from inference.fits.likelihood.arguments import Fit, Place
 from inference.fits.likelihood.coordinates import physical
-from inference.frame.arguments import Instrument, RangePrior
+from inference.frame.arguments import RangePrior, scene_of
+from inference.frame.blocks import block_of
+from inference.frame.gaussian import log_top
+from inference.frame.log_density import log_density, slope_and_curvature
 from inference.frame.sensitivity import Value
 from simulator.compiled import compiled
 
@@ -23,59 +23,47 @@ POSITION, TOP = 0, 1  # of a frame in `Place.best`
 _LOW = RangePrior._fields.index("low")
 _TRIES = 12
 _SETTLED = 1e-7  # deviance that a range may lack of its best value
-_KNOTS = 0.04  # about their distance in `inference.density.curve_table`
+_KNOTS = 0.04  # about their distance in `inference.frame.table`
 
 
 @compiled
-def _settle(
-    best: Array,
-    shapes: Array,
-    crosstalks: Array | None,
-    backgrounds: Array | None,
-    laws: Array,
-    frames: Array,
-    instrument: Instrument,
-) -> None:
+def _settle(best: Array, fit: Fit) -> None:
     """Follow modes to their very top by Newton steps.
 
     An integral is content with a mode to a fraction of its width; where the readings barely move
     with the range but lie far from the model, the width from first derivatives says little, and a
     gradient needs the top.
     """
-    shape = (shapes[0, 0], shapes[0, 1], shapes[0, 2])
-    crosstalk, background = crosstalk_of(crosstalks, 0), background_of(backgrounds, 0)
-    law = law_of(laws, 0)
-    r0, wave, read, shot, relative = instrument
-    scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative, None)
-    low, high = math.log(law[6]), math.log(law[7])
-    for j in range(frames.shape[0]):
+    scene, data = scene_of(fit.rows, fit.instrument, 0), fit.data
+    low, high = math.log(scene.range_prior.low), math.log(scene.range_prior.high)
+    for j in range(best.shape[1]):
         if not math.isfinite(best[0, j, POSITION]):  # without an object
             continue
-        frame = (frames[j, 0], frames[j, 1], frames[j, 2])
+        block = block_of(data, j)
         u = best[0, j, POSITION]
-        slope, curvature = slope_and_curvature(u, frame, *scene)
+        slope, curvature = slope_and_curvature(u, block, scene)
         if slope * slope <= _SETTLED * curvature:
             continue
-        density = log_integrand(u, frame, *scene)
+        density = log_density(u, block, scene)
         for _ in range(_TRIES):
             width = 1e-5
-            ahead, _ = slope_and_curvature(u + width, frame, *scene)
+            ahead, _ = slope_and_curvature(u + width, block, scene)
             bend = max((slope - ahead) / width, 1e-3 * curvature, 1e-12)
             step = min(max(slope / bend, -_KNOTS), _KNOTS)
             while abs(step) > 1e-13:
                 trial = min(max(u + step, low), high)
-                value = log_integrand(trial, frame, *scene)
+                value = log_density(trial, block, scene)
                 if value >= density:
                     break
                 step *= 0.25
             if not abs(step) > 1e-13 or trial == u:
                 break
             u, density = trial, value
-            slope, curvature = slope_and_curvature(u, frame, *scene)
+            slope, curvature = slope_and_curvature(u, block, scene)
             if abs(slope * step) < _SETTLED:
                 break
         best[0, j, POSITION] = u
-        best[0, j, TOP] = density + log_top(read)
+        best[0, j, TOP] = density + log_top(fit.instrument.read)
 
 
 @compiled
@@ -124,31 +112,9 @@ def deviance(place: Place, fit: Fit) -> float:
     if not physical(place.values, place.x, fit.layout):
         return math.inf
     open_values(place.values, fit)
-    rows, data, instrument, best = fit.rows, fit.data, fit.instrument, place.best
-    r0, wave, read, shot, relative = instrument
-    fill_best_ranges(
-        best,
-        rows.shapes,
-        rows.crosstalks,
-        rows.backgrounds,
-        rows.range_priors,
-        data.frames,
-        data.present,
-        r0,
-        wave,
-        read,
-        shot,
-        relative,
-    )
-    _settle(
-        best,
-        rows.shapes,
-        rows.crosstalks,
-        rows.backgrounds,
-        rows.range_priors,
-        data.frames,
-        instrument,
-    )
+    instrument, best = fit.instrument, place.best
+    fill_best_ranges(best, fit.rows, fit.data, instrument)
+    _settle(best, fit)
     total = 0.0
     top = log_top(instrument.read)
     for j in range(best.shape[1]):

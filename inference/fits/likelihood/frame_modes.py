@@ -3,12 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.density.curve_table import integration_bounds, tabulate
-from inference.density.range_modes import find_modes
-from inference.density.rows import background_of, crosstalk_of, law_of
 from inference.fits.likelihood.arguments import Fit
-from inference.fits.likelihood.deviance import POSITION, open_values
+from inference.fits.likelihood.deviance import open_values
 from inference.fits.likelihood.problem import FitProblem
+from inference.frame.arguments import scene_of
+from inference.frame.blocks import block_of, is_empty
+from inference.frame.modes import POSITION, TOP, find_modes, room_for_modes
+from inference.frame.range_prior import integration_bounds
+from inference.frame.table import tabulate
 from simulator.compiled import compiled
 
 __all__ = ["MOST", "frame_modes"]
@@ -31,30 +33,23 @@ def _keep(out: Array, position: float, deviance: float) -> None:
 
 
 @compiled
-def _fill_modes(out: Array, values: Array, present: NDArray[np.bool_], fit: Fit) -> None:
+def _fill_modes(out: Array, values: Array, fit: Fit) -> None:
     """Fill out[j, k] with log r and deviance of the modes of frame j, the best first."""
     open_values(values, fit)
-    rows, data = fit.rows, fit.data
-    r0, wave, read, shot, relative = fit.instrument
-    strongest = data.frames[:, 2].max()
-    shape = (rows.shapes[0, 0], rows.shapes[0, 1], rows.shapes[0, 2])
-    crosstalk = crosstalk_of(rows.crosstalks, 0)
-    background = background_of(rows.backgrounds, 0)
-    law = law_of(rows.range_priors, 0)
-    bounds = integration_bounds(law)
+    data = fit.data
+    scene = scene_of(fit.rows, fit.instrument, 0)
+    bounds = integration_bounds(scene.range_prior)
     out[:, :, POSITION], out[:, :, DEVIANCE] = np.nan, np.inf
     if not bounds[1] > bounds[0]:
         return
-    table = tabulate(bounds, shape, crosstalk, background, law, r0, wave, read, shot, strongest)
+    table = tabulate(bounds, scene, data.strongest)
     knots = np.empty(table.shape[1])
-    modes = np.empty((knots.size // 2 + 1, 6))
-    scene = (shape, crosstalk, background, law, r0, wave, read, shot, relative, None)
-    for j in range(data.frames.shape[0]):
-        if not present[j]:
+    modes = room_for_modes(table)
+    for j in range(out.shape[0]):
+        if is_empty(data, j):
             continue
-        frame = (data.frames[j, 0], data.frames[j, 1], data.frames[j, 2])
-        for k in range(find_modes(modes, knots, table, frame, scene)):
-            _keep(out[j], modes[k, 0], -2.0 * modes[k, 1])
+        for k in range(find_modes(modes, knots, table, block_of(data, j), scene)):
+            _keep(out[j], modes[k, POSITION], -2.0 * modes[k, TOP])
 
 
 def frame_modes(problem: FitProblem, x: Array) -> tuple[Array, Array]:
@@ -74,5 +69,5 @@ def frame_modes(problem: FitProblem, x: Array) -> tuple[Array, Array]:
         noise alone), inf-padded, the best first.
     """
     out = np.empty((problem.frames.shape[0], MOST, 2))
-    _fill_modes(out, problem.values(x), problem.present, problem.kernel_fit())
+    _fill_modes(out, problem.values(x), problem.kernel_fit())
     return out[:, :, POSITION], out[:, :, DEVIANCE]

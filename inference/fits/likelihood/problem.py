@@ -16,7 +16,8 @@ from inference.fits.likelihood.coordinates import (
     physical,
 )
 from inference.fits.likelihood.supports import supports_of
-from inference.frame.arguments import Data, Instrument, Rows
+from inference.frame.arguments import Instrument, Rows
+from inference.frame.blocks import own_blocks
 from inference.frame.sensitivity import Value
 from simulator.errors import RefusedError
 from simulator.frames import Frames
@@ -90,7 +91,7 @@ class FitProblem:
         return Fit(
             self.layout,
             Rows(np.empty((1, 3)), np.empty((1, 2)), background, prior),
-            Data(self.frames, self.present),
+            own_blocks(self.frames, self.present),
             self.instrument,
             self.gain,
             self.background,

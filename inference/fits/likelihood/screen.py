@@ -10,11 +10,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.density.gaussian import log_top
 from inference.fits.likelihood.arguments import CROSSTALK, SLOTS, Bounds, Fit, Layout, Place
 from inference.fits.likelihood.coordinates import move_inside, physical
 from inference.fits.likelihood.deviance import TOP, deviance
 from inference.fits.likelihood.triangle import solve_least_squares
+from inference.frame.gaussian import log_top
 from inference.frame.sensitivity import SLOPES, Value, fill_slopes
 from simulator.compiled import compiled
 

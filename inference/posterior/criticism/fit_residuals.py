@@ -104,7 +104,7 @@ def fit_residuals(
     own = at.jacobian[:n]
     if isinstance(density, DiscrepantDensity):
         # the error's coefficients, whose prior has unit scale too, are fitted like parameters
-        functions = density.functions(seen)[0]
+        functions = density.functions_at(seen)[0]
         own = np.concatenate([own, at.signal[:n, :, None] * functions[:, None, :]], axis=2)
         d = own.shape[2]
     rows = np.concatenate(

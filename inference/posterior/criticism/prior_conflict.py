@@ -177,7 +177,8 @@ def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
     near = [middle < ends[0], middle > ends[1]]
     if not (near[0].any() or near[1].any()):
         return ()
-    farthest = density.r0 if density.wave is None else 2 * math.pi / density.wave[0]
+    r0, wave = density.instrument.r0, density.instrument.wave
+    farthest = r0 if wave is None else 2 * math.pi / wave[0]
     high = min(_BEYOND * float(ends[1]), farthest)
     if math.isfinite(distribution.high):
         high = max(high, distribution.high)

@@ -101,11 +101,9 @@ def shear_of(density: CollapsedDensity) -> Shear | None:
     z[:, strength] = z[:, distance] = grid
     natural = parameters.natural(z)
     distances = natural[:, distance] if far in names else np.full(_KNOTS, parameters.known[far])
+    r0, wave = density.instrument.r0, density.instrument.wave
     bare = np.array(
-        [
-            background_readings(np.inf, density.r0, density.wave, (1.0, float(r), 1.0, 0.0))
-            for r in distances
-        ]
+        [background_readings(np.inf, r0, wave, (1.0, float(r), 1.0, 0.0)) for r in distances]
     )
     columns = np.array([column for _, column in unknown], dtype=np.int64)
     ends = np.zeros((2, len(names)))

@@ -41,10 +41,11 @@ def test_equal_static_light_is_one_place(kind: str, distance: Any) -> None:
     assert terms.crosstalk is not None
     assert terms.background is not None
     strength, far = terms.background[:, 0], terms.background[:, 1]
-    if density.wave is None:
-        light = np.stack([strength * np.minimum(far / density.r0, 1.0), strength], axis=1)
+    r0, wave = density.instrument.r0, density.instrument.wave
+    if wave is None:
+        light = np.stack([strength * np.minimum(far / r0, 1.0), strength], axis=1)
     else:
-        phase = density.wave[0] * far + density.wave[1]
+        phase = wave[0] * far + wave[1]
         light = strength[:, None] * np.stack([np.cos(phase), np.sin(phase)], axis=1)
     wanted = (terms.crosstalk + light - 0.01) / 0.02
     # tables of 50 knots a standard deviation, linear between: (sigma / 50)^2 / 8 of the light

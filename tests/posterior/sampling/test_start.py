@@ -76,9 +76,8 @@ def random_data(
     terms = density.parameters.terms(z[None])
     c0, c1, c2 = terms.object[0]
     ranges = np.exp(rng.uniform(np.log(0.1), np.log(2.0), 20))
-    readings = np.array(
-        [object_readings(r, density.r0, density.wave, c0 * c2, c0, c1) for r in ranges]
-    )
+    r0, wave = density.instrument.r0, density.instrument.wave
+    readings = np.array([object_readings(r, r0, wave, c0 * c2, c0, c1) for r in ranges])
     if terms.crosstalk is not None:
         readings += terms.crosstalk[0]
     readings += rng.standard_normal(readings.shape) * sensor.noise.read

@@ -8,8 +8,16 @@ import mpmath
 import numpy as np
 import pytest
 
-from inference.density.gaussian import _determinant, gaussian, precision_times
-from inference.density.integrand import log_integrand, slope_and_curvature
+from inference.frame.arguments import (
+    Background,
+    FrameScene,
+    Instrument,
+    RangePrior,
+    Shape,
+)
+from inference.frame.blocks import Block, Frame
+from inference.frame.gaussian import gaussian, precision_times
+from inference.frame.log_density import log_density, slope_and_curvature
 
 EPS = float(np.finfo(float).eps)
 CASES = 60
@@ -17,7 +25,7 @@ CASES = 60
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """Arguments of `log_integrand` after u."""
+    """A frame, and what `log_density` takes."""
 
     u: float
     frame: tuple[float, float, float]
@@ -32,8 +40,23 @@ class Case:
     relative: float | None
 
     @property
-    def arguments(self) -> Any:
-        return tuple(getattr(self, field.name) for field in dataclasses.fields(self))[1:]
+    def instrument(self) -> Instrument:
+        return Instrument(self.r0, self.wave, self.read, self.shot, self.relative)
+
+    @property
+    def block(self) -> Block:
+        return Block(Frame(*self.frame), None)
+
+    @property
+    def scene(self) -> FrameScene:
+        return FrameScene(
+            Shape(*self.shape),
+            self.crosstalk,
+            None if self.background is None else Background(*self.background),
+            RangePrior(*self.law, reference=None),
+            self.instrument,
+            None,
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -181,9 +204,7 @@ def test_gaussian(cases: list[Case]) -> None:
     with mpmath.workdps(50):
         for case in cases:
             _, mean, signal, residual, matrix = parts_of(case)
-            found = gaussian(
-                residual, mean, signal, case.read, case.shot, case.relative, case.wave is None
-            )
+            found = gaussian(residual, mean, signal, case.instrument)
             wanted = float(log_normal([mpmath.mpf(e) for e in residual], matrix, case.read))
             scaled = [
                 abs(e) / math.sqrt(float(matrix[k, k])) for k, e in enumerate(residual)
@@ -192,27 +213,11 @@ def test_gaussian(cases: list[Case]) -> None:
             assert found == pytest.approx(wanted, abs=64 * EPS * (1 + abs(wanted) + lost))
 
 
-def test_determinant_keeps_every_digit() -> None:
-    """A sum of squares: no condition number enters, however near singular the matrix is."""
-    rng = np.random.default_rng(21)
-    with mpmath.workdps(50):
-        for _ in range(200):
-            own1, own2, shared = 10.0 ** rng.uniform(-12, 0, 3)
-            s1 = 10.0 ** rng.uniform(-3, 6)
-            s2 = s1 * rng.uniform(-2, 2)
-            a, b, k, x, y = (mpmath.mpf(v) for v in (own1, own2, shared, s1, s2))
-            matrix = mpmath.matrix([[a + k + x * x, k + x * y], [k + x * y, b + k + y * y]])
-            found = _determinant(own1, own2, shared, s1, s2)
-            assert found == pytest.approx(float(mpmath.det(matrix)), rel=16 * EPS, abs=0.0)
-
-
 def test_precision_times(cases: list[Case]) -> None:
     with mpmath.workdps(50):
         for case in cases:
             _, mean, signal, residual, matrix = parts_of(case)
-            found = precision_times(
-                residual, mean, signal, case.read, case.shot, case.relative, case.wave is None
-            )
+            found = precision_times(residual, mean, signal, case.instrument)
             wanted = mpmath.inverse(matrix) * mpmath.matrix([mpmath.mpf(e) for e in residual])
             # errors measured in the matrix's own units, like the residual
             sizes = [math.sqrt(float(matrix[k, k])) for k in range(2)]
@@ -241,11 +246,11 @@ def amplification(case: Case) -> tuple[float, float]:
     )
 
 
-def test_log_integrand(cases: list[Case]) -> None:
+def test_log_density(cases: list[Case]) -> None:
     """What may be lost: the rounding of the mean readings, seen through the noise."""
     with mpmath.workdps(50):
         for case in cases:
-            found = log_integrand(case.u, *case.arguments)
+            found = log_density(case.u, case.block, case.scene)
             wanted = float(exact(case, mpmath.mpf(case.u)))
             loss, _ = amplification(case)
             chi = math.sqrt(2 * abs(wanted)) + 4
@@ -255,7 +260,8 @@ def test_log_integrand(cases: list[Case]) -> None:
 def test_most_digits_are_right_where_the_noise_is_plain(cases: list[Case]) -> None:
     with mpmath.workdps(50):
         errors = [
-            abs(log_integrand(c.u, *c.arguments) - float(exact(c, mpmath.mpf(c.u)))) for c in cases
+            abs(log_density(c.u, c.block, c.scene) - float(exact(c, mpmath.mpf(c.u))))
+            for c in cases
         ]
     assert np.median(errors) < 1e-11
 
@@ -285,7 +291,7 @@ def test_slope(cases: list[Case], displaced: float) -> None:
             case = dataclasses.replace(given, u=given.u + displaced)
             if has_kink_near(case):
                 continue
-            slope, curvature = slope_and_curvature(case.u, *case.arguments)
+            slope, curvature = slope_and_curvature(case.u, case.block, case.scene)
             wanted = float(mpmath.diff(lambda u, c=case: exact(c, u), mpmath.mpf(case.u)))
             loss, root = amplification(case)
             # the slope is a product of the residual and the curve's own slope in noise units
@@ -312,7 +318,7 @@ def test_curvature_is_that_of_the_mean_at_fixed_covariance(cases: list[Case]) ->
             matrix = moments(case, u).covariance
             prior = case.law[5] ** 2 + (math.exp(case.u) * case.law[3]) ** 2
             wanted = float((slope.T * mpmath.inverse(matrix) * slope)[0]) + prior
-            found = slope_and_curvature(case.u, *case.arguments)[1]
+            found = slope_and_curvature(case.u, case.block, case.scene)[1]
             sizes = [math.sqrt(float(matrix[k, k])) for k in range(2)]
             length = math.hypot(*(float(s) / w for s, w in zip(slope, sizes, strict=True)))
             loss, root = amplification(case)
@@ -323,10 +329,11 @@ def test_curvature_is_that_of_the_mean_at_fixed_covariance(cases: list[Case]) ->
 
 def test_relative_noise_far_above_the_read_noise_cancels_in_the_ratio() -> None:
     """Along the object's signal a reading is free; across it the read noise decides alone."""
-    signal, read, relative = (3.0, 4.0), (1e-6, 1e-6), 1e4
-    along = gaussian((0.3, 0.4), signal, signal, read, None, relative, True)
-    none = gaussian((0.0, 0.0), signal, signal, read, None, relative, True)
-    across = gaussian((-4e-6, 3e-6), signal, signal, read, None, relative, True)
+    signal, relative = (3.0, 4.0), 1e4
+    instrument = Instrument(1.0, None, (1e-6, 1e-6), None, relative)
+    along = gaussian((0.3, 0.4), signal, signal, instrument)
+    none = gaussian((0.0, 0.0), signal, signal, instrument)
+    across = gaussian((-4e-6, 3e-6), signal, signal, instrument)
     # (0.1 / relative)^2 / 2 along, 5^2 / 2 across
     assert none - along == pytest.approx(0.5e-10, abs=1e-11)
     assert none - across == pytest.approx(12.5, rel=1e-9)

@@ -1,6 +1,6 @@
-"""The inner integral: a frame's range integrated out, adaptively.
+"""The inner integral: the range of a block of frames integrated out, adaptively.
 
-Every local maximum of a frame's density on the table of the curve of mean readings is refined by
+Every local maximum of the density on the table of the curve of mean readings is refined by
 a bracketed Gauss-Newton iteration and integrated on its own interval between valleys: by a short
 rule where the peak is narrow, interior and passes its checks, otherwise by Gauss-Legendre panels
 that march outward.
@@ -11,11 +11,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.density.gaussian import Pair, log_top
-from inference.density.integrand import SceneArguments, Triple, log_integrand, slope_and_curvature
+from inference.frame.arguments import FrameScene, Pair
+from inference.frame.blocks import Block, frame_count
+from inference.frame.gaussian import log_top
+from inference.frame.log_density import log_density, slope_and_curvature
+from inference.frame.modes import LEFT, LOG_MASS, POSITION, RIGHT, SD, TOP
 from simulator.compiled import compiled
 
-__all__ = ["falls_off", "frame_log_likelihood", "log_add"]
+__all__ = ["best_mode", "falls_off", "integrate_range"]
 
 Array = NDArray[np.float64]
 
@@ -32,48 +35,42 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 @compiled
-def falls_off(
-    mode: Array,
-    frame: Triple,
-    scene: SceneArguments,
-) -> bool:
+def falls_off(mode: Array, block: Block, scene: FrameScene) -> bool:
     """Tell whether nothing is left beyond the reach of the short rules.
 
     The density falls all the way to the valleys, but it may do so slowly over a long interval: it
     is looked at once more farther out.
     """
-    reach = _STEP * _HALF * mode[2]
+    reach = _STEP * _HALF * mode[SD]
     for sign in (-1.0, 1.0):
-        length = mode[4] - mode[0] if sign > 0.0 else mode[0] - mode[3]
+        length = mode[RIGHT] - mode[POSITION] if sign > 0.0 else mode[POSITION] - mode[LEFT]
         if length < reach:
             return False
-        near = math.exp(min(log_integrand(mode[0] + sign * reach, frame, *scene) - mode[1], 1.0))
-        distance = min(_FAR * mode[2], length)
-        far = math.exp(min(log_integrand(mode[0] + sign * distance, frame, *scene) - mode[1], 1.0))
-        if not near * (distance - reach) + far * (length - distance) < 1e-6 * mode[2]:
+        excess = log_density(mode[POSITION] + sign * reach, block, scene) - mode[TOP]
+        near = math.exp(min(excess, 1.0))
+        distance = min(_FAR * mode[SD], length)
+        excess = log_density(mode[POSITION] + sign * distance, block, scene) - mode[TOP]
+        far = math.exp(min(excess, 1.0))
+        if not near * (distance - reach) + far * (length - distance) < 1e-6 * mode[SD]:
             return False
     return True
 
 
 @compiled
-def _narrow(
-    mode: Array,
-    frame: Triple,
-    scene: SceneArguments,
-) -> float:
+def _narrow(mode: Array, block: Block, scene: FrameScene) -> float:
     """Integrate a narrow interior peak, relative to its top; -1 where a check fails.
 
     At a standard deviation below 0.003 of log r the skewness is of the same order, and seven
     Gauss-Hermite nodes leave an error below 1e-7; their outer nodes find the exceptions.
     """
-    u, top, sd = mode[0], mode[1], mode[2]
-    if not sd < 1.0 or not falls_off(mode, frame, scene):
+    u, top, sd = mode[POSITION], mode[TOP], mode[SD]
+    if not sd < 1.0 or not falls_off(mode, block, scene):
         return -1.0
     if sd < _NEARLY_GAUSSIAN:
         total, largest = 0.0, 0.0
         for j in range(_HERMITE_NODES.size):
             x = _HERMITE_NODES[j]
-            excess = log_integrand(u + x * sd, frame, *scene) - top + 0.5 * x * x
+            excess = log_density(u + x * sd, block, scene) - top + 0.5 * x * x
             largest = max(largest, abs(excess))
             total += _HERMITE_WEIGHTS[j] * math.exp(min(excess, 1.0))
         if largest < 0.5:
@@ -81,7 +78,7 @@ def _narrow(
     even, odd = 1.0, 0.0
     for j in range(1, _HALF + 1):
         for sign in (-1.0, 1.0):
-            excess = log_integrand(u + sign * j * _STEP * sd, frame, *scene) - top
+            excess = log_density(u + sign * j * _STEP * sd, block, scene) - top
             value = math.exp(min(excess, 1.0))
             if j % 2 == 0:
                 even += value
@@ -89,7 +86,7 @@ def _narrow(
                 odd += value
     # the error of the whole rule is about the fourth power of this, but not across the kinks
     # that shot noise has where a mean reading changes sign
-    allowed = 2e-3 if scene[7] is None else 1e-5
+    allowed = 2e-3 if scene.instrument.shot is None else 1e-5
     if not abs(even - odd) <= allowed * (even + odd):
         return -1.0
     return float(_STEP * sd * (even + odd))
@@ -99,8 +96,8 @@ def _narrow(
 def _panel(
     start: float,
     width: float,
-    frame: Triple,
-    scene: SceneArguments,
+    block: Block,
+    scene: FrameScene,
 ) -> Pair:
     """Integrate from start over a signed width by 8 Gauss-Legendre nodes.
 
@@ -112,7 +109,7 @@ def _panel(
     total = 0.0
     highest = -math.inf
     for j in range(_NODES.size):
-        value = log_integrand(start + width * 0.5 * (1.0 + _NODES[j]), frame, *scene)
+        value = log_density(start + width * 0.5 * (1.0 + _NODES[j]), block, scene)
         if value > highest:
             total *= math.exp(highest - value)
             highest = value
@@ -122,7 +119,7 @@ def _panel(
 
 
 @compiled
-def log_add(first: float, second: float) -> float:
+def _log_add(first: float, second: float) -> float:
     """Return log(exp(first) + exp(second))."""
     large, small = max(first, second), min(first, second)
     return large + math.log1p(math.exp(small - large)) if small > -math.inf else large
@@ -132,44 +129,44 @@ def log_add(first: float, second: float) -> float:
 def _march(
     mode: Array,
     best: float,
-    frame: Triple,
-    scene: SceneArguments,
+    block: Block,
+    scene: FrameScene,
 ) -> float:
     """Integrate a mode's interval by panels from the mode outward; the log of its mass."""
     # halves of a smooth panel are 2^-16 of its error off
-    allowed = 1e-4 if scene[7] is None else 1e-8
+    allowed = 1e-4 if scene.instrument.shot is None else 1e-8
     total = -math.inf
     for sign in (-1.0, 1.0):
-        end = mode[3] if sign < 0.0 else mode[4]
-        edge = mode[0]
-        width = min(1.7 * mode[2], 0.4, mode[4] - mode[3])
+        end = mode[LEFT] if sign < 0.0 else mode[RIGHT]
+        edge = mode[POSITION]
+        width = min(1.7 * mode[SD], 0.4, mode[RIGHT] - mode[LEFT])
         # at 1e20 nats the density is rounding noise, which never falls off: panels are bounded
         for _ in range(_MOST_PANELS):
             if not (end - edge) * sign > 0.0:
                 break
-            slope = slope_and_curvature(edge, frame, *scene)[0]
+            slope = slope_and_curvature(edge, block, scene)[0]
             if abs(slope) * width > 8.0:
                 width = 8.0 / abs(slope)
             # the slope may grow within the panel: it is looked at from the far end as well
             while True:
                 width = min(max(width, 1e-15 * (1.0 + abs(edge))), (end - edge) * sign)
-                slope = slope_and_curvature(edge + sign * width, frame, *scene)[0]
+                slope = slope_and_curvature(edge + sign * width, block, scene)[0]
                 if abs(slope) * width < 16.0 or width < 1e-13 * (1.0 + abs(edge)):
                     break
                 width *= 0.5
             last = (end - edge) * sign <= 1.25 * width
             if last:
                 width = (end - edge) * sign
-            mass, highest = _panel(edge, sign * width, frame, scene)
+            mass, highest = _panel(edge, sign * width, block, scene)
             # a panel can be wider than the peak, whose curvature says little of a flat top; and the
             # variance of shot noise has a kink where a mean reading changes sign
             for _ in range(30):
                 if mass < total - 20.0:
                     break
                 half = 0.5 * sign * width
-                near, high1 = _panel(edge, half, frame, scene)
-                far, high2 = _panel(edge + half, half, frame, scene)
-                both = log_add(near, far)
+                near, high1 = _panel(edge, half, block, scene)
+                far, high2 = _panel(edge + half, half, block, scene)
+                both = _log_add(near, far)
                 error = abs(math.expm1(both - mass)) if mass > -math.inf else 0.0
                 mass, highest = both, max(high1, high2)
                 # a log mass of a million nats is itself known to no better than its rounding, and a
@@ -177,7 +174,7 @@ def _march(
                 if error <= allowed + 1e-14 * abs(mass) or abs(half) < 1e-14 * (1.0 + abs(edge)):
                     break
                 width, mass, highest, last = 0.5 * width, near, high1, False
-            total = log_add(total, mass)
+            total = _log_add(total, mass)
             edge += sign * width
             if last or highest < best - _NEGLIGIBLE:
                 break
@@ -186,40 +183,45 @@ def _march(
 
 
 @compiled
-def frame_log_likelihood(
-    modes: Array,
-    count: int,
-    frame: Triple,
-    scene: SceneArguments,
-) -> float:
-    """Integrate a frame's density over its range, given its modes.
+def best_mode(modes: Array, count: int) -> int:
+    """Return the mode whose top is the highest, the first of equal ones; -1 where there is none."""
+    best = -1
+    for k in range(count):
+        if modes[k, TOP] > -math.inf and (best < 0 or modes[k, TOP] > modes[best, TOP]):
+            best = k
+    return best
+
+
+@compiled
+def integrate_range(modes: Array, count: int, block: Block, scene: FrameScene) -> float:
+    """Integrate the density of a block of frames over their range, given its modes.
 
     Parameters
     ----------
-    modes : ndarray, shape (at least count, 6)
-        From `find_modes`; the last column is filled with the log of each mode's mass.
+    modes : ndarray
+        From `inference.frame.modes.find_modes`; `LOG_MASS` is filled.
     count : int
         Number of modes.
-    frame, scene
-        As for `log_integrand`.
+    block, scene
+        As for `inference.frame.log_density.log_density`.
 
     Returns
     -------
     float
-        log p(y | theta).
+        log p(readings of the block | theta).
     """
     best = -math.inf
     for j in range(count):
-        best = max(best, modes[j, 1])
+        best = max(best, modes[j, TOP])
     total = -math.inf
     for j in range(count):
         mass = -math.inf
-        if modes[j, 1] > best - _NEGLIGIBLE:
-            narrow = _narrow(modes[j], frame, scene)
+        if modes[j, TOP] > best - _NEGLIGIBLE:
+            narrow = _narrow(modes[j], block, scene)
             if narrow > 0.0:
-                mass = modes[j, 1] + math.log(narrow)
+                mass = modes[j, TOP] + math.log(narrow)
             else:
-                mass = _march(modes[j], best, frame, scene)
-        modes[j, 5] = mass
-        total = log_add(total, mass)
-    return log_top(scene[6]) + total
+                mass = _march(modes[j], best, block, scene)
+        modes[j, LOG_MASS] = mass
+        total = _log_add(total, mass)
+    return float(frame_count(block) * log_top(scene.instrument.read) + total)

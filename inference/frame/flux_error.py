@@ -1,15 +1,14 @@
-"""A smooth curve of log r that multiplies the object's flux, as the kernels take it."""
+"""A smooth curve of log r that multiplies the object's flux: cubic between knots."""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.frame.arguments import FluxError, Pair
 from simulator.compiled import compiled
 
-__all__ = ["Curve", "cubic_weights", "curve_at", "fill_curve", "slope_weights"]
+__all__ = ["cubic_weights", "fill_knots", "flux_error_at", "slope_weights"]
 
 Array = NDArray[np.float64]
-# knots of shape (n, 2), value and slope times spacing; log r of the first; one over the spacing
-Curve = tuple[Array, float, float]
 
 
 @compiled
@@ -31,17 +30,6 @@ def cubic_weights(
 
 
 @compiled
-def curve_at(u: float, curve: Curve) -> tuple[float, float]:
-    """Return value and derivative at u; beyond the knots the curve is constant."""
-    knots, first, rate = curve
-    i, a, b, c, d = cubic_weights(u, first, rate, knots.shape[0])
-    value = a * knots[i, 0] + b * knots[i, 1] + c * knots[i + 1, 0] + d * knots[i + 1, 1]
-    i, a, b, c = slope_weights(u, first, rate, knots.shape[0])
-    slope = a * (knots[i + 1, 0] - knots[i, 0]) + b * knots[i, 1] + c * knots[i + 1, 1]
-    return value, slope
-
-
-@compiled
 def slope_weights(
     u: float, first: float, rate: float, count: int
 ) -> tuple[int, float, float, float]:
@@ -56,8 +44,19 @@ def slope_weights(
 
 
 @compiled
-def fill_curve(knots: Array, basis: Array, coefficients: Array) -> None:
-    """Fill a curve's knots from coefficients; basis has shape (knots, 2, functions)."""
+def flux_error_at(u: float, flux_error: FluxError) -> Pair:
+    """Return value and derivative at u; beyond the knots the curve is constant."""
+    knots, first, rate = flux_error
+    i, a, b, c, d = cubic_weights(u, first, rate, knots.shape[0])
+    value = a * knots[i, 0] + b * knots[i, 1] + c * knots[i + 1, 0] + d * knots[i + 1, 1]
+    i, a, b, c = slope_weights(u, first, rate, knots.shape[0])
+    slope = a * (knots[i + 1, 0] - knots[i, 0]) + b * knots[i, 1] + c * knots[i + 1, 1]
+    return value, slope
+
+
+@compiled
+def fill_knots(knots: Array, basis: Array, coefficients: Array) -> None:
+    """Fill the knots of a curve from coefficients; basis has shape (knots, 2, functions)."""
     for i in range(basis.shape[0]):
         for part in range(2):
             total = 0.0

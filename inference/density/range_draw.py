@@ -1,0 +1,128 @@
+"""Draws of a range from its density given everything else."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.density.range_integral import falls_off, integrate_range
+from inference.frame.arguments import FrameScene, Instrument, Rows, scene_of
+from inference.frame.blocks import Block, Data, block_of, is_empty
+from inference.frame.log_density import log_density
+from inference.frame.modes import (
+    LEFT,
+    LOG_MASS,
+    POSITION,
+    RIGHT,
+    SD,
+    TOP,
+    find_modes,
+    room_for_modes,
+)
+from inference.frame.range_prior import integration_bounds
+from inference.frame.table import tabulate
+from simulator.compiled import compiled
+
+__all__ = ["fill_range_draws"]
+
+Array = NDArray[np.float64]
+
+_SIDE = 40  # grid points on either side of a mode
+_FAR = 8.5  # standard deviations at which the grid ends where nothing is left
+_AT, _DENSITY = 0, 1  # columns of a grid
+_WHICH, _WHERE = 0, 1  # uniforms: for the mode, and for the place within it
+
+
+@compiled
+def _fill_grid(grid: Array, mode: Array, block: Block, scene: FrameScene) -> None:
+    """Fill a grid graded away from a mode's top, and the density on it."""
+    reach = _FAR * mode[SD] if mode[SD] < 1.0 and falls_off(mode, block, scene) else math.inf
+    for side in range(2):
+        sign = -1.0 if side == 0 else 1.0
+        length = mode[POSITION] - mode[LEFT] if side == 0 else mode[RIGHT] - mode[POSITION]
+        length = min(length, reach)
+        scale = min(mode[SD], length)
+        growth = math.asinh(length / scale) if scale > 0.0 else 0.0
+        for j in range(_SIDE + 1):
+            u = mode[POSITION] + sign * scale * math.sinh(growth * j / _SIDE)
+            k = _SIDE + (j if side == 1 else -j)
+            grid[k, _AT] = min(max(u, mode[LEFT]), mode[RIGHT])
+            excess = log_density(grid[k, _AT], block, scene) - mode[TOP]
+            grid[k, _DENSITY] = math.exp(min(excess, 50.0))
+
+
+@compiled
+def _invert(mode: Array, probability: float, grid: Array) -> float:
+    """Invert the cumulative density of a mode's interval."""
+    total = 0.0
+    for k in range(1, 2 * _SIDE + 1):
+        width = grid[k, _AT] - grid[k - 1, _AT]
+        total += 0.5 * width * (grid[k, _DENSITY] + grid[k - 1, _DENSITY])
+    if not total > 0.0:
+        return float(mode[POSITION])
+    wanted = probability * total
+    for k in range(1, 2 * _SIDE + 1):
+        width = grid[k, _AT] - grid[k - 1, _AT]
+        left, right = grid[k - 1, _DENSITY], grid[k, _DENSITY]
+        mass = 0.5 * width * (left + right)
+        if wanted <= mass or k == 2 * _SIDE:
+            # density linear in the cell: the root of a quadratic, in its stable form
+            wanted = min(wanted, mass)
+            if not mass > 0.0:
+                return float(grid[k - 1, _AT])
+            slope = (right - left) / width
+            root = math.sqrt(max(left * left + 2.0 * slope * wanted, 0.0))
+            return float(grid[k - 1, _AT] + 2.0 * wanted / (left + root))
+        wanted -= mass
+    return float(mode[POSITION])
+
+
+@compiled
+def _draw(
+    modes: Array, count: int, uniforms: Array, block: Block, scene: FrameScene, grid: Array
+) -> float:
+    """Draw log r of a block from its modes; nan where there is none."""
+    best, total = -math.inf, 0.0
+    for k in range(count):
+        best = max(best, modes[k, LOG_MASS])
+    for k in range(count):
+        total += math.exp(modes[k, LOG_MASS] - best)
+    left = uniforms[_WHICH] * total
+    for k in range(count):
+        mass = math.exp(modes[k, LOG_MASS] - best)
+        if left <= mass or k == count - 1:
+            _fill_grid(grid, modes[k], block, scene)
+            return _invert(modes[k], uniforms[_WHERE], grid)
+        left -= mass
+    return math.nan
+
+
+@compiled
+def fill_range_draws(
+    out: Array, uniforms: Array, rows: Rows, data: Data, instrument: Instrument
+) -> None:
+    """Draw the range of every block of frames under every parameter vector.
+
+    Parameters
+    ----------
+    out : ndarray, shape (n, blocks)
+        Filled with log r; nan for frames without object.
+    uniforms : ndarray, shape (n, blocks, 2)
+        Independent, on (0, 1).
+    rows, data, instrument
+        Parameters, frames and sensor.
+    """
+    grid = np.empty((2 * _SIDE + 1, 2))
+    for i in range(out.shape[0]):
+        scene = scene_of(rows, instrument, i)
+        table = tabulate(integration_bounds(scene.range_prior), scene, data.strongest)
+        values = np.empty(table.shape[1])
+        modes = room_for_modes(table)
+        for b in range(out.shape[1]):
+            out[i, b] = math.nan
+            if is_empty(data, b):
+                continue
+            block = block_of(data, b)
+            count = find_modes(modes, values, table, block, scene)
+            integrate_range(modes, count, block, scene)
+            out[i, b] = _draw(modes, count, uniforms[i, b], block, scene, grid)

@@ -1,0 +1,174 @@
+"""Frames in blocks: those of a block have one range in common.
+
+The frames of an object that moves are blocks of one; all frames of an object at rest are one block.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numba import extending
+from numpy.typing import NDArray
+
+from simulator.compiled import compiled
+
+__all__ = [
+    "FIRST",
+    "GAIN",
+    "SECOND",
+    "Block",
+    "Data",
+    "Frame",
+    "block_of",
+    "frame_count",
+    "frame_of",
+    "is_empty",
+    "one_block",
+    "own_blocks",
+]
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# columns of frames
+FIRST, SECOND, GAIN = 0, 1, 2
+
+
+class Frame(NamedTuple):
+    """Two readings [reading units] and the factor on the sensor's gain."""
+
+    first: float
+    second: float
+    gain: float
+
+
+class Block(NamedTuple):
+    """Frames that have one range in common.
+
+    Attributes
+    ----------
+    one : Frame or None
+        The frame of a block of one: numbers that need no memory.
+    many : ndarray, shape (frames, 3), or None
+        The frames of any other block.
+    """
+
+    one: Frame | None
+    many: Array | None
+
+
+class Data(NamedTuple):
+    """The frames that a kernel runs over.
+
+    Attributes
+    ----------
+    frames : ndarray, shape (n, 3)
+        As `Frame`.
+    present : ndarray of bool, shape (n,), or None
+        False where it is known that no object is there, the same within a block; None where one may
+        be in all frames.
+    starts : ndarray of int, shape (blocks + 1,), or None
+        First frame of each block, and last the number of frames; None where every frame is a block.
+    strongest : float
+        Largest gain factor of frames that may hold an object.
+    """
+
+    frames: Array
+    present: Flags | None
+    starts: NDArray[np.int64] | None
+    strongest: float
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks; for Python, not for kernels."""
+        return len(self.frames) if self.starts is None else len(self.starts) - 1
+
+
+def own_blocks(frames: Array, present: Flags | None) -> Data:
+    """Return every frame as a block of its own."""
+    return Data(frames, present, None, float(frames[:, GAIN].max()))
+
+
+def one_block(frames: Array, present: Flags | None) -> Data:
+    """Return all frames that may hold an object as one block, and behind it each of the others."""
+    seen = frames if present is None else frames[present]
+    count = max(len(seen), 1)
+    starts = np.concatenate([[0], np.arange(count, len(frames) + 1)])
+    if present is None:
+        return Data(frames, None, starts, float(frames[:, GAIN].max()))
+    order = np.argsort(~present, kind="stable")
+    strongest = float((seen if len(seen) else frames)[:, GAIN].max())
+    return Data(frames[order], present[order], starts, strongest)
+
+
+@compiled
+def frame_count(block: Block) -> int:
+    """Return the number of frames of a block."""
+    return _count(block.many)
+
+
+@compiled
+def _count(many: Array | None) -> int:
+    if many is not None:
+        return int(many.shape[0])
+    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
+        return 1
+
+
+@compiled
+def frame_of(block: Block, j: int) -> Frame:
+    """Return frame j of a block."""
+    return _frame(block.one, block.many, j)
+
+
+@compiled
+def _frame(one: Frame | None, many: Array | None, j: int) -> Frame:
+    if many is not None:
+        return Frame(many[j, FIRST], many[j, SECOND], many[j, GAIN])
+    else:  # noqa: RET505
+        return one  # type: ignore[return-value]
+
+
+@compiled
+def block_of(data: Data, b: int) -> Block:
+    """Return block b."""
+    return _block(data.frames, data.starts, b)
+
+
+def _block(frames: Array, starts: NDArray[np.int64] | None, b: int) -> Block:
+    if starts is None:
+        return Block(Frame(*frames[b].tolist()), None)
+    return Block(None, frames[starts[b] : starts[b + 1]])
+
+
+@extending.overload(_block, strict=False)
+def _compile_block(frames: Any, starts: Any, b: Any) -> Callable[..., Any]:  # noqa: ARG001
+    # the type of what is returned depends on that of an argument
+    if starts is numba.types.none:
+        return lambda frames, starts, b: Block(  # noqa: ARG005
+            Frame(frames[b, FIRST], frames[b, SECOND], frames[b, GAIN]), None
+        )
+    return lambda frames, starts, b: Block(None, frames[starts[b] : starts[b + 1]])
+
+
+@compiled
+def is_empty(data: Data, b: int) -> bool:
+    """Tell whether block b is known to hold no object."""
+    return _is_empty(data.present, data.starts, b)
+
+
+@compiled
+def _is_empty(present: Flags | None, starts: NDArray[np.int64] | None, b: int) -> bool:
+    if present is not None:
+        return not present[_start(starts, b)]
+    else:  # noqa: RET505
+        return False
+
+
+@compiled
+def _start(starts: NDArray[np.int64] | None, b: int) -> int:
+    if starts is not None:
+        return int(starts[b])
+    else:  # noqa: RET505
+        return b

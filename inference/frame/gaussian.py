@@ -1,0 +1,205 @@
+"""The density of a frame's readings about their means, from which nothing cancels.
+
+Where there is neither shot nor relative noise the readings are independent, and the machine code
+knows of nothing else.
+"""
+
+import math
+
+from inference.frame.arguments import Instrument, Pair
+from inference.frame.noise import NoiseParts, determinant, in_units, noise_of
+from simulator.compiled import compiled
+
+__all__ = [
+    "LOG_2PI",
+    "covariance_slope",
+    "empty_gaussian",
+    "gaussian",
+    "log_top",
+    "precision_times",
+    "squared_cross",
+]
+
+Triple = tuple[float, float, float]
+
+LOG_2PI = math.log(2 * math.pi)
+
+
+@compiled
+def gaussian(residual: Pair, mean: Pair, signal: Pair, instrument: Instrument) -> float:
+    """Return the log density of a residual, relative to the top of the read noise's density.
+
+    With independent noise parts determinant and chi-square are sums of squares: a common relative
+    error far above the read noise leaves the matrix near singular, but nothing cancels.
+    """
+    return _gaussian(residual, mean, signal, instrument, instrument.shot, instrument.relative)
+
+
+@compiled
+def empty_gaussian(residual: Pair, mean: Pair, instrument: Instrument) -> float:
+    """Return `gaussian` of a frame without object, which knows no relative error of its signal."""
+    return _gaussian(residual, mean, (0.0, 0.0), instrument, instrument.shot, None)
+
+
+@compiled
+def _gaussian(
+    residual: Pair,
+    mean: Pair,
+    signal: Pair,
+    instrument: Instrument,
+    shot: float | None,
+    relative: float | None,
+) -> float:
+    read = instrument.read
+    if shot is not None or relative is not None:
+        unit = read[1]
+        noise = in_units(noise_of(mean, signal, instrument), unit)
+        e1, e2 = residual[0] / unit, residual[1] / unit
+        area = determinant(noise)
+        turned = noise.common2 * e1 - noise.common1 * e2
+        square = noise.own2 * e1 * e1 + noise.own1 * e2 * e2
+        square = square + noise.shared * (e1 - e2) ** 2 + turned * turned
+        ratio = read[0] / unit
+        return -0.5 * square / area - 0.5 * math.log(area / ratio / ratio)
+    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
+        e1 = residual[0] / read[0]
+        e2 = residual[1] / read[1]
+        return -0.5 * (e1 * e1 + e2 * e2)
+
+
+@compiled
+def log_top(read: Pair) -> float:
+    """Return the log density of a zero residual under read noise alone."""
+    return -math.log(read[0]) - math.log(read[1]) - LOG_2PI
+
+
+@compiled
+def precision_times(vector: Pair, mean: Pair, signal: Pair, instrument: Instrument) -> Pair:
+    """Return the inverse covariance times a vector."""
+    return _precision_times(vector, mean, signal, instrument, instrument.shot, instrument.relative)
+
+
+@compiled
+def _precision_times(
+    vector: Pair,
+    mean: Pair,
+    signal: Pair,
+    instrument: Instrument,
+    shot: float | None,
+    relative: float | None,
+) -> Pair:
+    read = instrument.read
+    if shot is not None or relative is not None:
+        unit = read[1]
+        own1, own2, shared, s1, s2 = in_units(noise_of(mean, signal, instrument), unit)
+        t1, t2 = vector[0] / unit, vector[1] / unit
+        area = determinant(NoiseParts(own1, own2, shared, s1, s2))
+        turned = s2 * t1 - s1 * t2
+        return (
+            (own2 * t1 + shared * (t1 - t2) + s2 * turned) / area / unit,
+            (own1 * t2 + shared * (t2 - t1) - s1 * turned) / area / unit,
+        )
+    else:  # noqa: RET505
+        return vector[0] / read[0] / read[0], vector[1] / read[1] / read[1]
+
+
+@compiled
+def squared_cross(
+    first: Pair, second: Pair, mean: Pair, signal: Pair, instrument: Instrument
+) -> float:
+    """Return the squared cross product of two whitened vectors: of both readings, what is free."""
+    unit = instrument.read[1]
+    cross = (first[0] / unit) * (second[1] / unit) - (first[1] / unit) * (second[0] / unit)
+    return _squared(cross, mean, signal, instrument, instrument.shot, instrument.relative)
+
+
+@compiled
+def _squared(
+    cross: float,
+    mean: Pair,
+    signal: Pair,
+    instrument: Instrument,
+    shot: float | None,
+    relative: float | None,
+) -> float:
+    read = instrument.read
+    if shot is not None or relative is not None:
+        return cross * cross / determinant(in_units(noise_of(mean, signal, instrument), read[1]))
+    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
+        cross *= read[1] / read[0]
+        return cross * cross
+
+
+@compiled
+def _shot_slopes(mean: Pair, mean_slope: Pair, shot: float | None, pulsed: bool) -> Triple:
+    """Return the slopes of both own variances and of the shared one."""
+    if shot is not None:
+        d1 = shot * mean_slope[0] * math.copysign(1.0, mean[0])
+        d2 = shot * mean_slope[1] * math.copysign(1.0, mean[1])
+        shared = 0.0
+        if pulsed:
+            shared = d1 if abs(mean[0]) < abs(mean[1]) else d2
+        return d1 - shared, d2 - shared, shared
+    else:  # noqa: RET505
+        return 0.0, 0.0, 0.0
+
+
+@compiled
+def _common_slopes(signal_slope: Pair, relative: float | None) -> Pair:
+    """Return the slopes of the common error's standard deviations."""
+    if relative is not None:
+        return relative * signal_slope[0], relative * signal_slope[1]
+    else:  # noqa: RET505
+        return 0.0, 0.0
+
+
+@compiled
+def covariance_slope(
+    pull: Pair,
+    mean: Pair,
+    mean_slope: Pair,
+    signal: Pair,
+    signal_slope: Pair,
+    instrument: Instrument,
+) -> float:
+    """Return what the change of the covariance adds to the slope of the log density.
+
+    With w = V^-1 e it is (w^T V' w - tr(V^-1 V')) / 2, V' from the independent parts.
+    """
+    pulsed = instrument.wave is None
+    own = _shot_slopes(mean, mean_slope, instrument.shot, pulsed)
+    common = _common_slopes(signal_slope, instrument.relative)
+    return _covariance_slope(
+        pull, mean, signal, own, common, instrument, instrument.shot, instrument.relative
+    )
+
+
+@compiled
+def _covariance_slope(
+    pull: Pair,
+    mean: Pair,
+    signal: Pair,
+    own_slopes: Triple,
+    common_slopes: Pair,
+    instrument: Instrument,
+    shot: float | None,
+    relative: float | None,
+) -> float:
+    if shot is not None or relative is not None:
+        noise = noise_of(mean, signal, instrument)
+        own1, own2, shared, s1, s2 = noise
+        d1, d2, dk = own_slopes
+        t1, t2 = common_slopes
+        unit = instrument.read[1]
+        scale = determinant(in_units(noise, unit)) * unit * unit
+        p11 = (own2 + shared + s2 * s2) / unit / unit / scale
+        p22 = (own1 + shared + s1 * s1) / unit / unit / scale
+        p12 = -(shared + s1 * s2) / unit / unit / scale
+        w1, w2 = pull
+        square = d1 * w1 * w1 + d2 * w2 * w2 + dk * (w1 + w2) ** 2
+        square += 2.0 * (w1 * t1 + w2 * t2) * (w1 * s1 + w2 * s2)
+        q1, q2 = precision_times((s1, s2), mean, signal, instrument)
+        trace = d1 * p11 + d2 * p22 + dk * (p11 + 2.0 * p12 + p22) + 2.0 * (t1 * q1 + t2 * q2)
+        return 0.5 * (square - trace)
+    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
+        return 0.0

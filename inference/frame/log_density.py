@@ -1,0 +1,115 @@
+"""The density of frames along their range: what the collapsed likelihood integrates.
+
+Kernels take a block: the frames that have one range in common.
+"""
+
+import math
+
+from inference.frame.arguments import FrameScene, Pair, ReferencePrior
+from inference.frame.blocks import Block, frame_count, frame_of
+from inference.frame.gaussian import (
+    covariance_slope,
+    empty_gaussian,
+    gaussian,
+    log_top,
+    precision_times,
+)
+from inference.frame.mean_readings import readings_along, readings_at, with_surroundings
+from inference.frame.range_prior import log_range_density, prior_curvature, prior_slope
+from simulator.compiled import compiled
+
+__all__ = [
+    "empty_log_likelihood",
+    "log_density",
+    "log_resolution",
+    "slope_and_curvature",
+]
+
+_DIFFERENCE = 1e-3  # in log r, over which the resolution changes slowly
+
+
+@compiled
+def _information(u: float, gain: float, scene: FrameScene) -> float:
+    """Return the Fisher information of a frame on its log r."""
+    signal, _, mean, slope = readings_along(u, math.exp(u), gain, scene)
+    p1, p2 = precision_times(slope, mean, signal, scene.instrument)
+    return slope[0] * p1 + slope[1] * p2
+
+
+@compiled
+def log_resolution(
+    u: float, block: Block, scene: FrameScene, reference: ReferencePrior | None
+) -> float:
+    """Return log sqrt(1 + I), I the Fisher information of a block on its log r.
+
+    It is the density of the reference prior where the readings tell ranges apart, and that of a
+    log-uniform one where they do not; 0 for any other prior.
+    """
+    if reference is not None:
+        total = 0.0
+        for j in range(frame_count(block)):
+            frame = frame_of(block, j)
+            total += _information(u, frame.gain, scene)
+        return 0.5 * math.log1p(max(total, 0.0))
+    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
+        return 0.0
+
+
+@compiled
+def log_density(u: float, block: Block, scene: FrameScene) -> float:
+    """Return log p(readings, u | theta) of a block less `log_top` of each frame.
+
+    Parameters
+    ----------
+    u : float
+        log r.
+    block : Block
+        The frames.
+    scene : FrameScene
+        The parameters.
+    """
+    r, prior, total = math.exp(u), scene.range_prior, 0.0
+    for j in range(frame_count(block)):
+        frame = frame_of(block, j)
+        signal, mean = readings_at(u, r, frame.gain, scene)
+        residual = (frame.first - mean[0], frame.second - mean[1])
+        total += gaussian(residual, mean, signal, scene.instrument)
+    total += log_range_density(r, u, prior)
+    return total + log_resolution(u, block, scene, prior.reference)
+
+
+@compiled
+def slope_and_curvature(u: float, block: Block, scene: FrameScene) -> Pair:
+    """Return the slope of `log_density` along u and its Gauss-Newton curvature, never negative.
+
+    The curvature holds the covariance fixed.
+    """
+    r, prior, instrument = math.exp(u), scene.range_prior, scene.instrument
+    rise, bend = prior_slope(r, u, prior), 0.0
+    for j in range(frame_count(block)):
+        frame = frame_of(block, j)
+        signal, signal_slope, mean, slope = readings_along(u, r, frame.gain, scene)
+        e1, e2 = frame.first - mean[0], frame.second - mean[1]
+        p1, p2 = precision_times(slope, mean, signal, instrument)
+        pull = precision_times((e1, e2), mean, signal, instrument)
+        rise += e1 * p1 + e2 * p2
+        rise += covariance_slope(pull, mean, slope, signal, signal_slope, instrument)
+        bend += slope[0] * p1 + slope[1] * p2
+    ahead = log_resolution(u + _DIFFERENCE, block, scene, prior.reference)
+    behind = log_resolution(u - _DIFFERENCE, block, scene, prior.reference)
+    rise += (ahead - behind) / (2 * _DIFFERENCE)
+    of_logarithm, of_range = prior_curvature(r, prior)
+    return rise, bend + of_logarithm + of_range
+
+
+@compiled
+def empty_log_likelihood(block: Block, scene: FrameScene) -> float:
+    """Return the log density of frames of which it is known that no object is in them."""
+    total = 0.0
+    for j in range(frame_count(block)):
+        frame = frame_of(block, j)
+        mean = with_surroundings((0.0, 0.0), math.inf, frame.gain, scene)
+        residual = (frame.first - mean[0], frame.second - mean[1])
+        total += empty_gaussian(residual, mean, scene.instrument)
+        total += log_top(scene.instrument.read)
+    return total
