@@ -13,12 +13,14 @@ from inference.frame.range_prior import log_range_density
 from simulator.compiled import compiled
 
 __all__ = [
+    "KNOT_SPACING",
     "LOG_PRIOR",
     "LOG_RANGE",
     "MEAN_1",
     "MEAN_2",
     "SIGNAL_1",
     "SIGNAL_2",
+    "TURN",
     "tabulate",
 ]
 
@@ -28,10 +30,10 @@ Array = NDArray[np.float64]
 LOG_RANGE, LOG_PRIOR, SIGNAL_1, SIGNAL_2, MEAN_1, MEAN_2 = 0, 1, 2, 3, 4, 5
 _ROWS = 6
 
-_KNOT_SPACING = 0.0365  # 192 knots over the default prior's seven e-folds
+KNOT_SPACING = 0.0365  # 192 knots over the default prior's seven e-folds
 _FEWEST_KNOTS = 192
 _MOST_KNOTS = 16384
-_TURN = 0.7  # cosine of the largest turn of the curve at a knot
+TURN = 0.7  # cosine of the largest turn of the curve at a knot
 _VISIBLE = 0.3  # standard deviations of a reading below which a turn of the curve is not seen
 
 
@@ -73,7 +75,7 @@ def _too_coarse(
         length2 = x2 * x2 + y2 * y2
         along = x1 * x2 + y1 * y2
         if max(length1, length2) > _VISIBLE**2 and (
-            along <= 0.0 or along * along < _TURN**2 * length1 * length2
+            along <= 0.0 or along * along < TURN**2 * length1 * length2
         ):
             split[k - 1] = split[k - 1] or length1 > _VISIBLE**2
             split[k] = length2 > _VISIBLE**2
@@ -140,7 +142,7 @@ def tabulate(bounds: Pair, scene: FrameScene, strongest: float) -> Array:
         Instrument(r0, wave, read, shot, None),
         scene.flux_error,
     )
-    n = max(_FEWEST_KNOTS, math.ceil((bounds[1] - bounds[0]) / _KNOT_SPACING) + 1)
+    n = max(_FEWEST_KNOTS, math.ceil((bounds[1] - bounds[0]) / KNOT_SPACING) + 1)
     unit = (read[0] / strongest, read[1] / strongest)
     offset = _offset(scene.crosstalk, strongest)
     table = np.empty((_ROWS, n))

@@ -6,21 +6,24 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.frame.arguments import Background, RangePrior, Shape
+from inference.frame.arguments import (
+    Background,
+    FrameScene,
+    RangePrior,
+    Shape,
+    instrument_of,
+    prior_of,
+)
+from inference.frame.mean_readings import readings_along, with_surroundings
 from inference.frame.range_prior import integration_bounds, log_range_density
+from inference.frame.table import KNOT_SPACING, TURN
 from inference.tracking.observed import Observed
 from inference.tracking.places import Places, Scan, boxes_of
 from inference.tracking.readings_table import ReadingsTable
 from simulator.compiled import compiled
 from simulator.errors import RefusedError
 from simulator.parameters import Terms
-from simulator.readings import (
-    background_readings,
-    background_slopes,
-    object_readings,
-    object_slopes,
-)
-from simulator.sensor import PulsedSensor, Sensor, instrument
+from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = [
     "OBJECT",
@@ -33,7 +36,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-Pair = tuple[float, float]
 
 # columns of `means_over`: mean readings, their slopes, the object's part of both
 MEAN, SLOPE, OBJECT, OBJECT_SLOPE = (slice(k, k + 2) for k in range(0, 8, 2))
@@ -42,32 +44,18 @@ _FEWEST = 256
 _MOST = 1 << 16
 _ERROR = 0.01  # standard deviations of a reading by which the table may be wrong
 _RELATIVE_ERROR = 1e-11  # or this share of the reading, which no range feels
-_SCAN_SPACING = 0.0365
-_TURN = 0.7  # cosine of the largest turn of the curve at a scanned knot
 _VISIBLE = 0.1  # standard deviations of a reading below which a turn is not seen
 _DIFFERENCE = 3e-5  # of u, for second derivatives
 
 
 @compiled
-def _fill(
-    out: Array,
-    positions: Array,
-    r0: float,
-    wave: Pair | None,
-    shape: Shape,
-    background: Background | None,
-) -> None:
+def _fill(out: Array, positions: Array, scene: FrameScene) -> None:
     """Fill out (n, 8): mean readings, their derivatives along u, the object's part of both."""
     for k in range(positions.size):
-        r = math.exp(positions[k])
-        o1, o2 = object_readings(r, r0, wave, shape.strength, shape.c0, shape.c1)
-        d1, d2 = object_slopes(r, r0, wave, shape.strength, shape.c0, shape.c1)
-        out[k, 4], out[k, 5], out[k, 6], out[k, 7] = o1, o2, d1, d2
-        if background is not None:
-            b1, b2 = background_readings(r, r0, wave, background)
-            a1, a2 = background_slopes(r, r0, wave, background)
-            o1, o2, d1, d2 = o1 + b1, o2 + b2, d1 + a1, d2 + a2
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = o1, o2, d1, d2
+        here = readings_along(positions[k], math.exp(positions[k]), 1.0, scene)
+        parts = (here.mean, here.slope, here.signal, here.signal_slope)
+        for j, (first, second) in enumerate(parts):
+            out[k, 2 * j], out[k, 2 * j + 1] = first, second
 
 
 @compiled
@@ -95,29 +83,34 @@ def means_over(positions: Array, sensor: Sensor, terms: Terms, by_rate: bool) ->
     ndarray, shape (n, 8)
         Means, their derivatives along u, the object's part of both.
     """
-    c0, c1, c2 = terms.object[0].tolist()
-    background = None if terms.background is None else Background(*terms.background[0].tolist())
-    r0, wave = instrument(sensor)
-    out = np.empty((positions.size, 8))
-    shape = Shape(sensor.gain * c0 * c2, c0, c1)
-    _fill(out, positions, r0, wave, shape, background)
+    scene, out = _scene(sensor, terms), np.empty((positions.size, 8))
+    _fill(out, positions, scene)
     if not by_rate:
         return out
     low = np.maximum(positions - _DIFFERENCE, positions[0])
     high = np.minimum(positions + _DIFFERENCE, positions[-1])
     before, after = np.empty_like(out), np.empty_like(out)
-    _fill(before, low, r0, wave, shape, background)
-    _fill(after, high, r0, wave, shape, background)
-    second = (after[:, 2:4] - before[:, 2:4]) / (high - low)[:, None]
-    return np.column_stack([out[:, 2:4], second, np.zeros((positions.size, 4))])
+    _fill(before, low, scene)
+    _fill(after, high, scene)
+    second = (after[:, SLOPE] - before[:, SLOPE]) / (high - low)[:, None]
+    return np.column_stack([out[:, SLOPE], second, np.zeros((positions.size, 4))])
+
+
+def _scene(sensor: Sensor, terms: Terms) -> FrameScene:
+    """Return the first parameter vector without crosstalk, before a sensor without its noise."""
+    c0, c1, c2 = terms.object[0].tolist()
+    background = None if terms.background is None else Background(*terms.background[0].tolist())
+    shape, prior = Shape(sensor.gain * c0 * c2, c0, c1), prior_of(terms.ranges[0])
+    instrument = instrument_of(sensor)._replace(shot=None, relative=None)
+    return FrameScene(shape, None, background, prior, instrument, None)
 
 
 def empty_readings(sensor: Sensor, terms: Terms, by_rate: bool) -> Array:
     """Return the readings of an empty scene without crosstalk, shape (2,)."""
     if terms.background is None or by_rate:
         return np.zeros(2)
-    r0, wave = instrument(sensor)
-    return np.asarray(background_readings(math.inf, r0, wave, tuple(terms.background[0].tolist())))
+    scene = _scene(sensor, terms)
+    return np.asarray(with_surroundings((0.0, 0.0), math.inf, 1.0, scene))
 
 
 def _bounds(sensor: Sensor, law: RangePrior) -> tuple[float, float]:
@@ -202,11 +195,11 @@ def knots_of(
 def _scan_of(knots: Knots, by_rate: bool, rate_sd: float) -> NDArray[np.int64]:
     """Choose knots between which a frame's density has at most one maximum.
 
-    They are at most `_SCAN_SPACING` apart, and closer where the curve turns visibly; by rate a turn
+    They are at most `KNOT_SPACING` apart, and closer where the curve turns visibly; by rate a turn
     back of its direction counts. Returns their indices, ascending, both ends among them.
     """
     last = knots.positions.size - 1
-    stride = max(1, int(_SCAN_SPACING / knots.step))
+    stride = max(1, int(KNOT_SPACING / knots.step))
     chosen = np.unique(np.append(np.arange(0, last, stride), last))
     while True:
         values = knots.means[chosen, MEAN]
@@ -220,7 +213,7 @@ def _scan_of(knots: Knots, by_rate: bool, rate_sd: float) -> NDArray[np.int64]:
             steps = np.diff(values, axis=0)
         length = np.linalg.norm(steps, axis=1)
         along = np.einsum("ij,ij->i", steps[1:], steps[:-1])
-        turns = along < _TURN * length[1:] * length[:-1]
+        turns = along < TURN * length[1:] * length[:-1]
         turns &= np.maximum(length[1:], length[:-1]) > _VISIBLE
         split = np.zeros(length.size, dtype=bool)
         split[:-1] |= turns & (length[:-1] > _VISIBLE)
