@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.tracking.borrowed import borrowed
 from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import (
     CROSSTALK1,
@@ -82,6 +83,7 @@ def expect_empty(
     return Expected(log_density, surprise, m1, m2, noise)
 
 
+@borrowed
 @compiled
 def learn_empty(
     of: Hypotheses, frame: TrackedFrame, table: ReadingsTable, empty: Array, scratch: Scratch

@@ -12,7 +12,7 @@ from inference.tracking.mode_search import edge
 from inference.tracking.readings_table import ReadingsTable
 from simulator.compiled import compiled
 
-__all__ = ["PeakedMode", "integrate"]
+__all__ = ["Nodes", "PeakedMode", "integrate", "nodes_for"]
 
 Array = NDArray[np.float64]
 
@@ -35,10 +35,22 @@ class PeakedMode(NamedTuple):
     high: float
 
 
+class Nodes(NamedTuple):
+    """Distances from a mode, and the masses there; overwritten."""
+
+    aways: Array
+    masses: Array
+
+
+@compiled
+def nodes_for() -> Nodes:
+    """Return room for both sides of a mode."""
+    return Nodes(np.empty(2 * _INTERVALS + 2), np.empty(2 * _INTERVALS + 2))
+
+
 @compiled
 def _simpson(
-    aways: Array,
-    masses: Array,
+    nodes: Nodes,
     top: float,
     mode: PeakedMode,
     frame: TrackedFrame,
@@ -46,6 +58,7 @@ def _simpson(
     table: ReadingsTable,
 ) -> tuple[float, float, float]:
     """Fill distances from a mode and their masses; their sum, mean and standard deviation."""
+    aways, masses = nodes.aways, nodes.masses
     u, scale = mode.u, mode.scale
     begin = edge(u, top, mode.low, scale, frame, prior, table)
     end = edge(u, top, mode.high, scale, frame, prior, table)
@@ -77,6 +90,7 @@ def _divide(
     frame: TrackedFrame,
     prior: Prior,
     table: ReadingsTable,
+    nodes: Nodes,
 ) -> int:
     """Append one mode that is not near a Gaussian, as at folds and ends of the support.
 
@@ -85,8 +99,8 @@ def _divide(
     """
     u = mode.u
     top = log_density(u, frame, prior, table)
-    aways, masses = np.empty(2 * _INTERVALS + 2), np.empty(2 * _INTERVALS + 2)
-    total, mean, sd = _simpson(aways, masses, top, mode, frame, prior, table)
+    aways, masses = nodes.aways, nodes.masses
+    total, mean, sd = _simpson(nodes, top, mode, frame, prior, table)
     if not total > 0.0:
         return count
     if not sd > 0.0:
@@ -121,6 +135,7 @@ def integrate(
     frame: TrackedFrame,
     prior: Prior,
     table: ReadingsTable,
+    nodes: Nodes,
 ) -> int:
     """Append one mode between its valleys, with its log mass, mean and standard deviation.
 
@@ -143,6 +158,8 @@ def integrate(
         The mode.
     frame, prior, table
         As for `log_density`.
+    nodes : Nodes
+        Overwritten.
 
     Returns
     -------
@@ -166,4 +183,4 @@ def integrate(
             log_mass = top + math.log(mass * scale) + _LOG_ROOT_2PI
             one = TrackCandidate(log_mass, u + shift * scale, sd, u, parent)
             return add_candidate(to, count, one)
-    return _divide(to, count, parent, mode, frame, prior, table)
+    return _divide(to, count, parent, mode, frame, prior, table, nodes)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from inference.tracking.candidates import TrackCandidates
 from inference.tracking.frame_density import Prior, TrackedFrame, log_density
-from inference.tracking.mode_integration import PeakedMode, integrate
+from inference.tracking.mode_integration import Nodes, PeakedMode, integrate, nodes_for
 from inference.tracking.mode_search import ModeBracket, mode_by_differences, mode_of_plain
 from inference.tracking.places import Scan
 from inference.tracking.readings_table import ReadingsTable, nuisance_count
@@ -23,16 +23,18 @@ _REACH = 7.0  # standard deviations of a prediction that are searched
 
 
 class Scanned(NamedTuple):
-    """Places that were looked at, and the log density there; overwritten."""
+    """Places that were looked at, the log density there, and nodes; overwritten."""
 
     positions: Array
     densities: Array
+    nodes: Nodes
 
 
 @compiled
 def scanned_for(scan: Scan) -> Scanned:
     """Return room for all places of a scan and both ends."""
-    return Scanned(np.empty(scan.positions.size + 3), np.empty(scan.positions.size + 3))
+    size = scan.positions.size + 3
+    return Scanned(np.empty(size), np.empty(size), nodes_for())
 
 
 @compiled
@@ -112,7 +114,9 @@ def find_candidates(
         # with one knot within reach the curve is near straight over all of it
         start = min(max(position.centre, low), high)
         u, scale = _mode_within(ModeBracket(start, low, high), width, frame, prior, table)
-        return integrate(to, count, parent, PeakedMode(u, scale, low, high), frame, prior, table)
+        return integrate(
+            to, count, parent, PeakedMode(u, scale, low, high), frame, prior, table, scanned.nodes
+        )
     for j in range(points):
         logs[j] = log_density(at[j], frame, prior, table)
     valley = 0
@@ -128,5 +132,5 @@ def find_candidates(
         u, scale = _mode_within(bracket, width, frame, prior, table)
         mode = PeakedMode(u, scale, at[valley], at[last])
         valley = last
-        count = integrate(to, count, parent, mode, frame, prior, table)
+        count = integrate(to, count, parent, mode, frame, prior, table, scanned.nodes)
     return count

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.tracking.borrowed import borrowed
 from inference.tracking.frame_density import Added, Position, Prior, Rate
 from inference.tracking.hypotheses import (
     ANCHOR,
@@ -33,6 +34,7 @@ Array = NDArray[np.float64]
 _LOG_2PI = math.log(2.0 * math.pi)
 
 
+@borrowed
 @compiled
 def predict(seconds: float, of: Hypotheses, rules: Rules, work: Array) -> None:
     """Predict everything to the time of the next frame.
@@ -120,12 +122,7 @@ def _rate_given_u(of: Hypotheses, row: int, precision: float) -> Rate:
     return Rate(of.x[row, V], slope, math.sqrt(square))
 
 
-@compiled
-def _spread(of: Hypotheses) -> Array:
-    """Return the root of the crosstalk's covariance in the empty scene."""
-    return of.X[0, of.X.shape[1] - 2 :]
-
-
+@borrowed
 @compiled
 def prior_of(
     of: Hypotheses, row: int, gain: float, log_weight: float, table: ReadingsTable
@@ -161,12 +158,13 @@ def prior_of(
         rate = _rate_given_u(of, row, precision)
     return Prior(
         Position(False, x[row, U], precision, log_scale),
-        Added(offset1, offset2, slope1, slope2, root, _spread(of)),
+        Added(offset1, offset2, slope1, slope2, root, of.X[0, of.X.shape[1] - 2 :]),
         rate,
         share,
     )
 
 
+@borrowed
 @compiled
 def born_prior(of: Hypotheses, log_weight: float, rate_sd: float, table: ReadingsTable) -> Prior:
     """Return what is known of an object that has just come: the prior of ranges, and crosstalk.
@@ -192,7 +190,7 @@ def born_prior(of: Hypotheses, log_weight: float, rate_sd: float, table: Reading
             root = add_factor(root, of.X[0, CROSSTALK1, j], of.X[0, CROSSTALK2, j])
     return Prior(
         Position(True, 0.0, 0.0, log_weight),
-        Added(offset1, offset2, 0.0, 0.0, root, _spread(of)),
+        Added(offset1, offset2, 0.0, 0.0, root, of.X[0, of.X.shape[1] - 2 :]),
         Rate(0.0, 0.0, rate_sd),
         0.0,
     )

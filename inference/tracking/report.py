@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import Status
+from inference.tracking.borrowed import borrowed
 from inference.tracking.hypotheses import (
     COUNT,
     CROSSTALK1,
@@ -114,6 +115,7 @@ def _sort_in(rows: Array, of: Hypotheses, count: int) -> None:
         _describe(rows[at], of, j)
 
 
+@borrowed
 @compiled
 def report(out: Array, rows: Array, i: int, of: Hypotheses, unique_above: float) -> None:
     """Describe the state after frame i.

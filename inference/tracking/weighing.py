@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.tracking.borrowed import borrowed
 from inference.tracking.candidates import (
     NEW,
     TrackCandidate,
@@ -230,6 +231,7 @@ def _take_over(of: Hypotheses, after: Hypotheses, count: int, total: float) -> N
     of.numbers[COUNT] = count
 
 
+@borrowed
 @compiled
 def weigh_frame(
     frame: TrackedFrame, of: Hypotheses, model: Model, room: Room, full: bool
