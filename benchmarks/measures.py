@@ -250,7 +250,9 @@ MEASURES: dict[str, Callable[[Tree], list[str]]] = {
     "Jacobian of the readings (slope kernels, or 2 r + c1)": jacobians,
     "opening rows of parameters (crosstalks, backgrounds)": row_loops,
     "sequential Monte Carlo (files that define *temper*)": _files_defining("temper"),
-    "multistart (files that define find_optima)": _files_defining("^find_optima$"),
+    "multistart (files that define find_optima or find_maxima)": _files_defining(
+        "^find_(optima|maxima)$"
+    ),
     "functions of 10 or more arguments in inference": long_argument_lists,
     "lines of inference with a bare index 2 to 9": bare_indices,
     "list[Any] spread over arguments": splats,
@@ -271,7 +273,7 @@ def main(arguments: list[str]) -> None:
     trees = [Tree(path) for path in (given.against, given.path) if path is not None]
     for title, measure in MEASURES.items():
         found = [measure(tree) for tree in trees]
-        print(f"{title:58}" + "".join(f"{len(places):>8}" for places in found))
+        print(f"{title:60}" + "".join(f"{len(places):>8}" for places in found))
         if given.where and measure is not lines:
             for mark, places in zip("+-", reversed(found), strict=False):
                 for place in places:
