@@ -1,8 +1,8 @@
 """Kernels that only look into arrays which others own, and need not count who does.
 
-A named tuple of arrays costs two atomic operations an array and a call, which is half of the time
-of a frame. A borrowed kernel and all that it
-calls make no array, and none that it returns is kept by a kernel that counts.
+A named tuple of arrays costs two atomic operations an array and a call, which was half of the time
+of a frame. A borrowed kernel and all that it calls make no array, and none that it returns is kept
+by a kernel that counts. Each says so itself: one that was compiled before keeps what it was.
 """
 
 from collections.abc import Callable

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.tracking.borrowed import borrowed
 from inference.tracking.readings_table import (
     FIRST,
     LOG_PRIOR,
@@ -118,6 +119,7 @@ def _add_at(root: Root, u: float, gain: float, added: Added, table: ReadingsTabl
     return root
 
 
+@borrowed
 @compiled
 def log_density(u: float, frame: TrackedFrame, prior: Prior, table: ReadingsTable) -> float:
     """Return log p(readings, u), the log of 2 pi per reading left out.

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.tracking.borrowed import borrowed
 from inference.tracking.candidates import TrackCandidate
 from inference.tracking.frame_density import Prior, TrackedFrame
 from inference.tracking.hypotheses import (
@@ -81,6 +82,7 @@ def _of_derivatives(
     return Linear(e1, e2, by_u1, by_u2, t.value1, t.value2, UNIT)
 
 
+@borrowed
 @compiled
 def _of_readings(
     of: Hypotheses,
@@ -126,6 +128,7 @@ def _take_moments(of: Hypotheses, row: int, mean: float, sd: float) -> None:
             X[row, i, j] += slope * stretch * X[row, U, j]
 
 
+@borrowed
 @compiled
 def learn(
     of: Hypotheses,

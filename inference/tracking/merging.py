@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.tracking.borrowed import borrowed
 from inference.tracking.hypotheses import Hypotheses, U, V, copy
 from inference.tracking.square_root import triangularise
 from simulator.compiled import compiled
@@ -16,6 +17,7 @@ Array = NDArray[np.float64]
 _UNLIKE = 1.0  # nats at which hypotheses are no longer merged for want of room
 
 
+@borrowed
 @compiled
 def merge(of: Hypotheses, into: int, other: int, share: float, first: int, work: Array) -> None:
     """Replace one hypothesis by the mean and covariance of two.
@@ -78,6 +80,7 @@ def _log_determinant(of: Hypotheses, one: int, other: int, share: float) -> floa
     return math.log(p11 * rest) if p11 * rest > 0.0 else -math.inf
 
 
+@borrowed
 @compiled
 def _loss(of: Hypotheses, heavy: int, light: int, share: float) -> float:
     """Return the bound of the information that a merger loses [nats] (Runnalls 2007)."""
@@ -87,6 +90,7 @@ def _loss(of: Hypotheses, heavy: int, light: int, share: float) -> float:
     return 0.5 * (both - (1.0 - share) * one - share * other)
 
 
+@borrowed
 @compiled
 def _replace(of: Hypotheses, row: int, other: int) -> None:
     """Put one hypothesis in the place of another."""
@@ -94,6 +98,7 @@ def _replace(of: Hypotheses, row: int, other: int) -> None:
     copy(of, row, of, other)
 
 
+@borrowed
 @compiled
 def _drop_lightest(of: Hypotheses, count: int) -> int:
     """Drop the lightest of the hypotheses in rows 1 to count; how many are left."""
@@ -105,6 +110,7 @@ def _drop_lightest(of: Hypotheses, count: int) -> int:
     return count - 1
 
 
+@borrowed
 @compiled
 def merge_equals(of: Hypotheses, count: int, same: float, work: Array) -> int:
     """Merge hypotheses that say the same.
@@ -148,6 +154,7 @@ def merge_equals(of: Hypotheses, count: int, same: float, work: Array) -> int:
     return count
 
 
+@borrowed
 @compiled
 def prune(of: Hypotheses, count: int, room: int, same: float, work: Array) -> int:
     """Merge equals, then what is more and more unlike, then drop, until all have room.

@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple
 
+from inference.tracking.borrowed import borrowed
 from inference.tracking.frame_density import Prior, TrackedFrame, expected_at, log_density
 from inference.tracking.readings_table import ReadingsTable
 from inference.tracking.roots import Root
@@ -22,6 +23,7 @@ class ModeBracket(NamedTuple):
     high: float
 
 
+@borrowed
 @compiled
 def mode_of_plain(
     bracket: ModeBracket, frame: TrackedFrame, prior: Prior, root: Root, table: ReadingsTable
@@ -74,6 +76,7 @@ def mode_of_plain(
     return u, 1.0 / math.sqrt(curvature) if curvature > 0.0 else high - low
 
 
+@borrowed
 @compiled
 def mode_by_differences(
     bracket: ModeBracket, scale: float, frame: TrackedFrame, prior: Prior, table: ReadingsTable
@@ -135,6 +138,7 @@ def mode_by_differences(
     return u, scale
 
 
+@borrowed
 @compiled
 def edge(
     u: float,

@@ -14,6 +14,7 @@ motion tells range and crosstalk apart.
 
 from typing import NamedTuple
 
+from inference.tracking.borrowed import borrowed
 from inference.tracking.hypotheses import (
     ANCHOR,
     CROSSTALK1,
@@ -94,6 +95,7 @@ def certainty(of: Hypotheses, row: int) -> float:
     return square / (square + variance_of(of, row, V)) if square > 0.0 else 0.0
 
 
+@borrowed
 @compiled
 def straighten(
     of: Hypotheses, row: int, gain: float, slope1: float, slope2: float, table: ReadingsTable
@@ -126,6 +128,7 @@ def straighten(
     return Shared(back1, back2, turn1, turn2, x[row, CROSSTALK1], x[row, CROSSTALK2])
 
 
+@borrowed
 @compiled
 def follow(of: Hypotheses, row: int, shared: Shared, gain: float, table: ReadingsTable) -> None:
     """Undo `straighten` after an update, and bring the anchor to where the object is now.

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.tracking.borrowed import borrowed
 from inference.tracking.hypotheses import CROSSTALK1, CROSSTALK2, Hypotheses, Scratch, U, V
 from inference.tracking.motion import Motion
 from inference.tracking.readings_table import FIRST, SECOND
@@ -52,6 +53,7 @@ def triangularise(work: Array, first: int, rows: int, columns: int) -> None:
                 work[k, j] = cosine * right - sine * left
 
 
+@borrowed
 @compiled
 def move(of: Hypotheses, row: int, motion: Motion, work: Array) -> None:
     """Let time pass for one hypothesis.
@@ -88,6 +90,7 @@ def move(of: Hypotheses, row: int, motion: Motion, work: Array) -> None:
             X[row, i, j] = work[i, j]
 
 
+@borrowed
 @compiled
 def update(of: Hypotheses, row: int, readings: Linear, scratch: Scratch) -> float:
     """Learn from two readings that are linear in the hypothesis.
