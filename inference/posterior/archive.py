@@ -19,8 +19,8 @@ from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.selection.models import Candidate
 from inference.posterior.selection.selection import Decision, Selection
 from inference.posterior.stages.stage import (
-    Known,
     Selecting,
+    Settled,
     Starting,
     Tempering,
     Walking,
@@ -70,7 +70,7 @@ _PARTS = {
         Decision,
         Ensemble,
         Frames,
-        Known,
+        Settled,
         Mixture,
         Population,
         Proposal,

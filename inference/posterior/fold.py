@@ -26,9 +26,9 @@ from inference.posterior.stages import selecting, tempering, walking
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.selecting import AssessTask, sampled
 from inference.posterior.stages.stage import (
-    Known,
     Progress,
     Selecting,
+    Settled,
     Starting,
     Tempering,
     Walking,
@@ -106,7 +106,7 @@ def tasks(job: Job, checkpoint: Checkpoint, wall_s: float = 0.0) -> tuple[Task, 
             return tempering.tasks(sampled(job, checkpoint), stage)
         case Walking() as stage:
             return walking.tasks(sampled(job, checkpoint), stage)
-        case Weighted() | Known():
+        case Weighted() | Settled():
             return ()
 
 
@@ -133,7 +133,7 @@ def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoi
             ensembles = _all(Ensemble, pieces)
             after, used = walking.merge(sampled(job, checkpoint), stage, ensembles)
             return Checkpoint(after, calls + used, selection)
-        case Weighted() | Known():
+        case Weighted() | Settled():
             raise ValueError("the job is finished: there is nothing to take in")
 
 

@@ -9,7 +9,7 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.proposal import Mixture
 from inference.posterior.sampling.verdict import Chains
-from inference.posterior.stages.stage import Drawing, Known, Tempering, Walking, Weighted
+from inference.posterior.stages.stage import Drawing, Settled, Tempering, Walking, Weighted
 
 __all__ = ["Sample", "sample_of"]
 
@@ -85,7 +85,7 @@ def sample_of(density: CollapsedDensity, stage: Drawing, rng: np.random.Generato
             keep = rng.choice(len(weighted.z), size=len(weighted.z), p=weighted.weights)
             z, log_density = weighted.z[keep], weighted.log_density[keep]
             return _lined_up(z, log_density, stage.optima, weighted)
-        case Known():
+        case Settled():
             z, optima = np.empty((_NOTHING_DRAWN, 0)), None
         case _:
             # stopped before the first chunk: the starts are all there is

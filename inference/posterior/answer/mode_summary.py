@@ -4,7 +4,7 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.answer.posterior import JointMode
 from inference.posterior.answer.shares import share_error, weighted_share_error
 from inference.posterior.sample import Sample
-from inference.posterior.stages.stage import Drawing, Known, Weighted
+from inference.posterior.stages.stage import Drawing, Settled, Weighted
 
 __all__ = ["mode_summary"]
 
@@ -28,7 +28,7 @@ def mode_summary(
     tuple of JointMode
         In the order of the optima; none where nothing is unknown.
     """
-    if isinstance(stage, Known):
+    if isinstance(stage, Settled):
         return ()
     optima = stage.optima if isinstance(stage, Weighted) else stage.proposal.optima
     natural = density.parameters.natural(optima.centres)

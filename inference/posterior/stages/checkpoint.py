@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.posterior.selection.selection import Selection
-from inference.posterior.stages.stage import Known, Stage, Weighted
+from inference.posterior.stages.stage import Settled, Stage, Weighted
 
 __all__ = ["Checkpoint"]
 
@@ -33,7 +33,7 @@ class Checkpoint:
     @property
     def method(self) -> str:
         """Whether draws are weighted ("importance") or walked ("emcee")."""
-        return "importance" if isinstance(self.stage, Weighted | Known) else "emcee"
+        return "importance" if isinstance(self.stage, Weighted | Settled) else "emcee"
 
     def to_bytes(self) -> bytes:
         """Return the checkpoint for a store."""

@@ -3,7 +3,7 @@
 ::
 
     Selecting -> Starting -+-> Weighted
-                           +-> Known
+                           +-> Settled
                            +-> Tempering -> Walking
                            +-> Walking -> (Tempering -> Walking)
 
@@ -22,9 +22,9 @@ from inference.posterior.sampling.verdict import Chains, Verdict, chains_of
 __all__ = [
     "MOST_STEPS",
     "Drawing",
-    "Known",
     "Progress",
     "Selecting",
+    "Settled",
     "Stage",
     "Starting",
     "Tempering",
@@ -56,29 +56,26 @@ class Progress:
     finished: bool
 
 
-_NOT_BEGUN = Progress(0, MOST_STEPS, None, None, False)
+class _NotBegun:
+    """A stage before the first step."""
+
+    def progress(self, _: int) -> Progress:
+        """Tell how far this is."""
+        return Progress(0, MOST_STEPS, None, None, False)
 
 
 @dataclasses.dataclass(frozen=True)
-class Selecting:
+class Selecting(_NotBegun):
     """It is being decided which optional terms stay."""
 
-    def progress(self, _: int) -> Progress:
-        """Tell how far this is."""
-        return _NOT_BEGUN
-
 
 @dataclasses.dataclass(frozen=True)
-class Starting:
+class Starting(_NotBegun):
     """It is decided which optional terms stay; starting points come next."""
-
-    def progress(self, _: int) -> Progress:
-        """Tell how far this is."""
-        return _NOT_BEGUN
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Tempering:
+class Tempering(_NotBegun):
     """Populations are on their way from the prior to the posterior: the Laplace shapes misfit.
 
     Attributes
@@ -94,10 +91,6 @@ class Tempering:
     proposal: Proposal
     populations: tuple[Population | None, ...]
     verdict: Verdict
-
-    def progress(self, _: int) -> Progress:
-        """Tell how far this is."""
-        return _NOT_BEGUN
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -174,8 +167,8 @@ class Weighted:
 
 
 @dataclasses.dataclass(frozen=True)
-class Known:
-    """Nothing is unknown but the ranges."""
+class Settled:
+    """Nothing is unknown but the ranges: there is nothing to sample."""
 
     @property
     def verdict(self) -> Verdict:
@@ -187,5 +180,5 @@ class Known:
         return Progress(0, 0, None, None, True)
 
 
-Drawing = Tempering | Walking | Weighted | Known
+Drawing = Tempering | Walking | Weighted | Settled
 Stage = Selecting | Starting | Drawing

@@ -18,7 +18,7 @@ from inference.posterior.sampling.start import Optimum, climb, find_optima, refi
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.ensembles import POPULATIONS, new_ensembles
-from inference.posterior.stages.stage import Drawing, Known, Tempering, Walking, Weighted
+from inference.posterior.stages.stage import Drawing, Settled, Tempering, Walking, Weighted
 from inference.posterior.streams import Stream
 from simulator.errors import RefusedError
 
@@ -73,7 +73,7 @@ def begin(job: Job) -> tuple[Drawing, int]:
     if len(density.parameters) == 0:
         if not np.isfinite(density(np.empty((1, 0)))[0]):
             raise RefusedError("no range allowed by the scene explains every frame")
-        return Known(), 1
+        return Settled(), 1
     optima, scouted, calls = _optima(job, density)
     if not optima:
         raise RefusedError(

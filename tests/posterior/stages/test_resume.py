@@ -9,8 +9,8 @@ from inference.posterior import fold
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages import chunk
 from inference.posterior.stages.stage import (
-    Known,
     Selecting,
+    Settled,
     Starting,
     Tempering,
     Walking,
@@ -51,7 +51,7 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any], str, int, int, tuple[type
         1,
         (Weighted,),
     ),
-    "known": ({}, {"object": OBJECT}, "emcee", 20, 1, (Known,)),
+    "known": ({}, {"object": OBJECT}, "emcee", 20, 1, (Settled,)),
 }
 
 
