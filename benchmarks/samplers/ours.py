@@ -13,7 +13,7 @@ from inference.posterior import fold
 from inference.posterior.job import Job
 from inference.posterior.sampling.importance import draw_weighted
 from inference.posterior.sampling.proposal import Proposal, mixture_of
-from inference.posterior.sampling.shear import shear_of
+from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.start import Optimum
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.stages.stage import Walking
@@ -55,7 +55,10 @@ def reference(
     rng = np.random.default_rng(job.seed + 2000)
     pilot = outcome.z[rng.integers(0, len(outcome.z), 20_000)]
     weighted = draw_weighted(
-        density, Proposal(mixture_of(optima), fit_map(pilot, shear_of(density)), 1.0), rng, 30_000
+        density,
+        Proposal(mixture_of(optima), fit_map(pilot, reparametrisation_of(density)), 1.0),
+        rng,
+        30_000,
     )
     if weighted.k_hat < 0.7:
         z, w = weighted.z, weighted.weights

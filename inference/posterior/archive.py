@@ -13,7 +13,7 @@ from inference.posterior.sampling.ensemble import Ensemble
 from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.proposal import Mixture, Proposal
-from inference.posterior.sampling.shear import Shear
+from inference.posterior.sampling.reparametrisation import Reparametrisation
 from inference.posterior.sampling.transport import TriangularMap
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.selection.models import Candidate
@@ -76,7 +76,7 @@ _PARTS = {
         Proposal,
         Selecting,
         Selection,
-        Shear,
+        Reparametrisation,
         Starting,
         Tempering,
         TriangularMap,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.proposal import log_student, student
-from inference.posterior.sampling.shear import shear_of
+from inference.posterior.sampling.reparametrisation import reparametrisation_of
 
 __all__ = ["Effort", "Move", "effort_of", "scouts"]
 
@@ -83,7 +83,7 @@ def effort_of(density: CollapsedDensity) -> Effort:
     that hardly moves does not find them again. Half of it is enough for a whole quadratic map.
     """
     d = len(density.parameters)
-    easy = shear_of(density) is None
+    easy = reparametrisation_of(density) is None
     size, wanted = (384, 1.0) if easy else (12 * d * (d + 1), 3.0)
     return Effort(size, wanted, 20.0, (_jump, _jump, _jump, _evolve), True)
 

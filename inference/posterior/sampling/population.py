@@ -18,7 +18,7 @@ from scipy import optimize
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.effort import Effort, Move
-from inference.posterior.sampling.shear import shear_of
+from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.transport import TriangularMap, fit_map, straight_map
 
 __all__ = ["Population", "carried", "first_population", "temper"]
@@ -196,7 +196,7 @@ def temper(
     Population
         Its power is 1 when it has arrived.
     """
-    shear = shear_of(density) if effort.unbends else None
+    coordinates = reparametrisation_of(density) if effort.unbends else None
     population = _resampled(population, effort.size, rng)
     wanted = 1.0 if population.power < _HOT else effort.wanted
     if population.power == 1.0:
@@ -209,7 +209,7 @@ def temper(
         turn = sweep % len(effort.moves)
         if turn == 0:
             members = [population.z[part] for part in parts]
-            maps = [fit_map(z, shear) if effort.unbends else straight_map(z) for z in members]
+            maps = [fit_map(z, coordinates) if effort.unbends else straight_map(z) for z in members]
         for moving, still, transport in zip(parts, parts[::-1], maps[::-1], strict=True):
             population, moved = _sweep(
                 density,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from inference.density.triangular import update_factor
-from inference.posterior.sampling.shear import Shear
+from inference.posterior.sampling.reparametrisation import Reparametrisation
 from simulator.compiled import compiled
 
 __all__ = ["TriangularMap", "fit_map", "straight_map"]
@@ -112,7 +112,7 @@ class TriangularMap:
         Coefficients of each coordinate's log scale, at most quadratic.
     cubic : int
         Widest coordinates that have cubic terms in the means.
-    shear : Shear or None
+    reparametrisation : Reparametrisation or None
         Applied before all of this; None where nothing is confounded.
     """
 
@@ -122,7 +122,7 @@ class TriangularMap:
     means: Array
     scales: Array
     cubic: int
-    shear: Shear | None = None
+    reparametrisation: Reparametrisation | None = None
 
     @property
     def _log_volume(self) -> float:
@@ -130,8 +130,8 @@ class TriangularMap:
 
     def unbend(self, z: Array) -> tuple[Array, Array]:
         """Return x of shape (n, d) and log |dx/dz| of shape (n,)."""
-        if self.shear is not None:
-            z = self.shear.forward(z)
+        if self.reparametrisation is not None:
+            z = self.reparametrisation.forward(z)
         # the axes are orthogonal: their inverse is their transpose, rescaled
         inverse = self.axes / np.einsum("ij,ij->j", self.axes, self.axes)
         whitened = np.einsum("nj,jk->nk", z - self.centre, inverse)
@@ -154,7 +154,9 @@ class TriangularMap:
             self.cubic,
         )
         z = self.centre + np.einsum("nk,jk->nj", whitened, self.axes)
-        return (z if self.shear is None else self.shear.backward(z)), log_det
+        return (
+            z if self.reparametrisation is None else self.reparametrisation.backward(z)
+        ), log_det
 
 
 def _features(w: Array, k: int, quadratic: bool, cubic: int) -> Array:
@@ -210,14 +212,14 @@ def straight_map(draws: Array) -> TriangularMap:
     return TriangularMap(centre, axes, np.zeros((2, d)), nothing, nothing, 0, None)
 
 
-def fit_map(draws: Array, shear: Shear | None = None) -> TriangularMap:
+def fit_map(draws: Array, reparametrisation: Reparametrisation | None = None) -> TriangularMap:
     """Fit the map that makes a sample nearly standard normal.
 
     Parameters
     ----------
     draws : ndarray, shape (n, d)
         n > d, not all equal; duplicates count as often as they stand there.
-    shear : Shear, optional
+    reparametrisation : Reparametrisation, optional
         Coordinates that the map starts from.
 
     Returns
@@ -225,8 +227,8 @@ def fit_map(draws: Array, shear: Shear | None = None) -> TriangularMap:
     TriangularMap
     """
     n, d = draws.shape
-    if shear is not None:
-        draws = shear.forward(draws)
+    if reparametrisation is not None:
+        draws = reparametrisation.forward(draws)
     centre, axes = _principal_axes(draws)
     whitened = (draws - centre) @ (axes / np.einsum("ij,ij->j", axes, axes))
     rest = n // _POINTS - math.comb(d + 1, 2)
@@ -249,4 +251,4 @@ def fit_map(draws: Array, shear: Shear | None = None) -> TriangularMap:
         means[k, : mean.size] = mean
         scales[k, : scale.size] = scale
     bounds = _BEYOND * np.array([whitened.min(axis=0), whitened.max(axis=0)])
-    return TriangularMap(centre, axes, bounds, means, scales, cubic, shear)
+    return TriangularMap(centre, axes, bounds, means, scales, cubic, reparametrisation)

@@ -9,7 +9,7 @@ from inference.posterior.job import Job
 from inference.posterior.sampling.effort import effort_of
 from inference.posterior.sampling.ensemble import WALKERS
 from inference.posterior.sampling.population import Population, first_population, temper
-from inference.posterior.sampling.shear import shear_of
+from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.stages.chunk import evaluations
 from inference.posterior.stages.ensembles import MAP_SHARE, new_ensembles
@@ -109,7 +109,7 @@ def _set_out(job: Job, stage: Tempering, arrived: list[Population]) -> Walking:
     starts = [np.empty((0, len(density.parameters)))] * count
     if arrived:
         members = [population.z for population in arrived]
-        transport = fit_map(np.concatenate(members), shear_of(density))
+        transport = fit_map(np.concatenate(members), reparametrisation_of(density))
         proposal = dataclasses.replace(proposal, transport=transport, share=MAP_SHARE)
         orders = [job.stream(Stream.MEMBERS, k).permutation(len(z)) for k, z in enumerate(members)]
         sharing = -(-(count - 1) // len(members))

@@ -14,7 +14,7 @@ from inference.posterior.sampling.diagnostics import (
 )
 from inference.posterior.sampling.ensemble import WALKERS, Ensemble, advance, restart
 from inference.posterior.sampling.proposal import Proposal
-from inference.posterior.sampling.shear import shear_of
+from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.sampling.verdict import Chains, Verdict, judge
 from inference.posterior.stages.chunk import steps_from
@@ -123,7 +123,7 @@ def _adapted(job: Job, stage: Walking, kept: Chains) -> Tempering | Walking:
         return Tempering(old, (None,) * POPULATIONS, pending)
     flat = kept.z.reshape(-1, kept.z.shape[-1])
     pilot = flat[np.linspace(0, len(flat) - 1, min(len(flat), _PILOT_DRAWS)).astype(int)]
-    transport = fit_map(pilot, shear_of(job.density()))
+    transport = fit_map(pilot, reparametrisation_of(job.density()))
     new = dataclasses.replace(old, transport=transport, share=MAP_SHARE)
     restarted = tuple(restart(ensemble, old, new) for ensemble in stage.ensembles)
     return Walking(new, restarted, pending, stage.adaptations + 1)

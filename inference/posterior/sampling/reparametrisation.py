@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from simulator.readings import background_readings
 
-__all__ = ["Shear", "shear_of"]
+__all__ = ["Reparametrisation", "reparametrisation_of"]
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ _STEP = 1e-3
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Shear:
+class Reparametrisation:
     """Coordinates y: z, but the static light in place of each unknown crosstalk.
 
     y = z + rate B(z) f(z), B and f interpolated between knots. Volumes stay as they are, and it can
@@ -74,8 +74,8 @@ class Shear:
         return z
 
 
-def shear_of(density: CollapsedDensity) -> Shear | None:
-    """Return the shear of a scene; None where crosstalk or the background's strength is known.
+def reparametrisation_of(density: CollapsedDensity) -> Reparametrisation | None:
+    """Return that of a scene; None where crosstalk or the background's strength is known.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def shear_of(density: CollapsedDensity) -> Shear | None:
 
     Returns
     -------
-    Shear or None
+    Reparametrisation or None
     """
     parameters = density.parameters
     names = list(parameters.names)
@@ -109,7 +109,7 @@ def shear_of(density: CollapsedDensity) -> Shear | None:
     ends = np.zeros((2, len(names)))
     ends[:, columns] = [[-_STEP], [_STEP]]
     low, high = parameters.natural(ends)[:, columns]
-    return Shear(
+    return Reparametrisation(
         columns,
         2.0 * _STEP / (high - low),
         strength,

@@ -7,7 +7,7 @@ import pytest
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.archive import pack_parts, unpack_parts
-from inference.posterior.sampling.shear import Shear, shear_of
+from inference.posterior.sampling.reparametrisation import Reparametrisation, reparametrisation_of
 from inference.posterior.sampling.transport import fit_map
 from simulator.scene import parse_scene
 from tests.posterior.scenes import KINDS, data, sensor_of
@@ -23,11 +23,11 @@ def density_of(kind: str, scene: dict[str, Any]) -> CollapsedDensity:
     return collapsed_density(sensor, parse_scene(scene), data(sensor, frames=4).frames)
 
 
-def sheared(kind: str, scene: dict[str, Any]) -> tuple[CollapsedDensity, Shear]:
+def reparametrised(kind: str, scene: dict[str, Any]) -> tuple[CollapsedDensity, Reparametrisation]:
     density = density_of(kind, scene)
-    shear = shear_of(density)
-    assert shear is not None
-    return density, shear
+    changed = reparametrisation_of(density)
+    assert changed is not None
+    return density, changed
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
@@ -35,7 +35,7 @@ def sheared(kind: str, scene: dict[str, Any]) -> tuple[CollapsedDensity, Shear]:
 def test_equal_static_light_is_one_place(kind: str, distance: Any) -> None:
     """Under a normal prior y is the static light of a bare background in the prior's units."""
     wall = {"strength": STRENGTH, "distance_m": distance}
-    density, shear = sheared(kind, {"crosstalk": [NORMAL, NORMAL], "background": wall})
+    density, changed = reparametrised(kind, {"crosstalk": [NORMAL, NORMAL], "background": wall})
     z = np.random.default_rng(1).standard_normal((50, len(density.parameters)))
     terms = density.parameters.terms(z)
     assert terms.crosstalk is not None
@@ -50,7 +50,7 @@ def test_equal_static_light_is_one_place(kind: str, distance: Any) -> None:
     wanted = (terms.crosstalk + light - 0.01) / 0.02
     # tables of 50 knots a standard deviation, linear between: (sigma / 50)^2 / 8 of the light
     tolerance = 2e-4 * float(np.abs(light).max()) / 0.02
-    np.testing.assert_allclose(shear.forward(z)[:, shear.crosstalk], wanted, atol=tolerance)
+    np.testing.assert_allclose(changed.forward(z)[:, changed.crosstalk], wanted, atol=tolerance)
 
 
 @pytest.mark.parametrize(
@@ -58,21 +58,21 @@ def test_equal_static_light_is_one_place(kind: str, distance: Any) -> None:
     [[NORMAL, NORMAL], [0.01, NORMAL], [{"prior": "halfnormal", "sd": 0.02}, NORMAL]],
     ids=["normal", "one known", "half normal"],
 )
-def test_what_is_sheared_can_be_undone(crosstalk: Any) -> None:
-    density, shear = sheared("pulsed", {"crosstalk": crosstalk, "background": WALL})
+def test_what_is_reparametrised_can_be_undone(crosstalk: Any) -> None:
+    density, changed = reparametrised("pulsed", {"crosstalk": crosstalk, "background": WALL})
     z = 3.0 * np.random.default_rng(2).standard_normal((200, len(density.parameters)))
-    y = shear.forward(z)
+    y = changed.forward(z)
     unknown = [name.startswith("crosstalk") for name in density.parameters.names]
-    assert list(shear.crosstalk) == list(np.flatnonzero(unknown))
+    assert list(changed.crosstalk) == list(np.flatnonzero(unknown))
     np.testing.assert_array_equal(y[:, ~np.array(unknown)], z[:, ~np.array(unknown)])
-    np.testing.assert_allclose(shear.backward(y), z, rtol=0, atol=1e-14 * float(np.abs(y).max()))
+    np.testing.assert_allclose(changed.backward(y), z, rtol=0, atol=1e-14 * float(np.abs(y).max()))
 
 
-def test_a_map_of_sheared_coordinates_keeps_volumes() -> None:
-    density, shear = sheared("pulsed", {"crosstalk": [NORMAL, NORMAL], "background": WALL})
+def test_a_map_of_reparametrised_coordinates_keeps_volumes() -> None:
+    density, changed = reparametrised("pulsed", {"crosstalk": [NORMAL, NORMAL], "background": WALL})
     d = len(density.parameters)
     rng = np.random.default_rng(3)
-    transport = fit_map(rng.standard_normal((2000, d)), shear)
+    transport = fit_map(rng.standard_normal((2000, d)), changed)
     z = rng.standard_normal((5, d))
     x, log_det = transport.unbend(z)
     np.testing.assert_allclose(transport.bend(x)[0], z, atol=1e-9)
@@ -85,12 +85,12 @@ def test_a_map_of_sheared_coordinates_keeps_volumes() -> None:
         assert np.linalg.slogdet(jacobian)[1] == pytest.approx(log_det[k], abs=1e-4)
 
 
-def test_a_shear_survives_the_archive() -> None:
-    _, shear = sheared("sine_wave", {"crosstalk": [NORMAL, NORMAL], "background": WALL})
+def test_it_survives_the_archive() -> None:
+    _, changed = reparametrised("sine_wave", {"crosstalk": [NORMAL, NORMAL], "background": WALL})
     arrays: dict[str, Any] = {}
-    again = unpack_parts(pack_parts(shear, "shear", arrays), arrays)
+    again = unpack_parts(pack_parts(changed, "reparametrisation", arrays), arrays)
     z = np.random.default_rng(4).standard_normal((9, 9))
-    np.testing.assert_array_equal(again.forward(z), shear.forward(z))
+    np.testing.assert_array_equal(again.forward(z), changed.forward(z))
 
 
 @pytest.mark.parametrize(
@@ -104,5 +104,5 @@ def test_a_shear_survives_the_archive() -> None:
     ],
     ids=str,
 )
-def test_what_is_not_confounded_is_not_sheared(scene: dict[str, Any]) -> None:
-    assert shear_of(density_of("pulsed", scene)) is None
+def test_what_is_not_confounded_is_left_alone(scene: dict[str, Any]) -> None:
+    assert reparametrisation_of(density_of("pulsed", scene)) is None
