@@ -18,7 +18,7 @@ PACKAGES = ("hybridtof", "simulator", "inference", "service", "benchmarks", "tes
 SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 PAGES = sorted([*ROOT.glob("*.md"), *DOCS.glob("*.md"), *(ROOT / "benchmarks").rglob("*.md")])
 
-NUMBER = r"(?<![\d.])[2-5]\.(?:[1-9]\d?)(?![\d.])"
+NUMBER = r"(?<![\d.])[2-5]\.(?:[1-9]\d?)(?!\d|\.\d)"
 NUMBERS = rf"{NUMBER}(?:(?:, | and |, and | to |-){NUMBER})*"
 # (4.13), (2.6-2.10), (4.19 with ...), equations 2.50, 2.57; a length in brackets is no equation
 EQUATION = re.compile(
