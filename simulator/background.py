@@ -1,6 +1,6 @@
 """A uniform background and the shadow that the object casts on it.
 
-Phi_bg = B S(r), S = (r^2 + c1' r) / (r^2 + c1' r + c0'); errata, section 0 and 3.30.
+Phi_bg = B S(r), S = (r^2 + c1' r) / (r^2 + c1' r + c0'); docs/model.md, 3.30.
 """
 
 from simulator.compiled import compiled
@@ -27,6 +27,6 @@ def shadow(r: float, c0: float, c1: float) -> float:
 
 @compiled
 def shadow_slope(r: float, c0: float, c1: float) -> float:
-    """Return dS/dr = c0' (2 r + c1') / Q'^2 [1/m] (errata, 4.83)."""
+    """Return dS/dr = c0' (2 r + c1') / Q'^2 [1/m] (docs/model.md, 4.83)."""
     q = quadratic(r, c0, c1)
     return c0 * (2.0 * r + c1) / q / q

@@ -1,6 +1,7 @@
 """The Object Parameter Model, its derivatives, and when its curves have a single root.
 
-K = c0 c2 (times a gain), Q = r^2 + c1 r + c0, P = r^2 Q, Phi_obj = K / P; errata, section 0.
+K = c0 c2 (times a gain), Q = r^2 + c1 r + c0, P = r^2 Q, Phi_obj = K / P (docs/model.md,
+conventions).
 """
 
 import math
@@ -24,7 +25,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-# least c1 / sqrt(c0) for which a curve is monotone (errata, 4.1, 4.4 and 4.68)
+# least c1 / sqrt(c0) for which a curve is monotone (docs/model.md, 4.1, 4.4 and 4.68)
 C1_LIMIT_INTENSITY = -math.sqrt(32 / 9)
 C1_LIMIT_INTENSITY_W1 = -math.sqrt(3)
 C1_LIMIT_DIFFERENTIAL = -math.sqrt(8 / 3)
@@ -75,7 +76,7 @@ def object_flux(r: float, strength: float, c0: float, c1: float) -> float:
 
 @compiled
 def log_slope(r: float, c0: float, c1: float) -> float:
-    """Return d log Phi / d log r = -(4 r^2 + 3 c1 r + 2 c0) / Q (4.13 with errata 4.18)."""
+    """Return d log Phi / d log r = -(4 r^2 + 3 c1 r + 2 c0) / Q (docs/model.md, 4.13)."""
     return -2.0 - r * (2.0 * r + c1) / quadratic(r, c0, c1)
 
 
@@ -87,7 +88,7 @@ def object_flux_slope(r: float, strength: float, c0: float, c1: float) -> float:
 
 @compiled
 def distortion(r: float, c0: float, c1: float) -> float:
-    """Return zeta = (3 r^2 + 2 c1 r + c0) / (4 r^2 + 3 c1 r + 2 c0) (4.19 with its erratum).
+    """Return zeta = (3 r^2 + 2 c1 r + c0) / (4 r^2 + 3 c1 r + 2 c0) (docs/model.md, 4.19).
 
     zeta r = r0 dw1 / dw2 for an object that moves radially; it is 1 + 1/b for a power law r^b.
     """

@@ -33,7 +33,7 @@ def object_readings(
     r : float
         Range [m], positive.
     r0 : float
-        c T_p / 2 of a pulse [m]; the late window holds the share min(r / r0, 1) (errata, 2.33).
+        c T_p / 2 of a pulse [m]; late is the share min(r / r0, 1) (docs/model.md, 2.33).
     wave : (float, float) or None
         Wave number k [rad/m] and phase offset [rad] of a sine wave, None for a pulse.
     strength : float

@@ -28,11 +28,6 @@ SECTION = re.compile(r"\((5\.2\.[23])\b")
 EQUATIONS = "equations="  # of a technique: what follows is all numbers of equations
 TABLE = re.compile(r"\bTables? (\d\.\d)(?: and (\d\.\d))?")
 APPENDIX = re.compile(r"\b(?:App\.|[Aa]ppendix) ([AB])(?:, (\d+)(?:-(\d+))?)?")
-# as the code still says, until every reference names a page
-ERRATA = re.compile(
-    rf"[Ee]rrata(?:\.md)?,? (?:(?:after|with) )?(?:({NUMBERS})|(?:section )?(\d)\b)"
-)
-ERRATA_SECTIONS = {"0": "conventions", "5": "exact", "7": "appendix-b", "8": "appendix-b"}
 PAGE = re.compile(
     r"\bdocs/([a-z_]+)\.md(?:, ((?:[A-Z] )?[\w.'-]+(?:(?:, | and | to )[2-5]\.\d+)*))?"
 )
@@ -104,12 +99,6 @@ def references(text: str) -> Iterator[tuple[str, str]]:
         yield found[0], name
         yield from ((found[0], f"{name}-{number}") for number in (first, last) if number)
 
-    for found in ERRATA.finditer(text):
-        for number in numbers(found[1] or ""):
-            yield found[0], f"eq-{number.replace('.', '-')}"
-        if found[2]:
-            yield found[0], ERRATA_SECTIONS[found[2]]
-
 
 def page_references(text: str) -> Iterator[tuple[str, str, str]]:
     """Each page that is named, with the anchor meant ("" is the page itself)."""
@@ -164,6 +153,18 @@ def test_paths_in_the_pages(page: Path) -> None:
     places = "|".join(PACKAGES)
     named = re.findall(rf"`((?:{places})/[\w./-]*)`", page.read_text(encoding="utf-8"))
     assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+def test_nothing_cites_books_that_are_not_here() -> None:
+    words = re.compile(r"\berrat(?:a|um)\b|\b(?:the|of a) contract\b|\(contract[,)]", re.IGNORECASE)
+    found = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for path in SOURCES
+        if path != Path(__file__)
+        for line, text in texts(path)
+        if words.search(text)
+    ]
+    assert found == []
 
 
 def test_every_floor_is_described() -> None:

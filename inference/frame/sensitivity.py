@@ -124,7 +124,7 @@ def fill_slopes(
 def _add_background(
     out: Array, r: float, values: Array, factor: float, instrument: Instrument
 ) -> None:
-    """Add B S(r), S = (r^2 + c1' r) / Q' (errata, 3.30), and its derivatives."""
+    """Add B S(r), S = (r^2 + c1' r) / Q' (docs/model.md, 3.30), and its derivatives."""
     r0, wave = instrument.r0, instrument.wave
     size, distance = values[Value.STRENGTH], values[Value.DISTANCE]
     c0, c1 = values[Value.SHADOW_C0], values[Value.SHADOW_C1]

@@ -2,7 +2,7 @@
 
 It is a midpoint-like rule on an equal-angle polar grid whose facets count wholly or not at all, so
 it converges as 1/N^2 on a shell or plane and as 1/N, unevenly, once the object has an edge
-(errata, section 8, "Convergence"); `simulator.optics.quadrature` is
+(docs/model.md, appendix-b, "Convergence"); `simulator.optics.quadrature` is
 the one to use.
 """
 
@@ -47,7 +47,7 @@ def facet_polar_grid(n: int) -> tuple[Array, float]:
 
     Notes
     -----
-    Errata, section 8: with n = 100 the step in theta is pi/198.
+    docs/model.md, appendix-b: with n = 100 the step in theta is pi/198.
     """
     return np.linspace(0.0, 0.5 * math.pi, n), 0.5 * math.pi / (n - 1) * (2 * math.pi / n)
 
@@ -64,7 +64,7 @@ def facet_plate_sums(
     theta: Array,
     step: float,
 ) -> tuple[float, float, float, float]:
-    """Sum the facets of a tilted plate at one distance (errata, section 8).
+    """Sum the facets of a tilted plate at one distance (docs/model.md, appendix-b).
 
     Parameters
     ----------

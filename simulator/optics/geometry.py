@@ -49,7 +49,7 @@ def light_path(
     height_i: float,
     height_o: float,
 ) -> tuple[float, float, float]:
-    """Return f_r cos_i cos_o I_e cos_d / r_i^2, r_i and r_o (errata, kernel (b), without 1/r_o^2).
+    """Return f_r cos_i cos_o I_e cos_d / r_i^2, r_i, r_o (docs/model.md, kernel, without 1/r_o^2).
 
     Parameters
     ----------

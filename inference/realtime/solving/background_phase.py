@@ -1,7 +1,7 @@
 """Background intensity of a sine wave: what the background leaves has the phase of the range.
 
 x - B S(r) e^jkR is the object alone, so its phase less k r is a multiple of 2 pi, or an odd one of
-pi where noise makes a faint object negative (errata, section 5).
+pi where noise makes a faint object negative (docs/model.md, exact).
 """
 
 import math

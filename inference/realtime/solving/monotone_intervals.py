@@ -3,7 +3,7 @@
 A curve has at most one root in each interval between two neighbouring turning points (or poles).
 Turning points are roots of polynomials of degree 2 to 4, of the differential phase for background
 cancelling of a sine wave, and sign changes on a fine grid for the two curves of a derivative with
-background (errata, section 5).
+background (docs/model.md, exact).
 """
 
 import itertools
@@ -97,7 +97,7 @@ def _roots(polynomial: Polynomial, p: CurveParameters, low: float, high: float) 
 def _marks(
     curve: Curve, p: CurveParameters, low: float, high: float
 ) -> tuple[list[float], list[float]]:
-    """Return turning points and poles (errata, 4.1, 4.4, 4.68, 5)."""
+    """Return turning points and poles (docs/model.md, 4.1, 4.4, 4.68 and exact)."""
     turns: list[float] = []
     poles: list[float] = []
     if isinstance(curve.turns, Polynomial):

@@ -180,7 +180,7 @@ BACKGROUND_CANCELLING = Technique(
     uses_background=True,
     differential=False,
     cost=200.0,
-    equations="4.73; for a sine wave errata section 5",
+    equations="4.73; of a sine wave docs/model.md, exact",
     roots="1 in (0, R) if c1^2 <= 32 c0 / 9; sine wave: 1 if kR <= pi, else up to 2 a half period",
     solve=_solve,
 )

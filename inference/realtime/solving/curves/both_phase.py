@@ -1,4 +1,4 @@
-"""The angle of a derivative before a background, of a sine wave (errata, section 5).
+"""The angle of a derivative before a background, of a sine wave (docs/model.md, exact).
 
 arg d(Phi e^jku + Phi_bg e^jkR), modulo pi.
 """

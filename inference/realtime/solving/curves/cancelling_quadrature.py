@@ -1,4 +1,4 @@
-"""What is free of a background at a known distance, of a sine wave (errata, section 5).
+"""What is free of a background at a known distance, of a sine wave (docs/model.md, exact).
 
 sin(k (R - u)) c0 / (u^2 Q).
 """

@@ -1,4 +1,4 @@
-"""The angle of a derivative, of a sine wave (exact form in errata section 5).
+"""The angle of a derivative, of a sine wave (exactly: docs/model.md, exact).
 
 k u - atan2(k u Q, 4u^2 + 3 c1 u + 2 c0), modulo pi.
 """
