@@ -16,5 +16,6 @@ R = TypeVar("R")
 
 def borrowed(kernel: Callable[P, R]) -> Callable[P, R]:
     """Have a compiled kernel leave the reference counts of its arrays alone."""
-    cast("Any", kernel).targetoptions["_nrt"] = False
+    dispatcher = cast("Any", kernel)
+    dispatcher.targetoptions["_nrt"] = dispatcher.called.targetoptions["_nrt"] = False
     return kernel

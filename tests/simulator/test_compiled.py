@@ -5,6 +5,7 @@ import importlib.util
 import shutil
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -112,6 +113,25 @@ def test_the_directory_exists_and_lies_below_the_one_that_is_asked_for(
     monkeypatch.delenv("NUMBA_CACHE_DIR")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
     assert directory_of(tree) == str(tmp_path / "xdg" / "hybridtof" / asked.name)
+
+
+@simulator.compiled.compiled
+def twice(x: float) -> float:
+    return x + x
+
+
+@simulator.compiled.compiled
+def four_times(x: float) -> float:
+    return twice(twice(x))
+
+
+def test_a_kernel_that_a_kernel_calls_gets_its_way_in_from_python_when_it_is_used() -> None:
+    called: Any = twice
+    assert four_times(3.0) == 12.0
+    assert not called.overloads
+    assert len(called.called.overloads) == 1
+    assert twice(3.0) == 6.0
+    assert len(called.overloads) == 1
 
 
 def half(x: float) -> float:
