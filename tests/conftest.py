@@ -1,5 +1,11 @@
 """What holds for every test."""
 
+import os
+
+# before numpy is loaded: with threads of its own the last bits of a product differ from run to run
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
 import itertools
 import sys
 import time
