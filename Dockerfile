@@ -34,14 +34,17 @@ RUN useradd --uid 10001 --create-home tester
 COPY --chown=tester . .
 RUN pip install --no-deps --no-build-isolation --editable . && chown tester /build
 USER tester
-RUN python -m pytest -n 2 --dist loadgroup
+RUN python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder
 
 FROM base AS runtime
 RUN useradd --uid 10001 --no-create-home --shell /usr/sbin/nologin hybridtof \
-    && install -d -o hybridtof /var/cache/hybridtof
+    && install -d -m 700 -o hybridtof /var/cache/hybridtof /var/lib/hybridtof
 COPY --from=build /opt/hybridtof /opt/hybridtof
 # machine code of the kernels: compiled at the first use, kept for as long as the volume
-ENV NUMBA_CACHE_DIR=/var/cache/hybridtof
+# jobs: for as long as the volume, or where HYBRIDTOF_DATABASE says
+ENV NUMBA_CACHE_DIR=/var/cache/hybridtof \
+    HYBRIDTOF_DATABASE=sqlite:////var/lib/hybridtof/jobs.sqlite
+VOLUME /var/lib/hybridtof
 USER hybridtof
 EXPOSE 8000
 HEALTHCHECK --interval=10s --timeout=5s --start-period=30s \

@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report readme api picture notebook notebook-data calibrate coverage test check lint format types fast lock clean
+.PHONY: help setup demo report readme api picture notebook notebook-data calibrate coverage kills test check lint format types fast lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -43,17 +43,22 @@ notebook-data: $(READY) ## Make the notebook's frames anew
 calibrate: $(READY) ## Simulation-based calibration: goes on where it stopped, then docs/calibration.png
 	$(BIN)/python -m benchmarks.calibration --workers 2
 
-coverage: $(READY) ## Intervals against exact optics and recorded photons: goes on where it stopped
+coverage: $(READY) ## Intervals against exact optics, recorded photons and paths: goes on where it stopped
 	$(BIN)/python -m benchmarks.coverage --workers 2
+	$(BIN)/python -m benchmarks.coverage.path_study --sets 50 --random 500
+
+kills: $(READY) ## Kill services and workers 50 times during 20 posteriors: SQLite, then PostgreSQL
+	$(BIN)/python -m benchmarks.kills
+	$(BIN)/python -m benchmarks.kills --postgres
 
 # two processes on two cores: a library that starts threads of its own only makes them wait
 calibrate coverage test fast: export OPENBLAS_NUM_THREADS = 1
 
 test: $(READY) ## Run every test
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+	$(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder
 
 fast: $(READY) ## Run the tests that take seconds
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow"
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -72,5 +77,5 @@ clean: ## Remove what the targets made
 	rm -rf $(VENV) build dist out *.egg-info .mypy_cache .ruff_cache .pytest_cache
 
 lock: ## Resolve the dependencies anew into requirements/ (needs uv)
-	uv pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate --output-file requirements/runtime.txt
-	uv pip compile pyproject.toml --extra plots --extra notebooks --extra cluster --extra dev --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate --output-file requirements/dev.txt
+	uv pip compile pyproject.toml --extra postgres --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate --output-file requirements/runtime.txt
+	uv pip compile pyproject.toml --extra postgres --extra plots --extra notebooks --extra cluster --extra dev --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate --output-file requirements/dev.txt

@@ -58,6 +58,9 @@ def speed(count: int = 100_000) -> None:
     step(model, model.first, few)
     conventional_range(sensor, few)
     fast = cpu(lambda: step(model, model.first, frames), 3)
+    erring = tracker(sensor, scene_of(PLATE, discrepancy="default"))
+    step(erring, erring.first, few)
+    default = cpu(lambda: step(erring, erring.first, frames), 1)
     full = cpu(lambda: step(model, model.first, frames, full=True), 1)
     bare = cpu(lambda: conventional_range(sensor, frames), 20)
     plain = cpu(lambda: estimate(sensor, scene, frames, ["conventional"]), 5)
@@ -71,6 +74,7 @@ def speed(count: int = 100_000) -> None:
         ("conventional estimate, all of it", plain / count),
         ("its division alone", bare / count),
         ("tracker, one batch", fast / count),
+        ("tracker, errors of the model carried along", default / count),
         ("tracker, looking everywhere in every frame", full / count),
         ("tracker, frame by frame from Python", single),
     ):

@@ -4,6 +4,7 @@ import dataclasses
 import time
 from collections.abc import Sequence
 
+from inference.assumptions import assumptions_of
 from inference.estimates import Estimates, LeftOut, TechniqueResult
 from inference.known import known_of
 from inference.plan import cheapest, obstacle, plan
@@ -12,7 +13,8 @@ from inference.technique import Task
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.errors import InvalidInputError, Problem, RefusedError
 from simulator.frames import Frames
-from simulator.scene import Scene, check_scene
+from simulator.scene import Scene
+from simulator.scene_checks import check_scene
 from simulator.sensor import Sensor
 
 __all__ = ["all_roots", "estimate"]
@@ -51,13 +53,14 @@ def estimate(
     except InvalidInputError as error:
         raise error.below("/scene") from None
     choice = plan(sensor, scene, frames)
+    supposed = assumptions_of(scene)
     if techniques is None:
         if choice.chosen is None:
-            return Estimates(None, (), choice.left_out)
+            return Estimates(None, (), choice.left_out, supposed)
         result = _run(sensor, scene, frames, choice.chosen)
         if isinstance(result, LeftOut):
-            return Estimates(None, (), (result, *choice.left_out))
-        return Estimates(choice.chosen, (result,), choice.left_out)
+            return Estimates(None, (), (result, *choice.left_out), supposed)
+        return Estimates(choice.chosen, (result,), choice.left_out, supposed)
     problems = [
         Problem(f"/techniques/{i}", f"{name!r} is not a technique")
         for i, name in enumerate(techniques)
@@ -80,7 +83,7 @@ def estimate(
         else:
             served.append(found)
     chosen = cheapest(result.technique for result in served)
-    return Estimates(chosen, tuple(served), tuple(left_out.values()))
+    return Estimates(chosen, tuple(served), tuple(left_out.values()), supposed)
 
 
 def _run(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> TechniqueResult | LeftOut:

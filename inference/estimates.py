@@ -3,12 +3,12 @@
 import dataclasses
 import enum
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Estimates", "LeftOut", "Status", "TechniqueResult"]
+__all__ = ["Estimates", "LeftOut", "SdParts", "Status", "TechniqueResult"]
 
 Array = NDArray[np.float64]
 
@@ -20,6 +20,24 @@ class Status(enum.IntEnum):
     AMBIGUOUS = 1
     NONE = 2
     SATURATED = 3
+
+
+class SdParts(NamedTuple):
+    """The error budget: parts of standard deviations, whose squares sum to that of the whole.
+
+    Attributes
+    ----------
+    noise : ndarray
+        What the noise of the readings does [m].
+    scene : ndarray
+        What the scene knows only by a prior, shared by all frames [m].
+    model : ndarray
+        What errors of the model do, of flux and of time of flight (`Scene.model_error`) [m].
+    """
+
+    noise: Array
+    scene: Array
+    model: Array
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -35,7 +53,7 @@ class TechniqueResult:
     roots_m : ndarray, shape (n, m)
         All physical roots, ascending, padded with nan; m >= 1 is the largest count [m].
     roots_sd_m : ndarray, shape (n, m)
-        First-order standard deviations [m]; nan where the linearisation does not hold.
+        First-order standard deviations, the whole [m]; nan where the linearisation does not hold.
     root_count : ndarray of int, shape (n,)
         Number of roots of each frame.
     near_fold : ndarray of bool, shape (n,)
@@ -44,11 +62,13 @@ class TechniqueResult:
         Index into ``reasons``; 0 says nothing.
     reasons : tuple of str
         The reasons that occur, ``reasons[0] == ""``.
+    sd_parts_m : SdParts, optional
+        Their parts; without meaning where the whole is nan.
     range_bounds_m : ndarray, shape (n, 2), optional
         Bounds where the object is unknown (differential) [m], nan where there are none.
-    power_law, zeta : ndarray, shape (n,), optional
-        Exponent b of Phi ~ r^b and distortion 1 + 1/b, nan where unavailable; only of techniques
-        that see motion.
+    power_law, power_law_sd, zeta, zeta_sd : ndarray, shape (n,), optional
+        Exponent b of Phi ~ r^b and distortion 1 + 1/b with their standard deviations, nan where
+        unavailable; only of techniques that see motion.
     parameters : mapping, optional
         What a technique of many frames found besides the ranges: by scene path ``value``, ``sd``
         and ``status``.
@@ -69,9 +89,12 @@ class TechniqueResult:
     near_fold: NDArray[np.bool_]
     reason: NDArray[np.uint8]
     reasons: tuple[str, ...]
+    sd_parts_m: SdParts | None = None
     range_bounds_m: Array | None = None
     power_law: Array | None = None
+    power_law_sd: Array | None = None
     zeta: Array | None = None
+    zeta_sd: Array | None = None
     parameters: Mapping[str, Any] | None = None
     fit: Mapping[str, Any] | None = None
     runtime_s: float = 0.0
@@ -110,8 +133,11 @@ class Estimates:
         In the order asked for.
     left_out : tuple of LeftOut
         Every other technique.
+    assumptions : tuple of str
+        What the results suppose without a check (`inference.assumptions`).
     """
 
     chosen: str | None
     results: tuple[TechniqueResult, ...]
     left_out: tuple[LeftOut, ...]
+    assumptions: tuple[str, ...] = ()

@@ -34,6 +34,9 @@ class Task:
         non-negative object, a background between nothing and its known strength.
     high_m : float, optional
         Upper end of the interval searched, in place of the technique's own [m].
+    exact : bool
+        Whether the model is taken as exact, whatever the scene says of its error: what asks for
+        the noise's part alone has its own way to the model's.
     """
 
     sensor: Sensor
@@ -42,6 +45,7 @@ class Task:
     known: Known
     physical: bool = True
     high_m: float | None = None
+    exact: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,7 +63,8 @@ class Technique:
     needs : tuple of str
         Scene paths that must be known numbers.
     immune_to : tuple of "crosstalk", "background", "discrepancy"
-        Terms that may be present without being known (Table 4.1); tests/contract holds it to it.
+        What may be present without being known (Table 4.1), of a discrepancy that of the flux;
+        tests/contract holds it to it.
     uses_background : bool
         Whether the scene must have a background.
     differential : bool

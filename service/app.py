@@ -11,12 +11,13 @@ from fastapi import FastAPI
 from inference.posterior import fold as posterior_fold
 from service import openapi, problems
 from service.fold import Fold
-from service.job_store import MemoryJobStore
 from service.jobs import Jobs
 from service.process_pool import ProcessPool
 from service.routes import ROUTERS
 from service.service_settings import ServiceSettings
 from service.shared import Shared
+from service.store.database import default_url
+from service.store.sql_store import Retention, SqlJobStore
 
 __all__ = ["create_app"]
 
@@ -37,10 +38,16 @@ def create_app(
     -------
     FastAPI
         An ASGI application; jobs run from its start to its end (ASGI lifespan).
+
+    Raises
+    ------
+    InvalidInputError
+        Where the database of the settings cannot be used.
     """
     settings = settings or ServiceSettings()
     pool = ProcessPool(settings.workers)
-    store = MemoryJobStore(settings.max_jobs, settings.max_draws_bytes)
+    retention = Retention(settings.max_jobs, settings.max_draws_bytes, settings.keep_days * 86_400)
+    store = SqlJobStore(settings.database or default_url(), retention)
     jobs = Jobs(fold, store, pool, running=settings.workers)
     shared = Shared(settings, jobs, anyio.CapacityLimiter(settings.threads))
 

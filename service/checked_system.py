@@ -2,7 +2,8 @@
 
 from simulator.errors import InvalidInputError, Problem, RefusedError
 from simulator.frames import FrameColumns, Frames, frames_from_columns
-from simulator.scene import Scene, check_scene
+from simulator.scene import Scene
+from simulator.scene_checks import check_scene
 from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = ["checked_frames", "checked_system"]

@@ -15,6 +15,7 @@
         ├── NotAcceptableError         no form that the client accepts
         ├── IdempotencyError           a key was used before with another request
         ├── BusyError                  the service takes no more work now
+        ├── StoreError                 the store of jobs is locked, full or does not answer
         └── WorkerDiedError            a task killed every worker that ran it
 """
 
@@ -30,6 +31,7 @@ __all__ = [
     "NotAcceptableError",
     "NotFoundError",
     "ServiceError",
+    "StoreError",
     "UnsupportedMediaTypeError",
     "WorkerDiedError",
 ]
@@ -73,6 +75,10 @@ class IdempotencyError(ServiceError):
 
 class BusyError(ServiceError):
     """The service takes no more work at present."""
+
+
+class StoreError(ServiceError):
+    """The store of jobs does not take or give anything at present; what it has it keeps."""
 
 
 class WorkerDiedError(ServiceError):

@@ -13,7 +13,8 @@ __all__ = ["check_estimate_suffix", "estimates_as"]
 
 _COLUMNS = (
     "technique", "frame", "status", "range_m", "sd_m", "roots_m", "roots_sd_m", "near_fold",
-    "power_law", "zeta", "range_bounds_m", "reason",
+    "sd_noise_m", "sd_scene_m", "sd_model_m",
+    "power_law", "power_law_sd", "zeta", "zeta_sd", "range_bounds_m", "reason",
 )  # fmt: skip
 
 
@@ -62,8 +63,16 @@ def _cell(value: Any) -> str:
     return "" if value is None else json.dumps(value)
 
 
+def _flat(frame: dict[str, Any]) -> dict[str, Any]:
+    """Give the parts of the standard deviation names of their own."""
+    parts = frame.get("sd_parts_m") or {}
+    return frame | {f"sd_{name}_m": value for name, value in parts.items()}
+
+
 def _csv(document: Mapping[str, Any]) -> str:
-    rows = [[_cell(frame.get(name)) for name in _COLUMNS] for frame in _frames(document)]
+    rows = [
+        [_cell(frame.get(name)) for name in _COLUMNS] for frame in map(_flat, _frames(document))
+    ]
     # of columns that only some techniques have, those that are used
     used = [k for k, name in enumerate(_COLUMNS) if name not in _SOME or any(r[k] for r in rows)]
     text = io.StringIO()
@@ -81,7 +90,10 @@ def _json(document: Mapping[str, Any]) -> str:
     return json.dumps(document, allow_nan=False) + "\n"
 
 
-_SOME = ("power_law", "zeta", "range_bounds_m")
+_SOME = (
+    "sd_noise_m", "sd_scene_m", "sd_model_m",
+    "power_law", "power_law_sd", "zeta", "zeta_sd", "range_bounds_m",
+)  # fmt: skip
 _WRITERS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     ".csv": _csv,
     ".ndjson": _ndjson,

@@ -1,16 +1,17 @@
 """What the service asks of a computation that is a fold over chunks."""
 
 from collections.abc import Sequence
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, Self, TypeVar
 
 from inference.posterior import job as posterior_job
 from inference.posterior.answer.draws import Draws
+from inference.posterior.progress import Progress
 from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
-__all__ = ["Fold", "FoldProgress", "Stored", "StoredCheckpoint", "StoredJob", "Summary"]
+__all__ = ["Fold", "Stored", "StoredCheckpoint", "StoredJob", "Summary"]
 
 
 class Stored(Protocol):
@@ -38,33 +39,8 @@ class StoredCheckpoint(Stored, Protocol):
         """What is being done."""
         ...
 
-
-class FoldProgress(Protocol):
-    """How far a job is."""
-
-    @property
-    def steps(self) -> int:
-        """Steps so far."""
-        ...
-
-    @property
-    def target(self) -> int:
-        """Steps that may be needed, as far as can be told."""
-        ...
-
-    @property
-    def ess(self) -> float | None:
-        """Least effective sample size."""
-        ...
-
-    @property
-    def rhat(self) -> float | None:
-        """Largest R-hat."""
-        ...
-
-    @property
-    def finished(self) -> bool:
-        """Whether only the summary is left."""
+    def addition(self, before: Self, /) -> bytes | None:
+        """Return what a store that holds an earlier one needs besides; None: all of it."""
         ...
 
 
@@ -91,6 +67,14 @@ class Reader(Protocol[S]):
         ...
 
 
+class PieceReader(Protocol[S]):
+    """A class whose instances can be read again from pieces."""
+
+    def from_bytes(self, *pieces: bytes) -> S:
+        """Read what ``to_bytes`` wrote, and what ``addition`` wrote after it."""
+        ...
+
+
 class Fold(Protocol[J, C, T, P]):
     """What `inference.posterior.fold` offers; every function is pure and importable by name.
 
@@ -98,12 +82,17 @@ class Fold(Protocol[J, C, T, P]):
     """
 
     @property
+    def FORMAT(self) -> str:  # noqa: N802  (a constant)
+        """Names the form of stored jobs and checkpoints."""
+        ...
+
+    @property
     def Job(self) -> Reader[J]:  # noqa: N802  (a class)
         """The job's class."""
         ...
 
     @property
-    def Checkpoint(self) -> Reader[C]:  # noqa: N802
+    def Checkpoint(self) -> PieceReader[C]:  # noqa: N802
         """The checkpoint's class."""
         ...
 
@@ -129,7 +118,7 @@ class Fold(Protocol[J, C, T, P]):
         """Return the next checkpoint."""
         ...
 
-    def progress(self, job: J, checkpoint: C, /) -> FoldProgress:
+    def progress(self, job: J, checkpoint: C, /) -> Progress:
         """Return steps, target, ess, rhat, finished."""
         ...
 

@@ -1,24 +1,69 @@
 """One posterior, from its first chunk to its summary.
 
-Between two chunks the checkpoint is stored, progress is reported, and a request to cancel is
-honoured; a chunk that was lost with its process is computed again, to the same last bit.
+Between two chunks the checkpoint is stored, progress is told, and a request to cancel is honoured;
+a chunk that was lost with its process is computed again, to the same last bit.
 """
 
 import asyncio
+import dataclasses
+import logging
 import math
 import time
-from collections.abc import Callable
-from concurrent.futures import Executor
-from typing import Any, Generic, TypeVar
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from typing import Any, Generic, Protocol, TypeVar
 
-from service.exports.writing import write_draws
-from service.fold import C, Fold, FoldProgress, J, P, Summary, T
-from service.job_store import JobRecord, JobStore
+from inference.posterior.pace import Pace
+from inference.posterior.progress import Progress
+from service.errors import GoneError, StoreError
+from service.fold import C, Fold, J, P, Summary, T
+from service.problems import describe
+from service.store.job_store import JobStore
+from service.store.record import Claimed, JobRecord, Status
 from service.worker import timed
+from simulator.errors import HybridTofError
 
-__all__ = ["Runner"]
+__all__ = ["Runner", "Workers"]
 
 R = TypeVar("R")
+_log = logging.getLogger("hybridtof")
+
+_LOOK_S = 0.25  # how often it is looked whether a job is still wanted
+_GRACE_S = 1.0  # what a chunk may still take when its job was cancelled
+# processor time that a chunk may take before its process is ended: of the first of a phase, and of
+# one that follows others like it, whose cost is known
+_FIRST_LIMIT_S = 900.0
+_LIMIT_S = 60.0
+_TIMES = 20.0
+_LONGEST_PAUSE_S = 5.0
+
+
+class Workers(Protocol):
+    """Where chunks run."""
+
+    def submit_within(self, limit_s: float, fn: Callable[..., R], /, *args: Any) -> Future[R]:
+        """Run a function within some processor time [s]."""
+        ...
+
+    def compiling(self, future: Future[Any]) -> bool:
+        """Tell whether machine code is being made for a task."""
+        ...
+
+    def abandon(self, future: Future[Any]) -> None:
+        """Give a task up."""
+        ...
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End."""
+        ...
+
+
+class _LostError(Exception):
+    """The job was deleted, or another process is ahead with it: nothing is to be done here."""
+
+
+class _CancelledError(Exception):
+    """The job was cancelled while a chunk ran, which was given up."""
 
 
 def _summary(summarise: Callable[..., Summary], *arguments: Any) -> dict[str, Any]:
@@ -26,102 +71,259 @@ def _summary(summarise: Callable[..., Summary], *arguments: Any) -> dict[str, An
     return summarise(*arguments).to_json()
 
 
-def _finite(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else float(value)
+def _sent(progress: Progress) -> dict[str, Any]:
+    """Return progress as sent to clients: what is unknown, or not finite, is null."""
+    members = dataclasses.asdict(progress)
+    del members["finished"]
+    unknown = {k for k, v in members.items() if isinstance(v, float) and not math.isfinite(v)}
+    return members | dict.fromkeys(unknown)
 
 
-def _progress(progress: FoldProgress, wall_s: float) -> dict[str, Any]:
-    """Progress as sent to clients, with the time left at the speed so far."""
-    steps, target = int(progress.steps), int(progress.target)
-    left = 0.0 if progress.finished else None
-    if left is None and steps > 0:
-        left = wall_s * max(target / steps - 1.0, 0.0)
-    return {
-        "steps": steps,
-        "target": target,
-        "ess": _finite(progress.ess),
-        "rhat": _finite(progress.rhat),
-        "eta_s": _finite(left),
-    }
-
-
+@dataclasses.dataclass(frozen=True, slots=True)
 class Runner(Generic[J, C, T, P]):
-    """Folds jobs, one at a call.
+    """Folds jobs, each in a call of its own.
 
-    Parameters
+    Attributes
     ----------
     fold : Fold
         The computation.
     store : JobStore
         Where jobs are kept between chunks.
-    executor : concurrent.futures.Executor
+    workers : Workers
         Where chunks run.
+    version : str
+        Names the format of jobs and checkpoints: those of another one are computed anew.
+    announce : callable
+        Is called when a job has changed.
     """
 
-    def __init__(self, fold: Fold[J, C, T, P], store: JobStore, executor: Executor) -> None:
-        self._fold = fold
-        self._store = store
-        self._executor = executor
+    fold: Fold[J, C, T, P]
+    store: JobStore
+    workers: Workers
+    version: str
+    announce: Callable[[], None]
 
-    async def run(self, record: JobRecord) -> None:
+    async def run(self, claimed: Claimed) -> None:
         """Fold until finished, cancelled, out of time or deleted; then summarise.
 
         Parameters
         ----------
-        record : JobRecord
+        claimed : Claimed
             The job, new or as another process left it.
         """
-        fold = self._fold
-        began = time.monotonic() - record.wall_s
-        cpu_s = record.cpu_s
-        if await self._save(record.id, status="running") is None:
+        await _Run(self, claimed).run()
+
+
+class _Run(Generic[J, C, T, P]):
+    """One job in the hands of this process."""
+
+    def __init__(self, runner: Runner[J, C, T, P], claimed: Claimed) -> None:
+        self.runner, self.claimed = runner, claimed
+        self.record = claimed.record
+        self.cpu_s = claimed.record.cpu_s
+        self.pace: Pace | None = None
+        self.checkpoint: C | None = None
+        self.longest = 0.0  # processor time of a chunk of the present phase [s]
+
+    async def run(self) -> None:
+        try:
+            await self._read()
+            await self._compute()
+        except _LostError:
             return
-        job = await asyncio.to_thread(fold.Job.from_bytes, record.job)
-        if record.checkpoint is None:
-            checkpoint, spent = await self._execute(fold.start, job)
-            cpu_s += spent
-        else:
-            checkpoint = await asyncio.to_thread(fold.Checkpoint.from_bytes, record.checkpoint)
-        while True:
-            wall_s = time.monotonic() - began
-            progress = await asyncio.to_thread(fold.progress, job, checkpoint)
-            known = await self._save(
-                record.id,
-                checkpoint=await asyncio.to_thread(checkpoint.to_bytes),
-                progress=_progress(progress, wall_s),
-                wall_s=wall_s,
-                cpu_s=cpu_s,
-            )
+        except Exception as error:
+            known = error if isinstance(error, HybridTofError) else None
             if known is None:
-                return
-            if known.cancel_requested:
-                break
-            tasks = await asyncio.to_thread(fold.tasks, job, checkpoint, wall_s)
-            if not tasks:
-                break
-            pieces = await asyncio.gather(*(self._execute(fold.run, task) for task in tasks))
-            cpu_s += math.fsum(spent for _, spent in pieces)
-            checkpoint = await asyncio.to_thread(
-                fold.merge, job, checkpoint, [piece for piece, _ in pieces]
+                _log.exception("posterior %s failed", self.record.id)
+            await self._fail(describe(known or HybridTofError(type(error).__name__)))
+
+    async def _read(self) -> None:
+        """Read the job, and its checkpoint where it is in the form of today."""
+        fold, pieces, store = self.runner.fold, self.claimed.pieces, self.runner.store
+        self.began = time.monotonic() - self.record.wall_s
+        if self.record.format != self.runner.version:
+            await self._save(store.restart, self.record, self.runner.version)
+            self.cpu_s, pieces = 0.0, ()
+        try:
+            self.job = await asyncio.to_thread(fold.Job.from_bytes, self.claimed.job)
+            if pieces:
+                self.checkpoint = await asyncio.to_thread(fold.Checkpoint.from_bytes, *pieces)
+                await self._tell(fold.progress(self.job, self.checkpoint).phase)
+        except _LostError:
+            raise
+        except Exception as error:
+            if self.claimed.record.format == self.runner.version:
+                raise
+            message = "it was accepted by another version of hybridtof, and cannot be read by this"
+            raise GoneError(message) from error
+
+    async def _compute(self) -> None:
+        fold = self.runner.fold
+        try:
+            if self.checkpoint is None:
+                await self._tell("starting")
+                (first,) = await self._execute((fold.start, self.job))
+                await self._keep(first)
+            while self.checkpoint is not None and not self.record.cancel_requested:
+                wall_s = self.record.wall_s
+                tasks = await asyncio.to_thread(fold.tasks, self.job, self.checkpoint, wall_s)
+                if not tasks:
+                    break
+                pieces = await self._execute(*((fold.run, task) for task in tasks))
+                merged, spent = await asyncio.to_thread(self._merged, self.checkpoint, pieces)
+                self.cpu_s += spent
+                await self._keep(merged)
+        except _CancelledError:
+            pass
+        finished = False
+        if self.checkpoint is not None:
+            finished = fold.progress(self.job, self.checkpoint).finished
+        cancelled = self.record.cancel_requested and not finished
+        result = await self._summarise()
+        await self._finish("cancelled" if cancelled else "done", result)
+
+    def _merged(self, checkpoint: C, pieces: Sequence[P]) -> tuple[C, float]:
+        before = time.thread_time()
+        merged = self.runner.fold.merge(self.job, checkpoint, pieces)
+        return merged, time.thread_time() - before
+
+    async def _summarise(self) -> dict[str, Any] | None:
+        """Return the answer of what there is; None where there is nothing."""
+        if self.checkpoint is None:
+            return None
+        await self._tell("summarising")
+        spent = self.record.wall_s, self.cpu_s
+        call = _summary, self.runner.fold.summarise, self.job, self.checkpoint, *spent
+        try:
+            (result,) = await self._execute(call, wanted=True)
+        except _CancelledError:
+            raise AssertionError("what is wanted is not given up") from None
+        return dict(result)
+
+    async def _fail(self, problem: dict[str, Any]) -> None:
+        """End the job, with what was drawn before it failed."""
+        result = None
+        try:
+            if self.record.progress["steps"] > 0:
+                result = await self._summarise()
+        except Exception as error:
+            _log.warning("posterior %s has no summary: %r", self.record.id, error)
+        await self._finish("failed", result, problem)
+
+    async def _finish(
+        self,
+        status: Status,
+        result: dict[str, Any] | None,
+        problem: dict[str, Any] | None = None,
+    ) -> None:
+        try:
+            await self._save(self.runner.store.finish, self.record, status, result, problem)
+        except _LostError:
+            return
+
+    async def _keep(self, checkpoint: C) -> None:
+        """Store a checkpoint: what it adds to the last one, or all of it."""
+        runner, before = self.runner, self.checkpoint
+        wall_s = time.monotonic() - self.began
+        progress = await asyncio.to_thread(runner.fold.progress, self.job, checkpoint)
+        self.pace = Pace.followed(self.pace, progress, wall_s)
+        if progress.phase != self.record.progress["phase"]:
+            self.longest = 0.0
+        added = None
+        if before is not None:
+            added = await asyncio.to_thread(checkpoint.addition, before)
+        data = added if added is not None else await asyncio.to_thread(checkpoint.to_bytes)
+        told = _sent(self.pace.foretell(progress, wall_s))
+        spent = wall_s, self.cpu_s
+        await self._save(runner.store.advance, self.record, data, added is None, told, *spent)
+        self.checkpoint = checkpoint
+
+    async def _tell(self, phase: str) -> None:
+        """Change the phase that is told; how long it takes is known of no other phase."""
+        if phase != self.record.progress["phase"]:
+            progress = self.record.progress | {"phase": phase, "eta_s": None}
+            await self._save(self.runner.store.report, self.record, progress)
+
+    async def _save(self, write: Callable[..., JobRecord | None], *arguments: Any) -> None:
+        """Write to the store, for as long as it takes: a chunk need not be computed twice."""
+        pause = 0.1
+        while True:
+            try:
+                after = await asyncio.to_thread(write, *arguments)
+            except StoreError as error:
+                _log.warning("posterior %s waits: %s", self.record.id, error)
+                await asyncio.sleep(pause)
+                pause = min(2 * pause, _LONGEST_PAUSE_S)
+                continue
+            if after is None:
+                raise _LostError
+            self.record = after
+            self.runner.announce()
+            return
+
+    async def _execute(self, *calls: tuple[Any, ...], wanted: bool = False) -> list[Any]:
+        """Run calls side by side in the workers; return their results.
+
+        Parameters
+        ----------
+        *calls : tuple
+            A function and its arguments.
+        wanted : bool
+            Whether they are wanted although the job was cancelled.
+
+        Raises
+        ------
+        _CancelledError
+            Where the job is cancelled before they have ended.
+        """
+        workers = self.runner.workers
+        limit_s = _LIMIT_S + _TIMES * self.longest if self.longest else _FIRST_LIMIT_S
+        futures = [workers.submit_within(limit_s, timed, *call) for call in calls]
+        answers = [asyncio.wrap_future(future) for future in futures]
+        try:
+            await self._await(futures, answers, wanted)
+            found = [answer.result() for answer in answers]
+        finally:
+            for future, answer in zip(futures, answers, strict=True):
+                if not answer.done():
+                    answer.cancel()
+                    workers.abandon(future)
+        self.cpu_s += math.fsum(spent for _, spent in found)
+        self.longest = max(self.longest, *(spent for _, spent in found))
+        return [result for result, _ in found]
+
+    async def _await(
+        self,
+        futures: Sequence[Future[Any]],
+        answers: Sequence["asyncio.Future[Any]"],
+        wanted: bool,
+    ) -> None:
+        """Return when all have ended or one has failed; see in between to the job."""
+        phase, cancelled = self.record.progress["phase"], False
+        while True:
+            ended, running = await asyncio.wait(
+                answers,
+                timeout=_GRACE_S if cancelled else _LOOK_S,
+                return_when=asyncio.FIRST_EXCEPTION,
             )
-        result, _ = await self._execute(_summary, fold.summarise, job, checkpoint, wall_s, cpu_s)
-        cancelled = known.cancel_requested and not progress.finished
-        status = "cancelled" if cancelled else "done"
-        await self._save(record.id, status=status, result=result)
+            for answer in ended:
+                answer.result()  # one that failed says so
+            if not running:
+                break
+            if cancelled:
+                raise _CancelledError
+            compiling = any(map(self.runner.workers.compiling, futures))
+            await self._tell("compiling" if compiling else phase)
+            cancelled = await self._look() and not wanted
+        await self._tell(phase)
 
-    async def draws(self, record: JobRecord, checkpoint: bytes, media_type: str) -> bytes:
-        """Return the draws that a job's checkpoint stands for, as a file."""
-        fold = self._fold
-        readers = (fold.Job.from_bytes, fold.Checkpoint.from_bytes)
-        data, _ = await self._execute(
-            write_draws, *readers, fold.draw, media_type, record.job, checkpoint
-        )
-        return data
-
-    async def _execute(self, function: Callable[..., R], *arguments: Any) -> tuple[R, float]:
-        """Run on the executor; return the result and the processor time [s]."""
-        future = self._executor.submit(timed, function, *arguments)
-        return await asyncio.wrap_future(future)
-
-    async def _save(self, job_id: str, **changes: Any) -> JobRecord | None:
-        return await asyncio.to_thread(lambda: self._store.update(job_id, **changes))
+    async def _look(self) -> bool:
+        """Look at the job in the store; return whether it was cancelled."""
+        try:
+            seen = await asyncio.to_thread(self.runner.store.get, self.record.id)
+        except StoreError:
+            return False
+        if seen is None or seen.number != self.record.number or seen.status != "running":
+            raise _LostError
+        self.record = seen
+        return seen.cancel_requested

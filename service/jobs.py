@@ -1,22 +1,25 @@
 """Posteriors as jobs: a fold over short pure chunks, on any executor.
 
 A job is never held in a worker: what runs there is one chunk (`service.job_runner`), and between
-two of them the job is in the store.
+two of them the job is in the store, which other processes may share.
 """
 
 import asyncio
+import contextlib
 import logging
 import uuid
-from concurrent.futures import Executor
-from typing import Any, Generic
+from collections.abc import AsyncIterator
+from importlib.metadata import version
+from typing import Generic
 
 from inference.posterior.settings import SamplerSettings
-from service.errors import BusyError, ConflictError, GoneError, NotFoundError
+from service.errors import BusyError, ConflictError, GoneError, NotFoundError, StoreError
+from service.exports.writing import write_draws
 from service.fold import C, Fold, J, P, T
-from service.job_runner import Runner
-from service.job_store import FINISHED, JobRecord, JobStore
-from service.problems import describe
-from simulator.errors import HybridTofError
+from service.job_runner import Runner, Workers
+from service.store.holder import holder_name
+from service.store.job_store import JobStore
+from service.store.record import FINISHED, JobRecord, NewJob
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
@@ -25,9 +28,13 @@ __all__ = ["Jobs"]
 
 _log = logging.getLogger("hybridtof")
 
+_RENEW_S = 3.0
+_SWEEP_EVERY = 600  # renewals
+_DRAWS_LIMIT_S = 600.0
+
 
 class Jobs(Generic[J, C, T, P]):
-    """Runs the posteriors of one process.
+    """Runs posteriors of a store in one process.
 
     Parameters
     ----------
@@ -35,23 +42,33 @@ class Jobs(Generic[J, C, T, P]):
         The computation, such as the module `inference.posterior.fold`.
     store : JobStore
         Where jobs are kept between chunks.
-    executor : concurrent.futures.Executor
+    workers : Workers
         Where chunks run.
     running : int
         How many jobs run at a time; the others wait in the order of their arrival.
+    look_s : float
+        How often it is looked whether other processes have left or changed something [s].
     """
 
     def __init__(
-        self, fold: Fold[J, C, T, P], store: JobStore, executor: Executor, running: int
+        self,
+        fold: Fold[J, C, T, P],
+        store: JobStore,
+        workers: Workers,
+        running: int,
+        look_s: float = 1.0,
     ) -> None:
         self._fold = fold
         self._store = store
-        self._executor = executor
-        self._runner = Runner(fold, store, executor)
+        self._workers = workers
         self._running = running
-        self._slots = asyncio.Semaphore(running)
-        self._tasks: dict[str, asyncio.Task[None]] = {}
-        self._waiting: set[str] = set()
+        self._look_s = look_s
+        self._version = f"{version('hybridtof')} {fold.FORMAT}"
+        self._runner = Runner(fold, store, workers, self._version, self._announce)
+        self._holder = holder_name()
+        self._tasks: list[asyncio.Task[None]] = []
+        self._held: set[str] = set()
+        self._news = asyncio.Event()
         self._open = False
 
     @property
@@ -61,20 +78,21 @@ class Jobs(Generic[J, C, T, P]):
 
     async def start(self) -> None:
         """Take jobs, first those that the store holds unfinished."""
-        self._slots = asyncio.Semaphore(self._running)
         self._open = True
-        for record in await asyncio.to_thread(self._store.unfinished):
-            self._schedule(record)
+        loops = [self._serve() for _ in range(self._running)]
+        self._tasks = [asyncio.create_task(loop) for loop in (*loops, self._hold())]
 
     async def close(self) -> None:
         """Stop between two instructions; what ran stays unfinished in the store."""
         self._open = False
-        tasks = list(self._tasks.values())
-        for task in tasks:
+        for task in self._tasks:
             task.cancel()
         # the processes are killed: a chunk is cheap to repeat, a shutdown must not wait for it
-        await asyncio.to_thread(self._executor.shutdown, True, cancel_futures=True)
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await asyncio.to_thread(self._workers.shutdown, True, cancel_futures=True)
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        with contextlib.suppress(StoreError):  # the leases run out by themselves
+            await asyncio.to_thread(self._store.release, self._holder)
+        await asyncio.to_thread(self._store.close)
 
     async def submit(
         self,
@@ -85,6 +103,7 @@ class Jobs(Generic[J, C, T, P]):
         *,
         key: str | None = None,
         digest: str = "",
+        client: str = "",
     ) -> JobRecord:
         """Prepare a job and let it run.
 
@@ -96,11 +115,13 @@ class Jobs(Generic[J, C, T, P]):
             How to sample.
         key, digest : str
             Idempotency key and a digest of the request.
+        client : str
+            To whom the job belongs.
 
         Returns
         -------
         JobRecord
-            Of the new job, or of the one that came with the same key before.
+            Of the new job, or of the one that came with the same key before; it is in the store.
 
         Raises
         ------
@@ -110,6 +131,8 @@ class Jobs(Generic[J, C, T, P]):
             Where the key came with another request.
         BusyError
             Where there is no room, or the service is ending.
+        StoreError
+            Where the store does not take it.
         """
         if not self._open:
             raise BusyError("the service is ending")
@@ -117,38 +140,66 @@ class Jobs(Generic[J, C, T, P]):
         seed = job.settings.seed
         if seed is None:
             raise ValueError("`Fold.prepare` resolves the seed")
-        record = JobRecord(
+        new = NewJob(
             id=uuid.uuid4().hex,
             job=await asyncio.to_thread(job.to_bytes),
+            format=self._version,
             method=job.settings.method,
             seed=seed,
             key=key,
             digest=digest,
+            client=client,
         )
-        kept = await asyncio.to_thread(self._store.add, record)
-        if kept.id == record.id:
-            self._schedule(kept)
+        kept = await asyncio.to_thread(self._store.add, new)
+        self._announce()
         return kept
 
-    async def get(self, job_id: str) -> JobRecord:
+    async def get(self, job_id: str, client: str = "") -> JobRecord:
         """Return a job as it stands.
 
         Raises
         ------
         NotFoundError
-            Where there is none of that name.
+            Where the client has none of that name.
         """
         record = await asyncio.to_thread(self._store.get, job_id)
-        if record is None:
+        if record is None or record.client != client:
             raise NotFoundError("there is no posterior of this id")
         return record
 
-    async def page(self, after: int | None, limit: int) -> list[JobRecord]:
+    async def page(self, after: int | None, limit: int, client: str = "") -> list[JobRecord]:
         """Return jobs, newest first; see `JobStore.page`."""
-        return await asyncio.to_thread(self._store.page, after, limit)
+        return await asyncio.to_thread(self._store.page, client, after, limit)
 
-    async def draws(self, job_id: str, media_type: str) -> bytes:
-        """Return the draws of a finished job, made anew from its last checkpoint.
+    async def follow(
+        self, job_id: str, after: int = 0, client: str = ""
+    ) -> AsyncIterator[JobRecord]:
+        """Yield a job at every change that is noticed, until it has ended or was deleted.
+
+        Parameters
+        ----------
+        job_id : str
+            Which job.
+        after : int
+            Revision that is known already.
+        client : str
+            To whom it belongs.
+        """
+        while self._open:
+            news = self._news
+            try:
+                record = await self.get(job_id, client)
+            except NotFoundError:
+                return
+            if record.revision > after:
+                after = record.revision
+                yield record
+            if record.status in FINISHED:
+                return
+            await self._wait(news)
+
+    async def draws(self, job_id: str, media_type: str, client: str = "") -> bytes:
+        """Return the draws of a job that has ended, made anew from its last checkpoint.
 
         Parameters
         ----------
@@ -156,6 +207,8 @@ class Jobs(Generic[J, C, T, P]):
             Which job.
         media_type : str
             Of one of `service.exports.EXPORTS`.
+        client : str
+            To whom it belongs.
 
         Returns
         -------
@@ -169,21 +222,28 @@ class Jobs(Generic[J, C, T, P]):
         ConflictError
             Where the job has not ended, or ended without draws.
         GoneError
-            Where the draws had to make room for others.
+            Where the draws had to make room for others, or were made by another version.
         """
-        record = await self.get(job_id)
+        record = await self.get(job_id, client)
         if record.status not in FINISHED:
             raise ConflictError("the posterior is not finished: wait for it, or cancel it")
-        if record.status == "failed" or record.result is None:
+        if record.result is None or not record.result["drawn"]:
             raise ConflictError("this posterior ended before anything was drawn")
-        if record.checkpoint is None:
-            raise GoneError(
-                "the draws made room for those of other posteriors; the same request with this "
-                "seed gives the same draws"
-            )
-        return await self._runner.draws(record, record.checkpoint, media_type)
+        kept = await asyncio.to_thread(self._store.drawn, job_id)
+        if kept is None:
+            raise NotFoundError("there is no posterior of this id")
+        if not kept.pieces or record.format != self._version:
+            reason = "made room for those of other posteriors"
+            if kept.pieces:
+                reason = "are in the form of another version of hybridtof"
+            raise GoneError(f"the draws {reason}; ask again with the same seed")
+        call = write_draws, self._fold.Job.from_bytes, self._fold.Checkpoint.from_bytes
+        future = self._workers.submit_within(
+            _DRAWS_LIMIT_S, *call, self._fold.draw, media_type, kept.job, kept.pieces
+        )
+        return await asyncio.wrap_future(future)
 
-    async def cancel(self, job_id: str) -> JobRecord:
+    async def cancel(self, job_id: str, client: str = "") -> JobRecord:
         """End a job after the chunk that runs; one that has ended is left as it is.
 
         Raises
@@ -191,18 +251,14 @@ class Jobs(Generic[J, C, T, P]):
         NotFoundError
             Where there is none of that name.
         """
-        record = await self.get(job_id)
-        if record.status in FINISHED:
-            return record
-        changes: dict[str, Any] = {"cancel_requested": True}
-        if job_id in self._waiting:
-            self._waiting.discard(job_id)
-            self._tasks[job_id].cancel()
-            changes["status"] = "cancelled"
-        changed = await asyncio.to_thread(lambda: self._store.update(job_id, **changes))
-        return changed or record
+        await self.get(job_id, client)
+        record = await asyncio.to_thread(self._store.cancel, job_id)
+        if record is None:
+            raise NotFoundError("there is no posterior of this id")
+        self._announce()
+        return record
 
-    async def delete(self, job_id: str) -> None:
+    async def delete(self, job_id: str, client: str = "") -> None:
         """Forget a job; if it runs, its last chunk is thrown away.
 
         Raises
@@ -210,38 +266,58 @@ class Jobs(Generic[J, C, T, P]):
         NotFoundError
             Where there is none of that name.
         """
+        await self.get(job_id, client)
         if not await asyncio.to_thread(self._store.delete, job_id):
             raise NotFoundError("there is no posterior of this id")
-        if job_id in self._tasks:
-            self._tasks[job_id].cancel()
+        self._announce()
 
-    async def wait(self, job_id: str, timeout_s: float | None = None) -> bool:
-        """Wait for the end of a job of this process, or for a time; whether it has ended."""
-        task = self._tasks.get(job_id)
-        if task is not None:
-            await asyncio.wait([task], timeout=timeout_s)
-        return task is None or task.done()
+    async def _serve(self) -> None:
+        """Run one job after the other."""
+        while self._open:
+            news = self._news
+            try:
+                if await self._serve_one():
+                    continue
+            except StoreError as error:
+                _log.warning("%s", error)
+            except Exception:
+                _log.exception("a posterior was left as it is")
+            await self._wait(news)
 
-    def _schedule(self, record: JobRecord) -> None:
-        task = asyncio.get_running_loop().create_task(self._run(record))
-        self._tasks[record.id] = task
-        self._waiting.add(record.id)
-        task.add_done_callback(lambda _: self._tasks.pop(record.id, None))
-
-    async def _run(self, record: JobRecord) -> None:
+    async def _serve_one(self) -> bool:
+        """Run a job that nobody holds; whether there was one."""
+        claimed = await asyncio.to_thread(self._store.claim, self._holder)
+        if claimed is None:
+            return False
+        self._held.add(claimed.record.id)
         try:
-            async with self._slots:
-                self._waiting.discard(record.id)
-                await self._runner.run(record)
-        except HybridTofError as error:
-            await self._fail(record.id, describe(error))
-        except Exception as error:
-            _log.exception("posterior %s failed", record.id)
-            await self._fail(record.id, describe(HybridTofError(type(error).__name__)))
+            await self._runner.run(claimed)
         finally:
-            self._waiting.discard(record.id)
+            self._held.discard(claimed.record.id)
+        self._announce()
+        return True
 
-    async def _fail(self, job_id: str, problem: dict[str, Any]) -> None:
-        await asyncio.to_thread(
-            lambda: self._store.update(job_id, status="failed", problem=problem, checkpoint=None)
-        )
+    async def _hold(self) -> None:
+        """Go on holding what runs here, and from time to time forget what is too old."""
+        turn = 0
+        while self._open:
+            try:
+                if turn % _SWEEP_EVERY == 0:
+                    await asyncio.to_thread(self._store.sweep)
+                if self._held:
+                    await asyncio.to_thread(self._store.renew, self._holder, tuple(self._held))
+            except StoreError as error:
+                _log.warning("%s", error)
+            turn += 1
+            await asyncio.sleep(_RENEW_S)
+
+    def _announce(self) -> None:
+        """Wake whoever waits for news."""
+        self._news.set()
+        self._news = asyncio.Event()
+
+    async def _wait(self, news: asyncio.Event) -> None:
+        """Return when something has changed here, or may have elsewhere."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(self._look_s):
+                await news.wait()

@@ -14,6 +14,8 @@ GoneError                  410    was there, and is kept no longer
 BodyTooLargeError          413
 UnsupportedMediaTypeError  415
 BusyError                  503    with ``Retry-After``
+StoreError                 503    with ``Retry-After``; nothing that was accepted is lost
+WorkerDiedError            500    of a job: a chunk of it ended every process that ran it
 ========================== ====== =====================================================
 
 A refusal is 422 and not 409: it depends on the request alone, not on the state of a resource.
@@ -41,7 +43,9 @@ from service.errors import (
     MalformedError,
     NotAcceptableError,
     NotFoundError,
+    StoreError,
     UnsupportedMediaTypeError,
+    WorkerDiedError,
 )
 from simulator.errors import HybridTofError, InvalidInputError, Problem, RefusedError, escape
 
@@ -96,6 +100,8 @@ _KINDS: Mapping[type[HybridTofError], tuple[HTTPStatus, str, str]] = {
         "The body must be JSON",
     ),
     BusyError: (HTTPStatus.SERVICE_UNAVAILABLE, "busy", "The service takes no more work now"),
+    StoreError: (HTTPStatus.SERVICE_UNAVAILABLE, "store", "The store of jobs does not answer"),
+    WorkerDiedError: (HTTPStatus(500), "worker-died", "The computation ended its process"),
 }
 
 
@@ -152,7 +158,7 @@ def _response(details: Mapping[str, Any], headers: Mapping[str, str] | None = No
 async def _on_known(_: Request, error: Exception) -> Response:
     assert isinstance(error, HybridTofError)  # noqa: S101 (registered for this class alone)
     details = describe(error)
-    headers = {"Retry-After": "5"} if isinstance(error, BusyError) else None
+    headers = {"Retry-After": "5"} if isinstance(error, BusyError | StoreError) else None
     if details["status"] == HTTPStatus.INTERNAL_SERVER_ERROR:
         return await _on_unknown(_, error)
     return _response(details, headers)
@@ -161,6 +167,8 @@ async def _on_known(_: Request, error: Exception) -> Response:
 async def _on_http(_: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)  # noqa: S101
     status = HTTPStatus(error.status_code)
+    if status == HTTPStatus.NO_CONTENT:
+        return Response(status_code=status, headers=error.headers)
     slug = status.phrase.lower().replace(" ", "-")
     details = _details(status, slug, status.phrase, str(error.detail))
     return _response(details, error.headers)

@@ -6,70 +6,31 @@ the answer, and where the process died instead it starts another and hands the t
 """
 
 import contextlib
-import multiprocessing
-import os
+import logging
 import queue
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor, Future
-from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnProcess
 from typing import Any, ParamSpec, TypeVar
 
 from service.errors import WorkerDiedError
-from service.worker import THREAD_VARIABLES, work
+from service.worker_process import DiedError, Watch, WorkerProcess
 
 __all__ = ["ProcessPool"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_ATTEMPTS = 3
-_environment_lock = threading.Lock()
-_Task = tuple[Future[Any], Callable[..., Any], tuple[Any, ...]]
-
-
-@contextlib.contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Let processes that are started inside inherit the limit of one thread."""
-    with _environment_lock:
-        before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
-        os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
-        try:
-            yield
-        finally:
-            for name, value in before.items():
-                if value is None:
-                    del os.environ[name]
-                else:
-                    os.environ[name] = value
-
-
-class _Worker:
-    """One process and the near end of its pipe."""
-
-    process: SpawnProcess
-    pipe: "Connection[object, object]"
-
-    def __init__(self) -> None:
-        # in the thread that serves it until its end: a worker ends with the thread that started it
-        context = multiprocessing.get_context("spawn")
-        self.pipe, far = context.Pipe()
-        self.process = context.Process(target=work, args=(far,), daemon=True)
-        with _one_thread_each():
-            self.process.start()
-        far.close()  # so that the process's death is the end of the pipe
-
-    def ask(self, task: object) -> tuple[bool, Any]:
-        self.pipe.send(task)
-        answer: Any = self.pipe.recv()
-        return bool(answer[0]), answer[1]
-
-    def end(self, kill: bool) -> None:
-        if kill:
-            self.process.kill()
-        self.pipe.close()
-        self.process.join()
+_log = logging.getLogger("hybridtof")
+# of its own doing, such as SIGSEGV: the next try will hardly differ
+_OWN_DEATHS = 3
+# by signals from outside, which are not the task's fault: somebody has to mean it
+_DEATHS = 25
+_FIRST_PAUSE_S = 0.05
+_LONGEST_PAUSE_S = 2.0
+# tasks without a limit of their own: an hour of one processor
+_LIMIT_S = 3600.0
+_Task = tuple[Future[Any], Watch, Callable[..., Any], tuple[Any, ...]]
 
 
 class ProcessPool(Executor):
@@ -79,18 +40,23 @@ class ProcessPool(Executor):
     ----------
     workers : int
         Number of processes; they start with the first task.
+    stall_s : float
+        How long a process that works on a task may take no processor time [s].
 
     Notes
     -----
-    A task is run again when its process died, so it must be pure. After three deaths its future
-    raises `WorkerDiedError`.
+    A task is run again when its process died, so it must be pure. Its future raises
+    `WorkerDiedError` after three deaths of its own doing, or 25 by signals from outside.
     """
 
-    def __init__(self, workers: int) -> None:
+    def __init__(self, workers: int, stall_s: float = 10.0) -> None:
         self._tasks: queue.SimpleQueue[_Task | None] = queue.SimpleQueue()
+        self._stall_s = stall_s
         self._lock = threading.Lock()
-        self._closed = False
-        self._workers: dict[int, _Worker] = {}
+        self._closed = threading.Event()
+        self._workers: dict[int, WorkerProcess] = {}
+        self._running: dict[Future[Any], tuple[int, Watch]] = {}
+        self._unwanted: set[Future[Any]] = set()
         self._threads = [
             threading.Thread(target=self._serve, args=(index,), name=f"worker-{index}", daemon=True)
             for index in range(workers)
@@ -101,7 +67,7 @@ class ProcessPool(Executor):
     def pids(self) -> tuple[int, ...]:
         """Ids of the processes that are there."""
         with self._lock:
-            return tuple(w.process.pid for w in self._workers.values() if w.process.pid is not None)
+            return tuple(worker.pid for worker in self._workers.values())
 
     def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
         """Hand over a pure, picklable function with its arguments.
@@ -127,16 +93,46 @@ class ProcessPool(Executor):
         """
         if kwargs:
             raise TypeError("tasks take positional arguments")
+        return self.submit_within(_LIMIT_S, fn, *args)
+
+    def submit_within(self, limit_s: float, fn: Callable[..., R], /, *args: Any) -> Future[R]:
+        """Hand over a task that is to take no more than some processor time.
+
+        Parameters
+        ----------
+        limit_s : float
+            Processor time of the task [s], without that of compiling; beyond it the process is
+            ended, and the task run again as if it had crashed.
+        fn, *args
+            As of `submit`.
+        """
         future: Future[R] = Future()
         with self._lock:
-            if self._closed:
+            if self._closed.is_set():
                 raise RuntimeError("the pool is closed")
             if not self._started:
                 self._started = True
                 for thread in self._threads:
                     thread.start()
-            self._tasks.put((future, fn, args))
+            self._tasks.put((future, Watch(limit_s, self._stall_s), fn, args))
         return future
+
+    def compiling(self, future: Future[Any]) -> bool:
+        """Tell whether machine code is being made for a task."""
+        with self._lock:
+            running = self._running.get(future)
+        return running is not None and running[1].compiling
+
+    def abandon(self, future: Future[Any]) -> None:
+        """Give a task up, at once: a process that runs it is ended."""
+        if future.cancel():
+            return
+        with self._lock:
+            if future in self._running:
+                self._unwanted.add(future)
+                worker = self._workers.get(self._running[future][0])
+                if worker is not None:
+                    worker.process.kill()
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes; those that run a task first finish it, unless it is cancelled.
@@ -149,7 +145,8 @@ class ProcessPool(Executor):
             Kill the processes, running tasks or not, and cancel all futures.
         """
         with self._lock:
-            closed, self._closed = self._closed, True
+            closed = self._closed.is_set()
+            self._closed.set()
             started = self._started
         if cancel_futures:
             self._cancel_waiting()
@@ -171,49 +168,60 @@ class ProcessPool(Executor):
                     task[0].cancel()
 
     def _serve(self, index: int) -> None:
-        worker: _Worker | None = None
         while (task := self._tasks.get()) is not None:
-            future, function, arguments = task
+            future, watch, function, arguments = task
             if not future.set_running_or_notify_cancel():
                 continue
-            worker = self._answer(index, worker, future, (function, arguments))
+            with self._lock:
+                self._running[future] = index, watch
+            try:
+                succeeded, result = self._answer(index, future, watch, (function, arguments))
+            finally:
+                with self._lock:
+                    del self._running[future]
+                    self._unwanted.discard(future)
+            if succeeded:
+                future.set_result(result)
+            else:
+                future.set_exception(result)
+        with self._lock:
+            worker = self._workers.pop(index, None)
         if worker is not None:
             worker.end(kill=False)
-        with self._lock:
-            self._workers.pop(index, None)
 
     def _answer(
-        self, index: int, worker: _Worker | None, future: Future[Any], task: object
-    ) -> _Worker | None:
-        """Run one task; return the process that is left for the next."""
-        for _ in range(_ATTEMPTS):
+        self, index: int, future: Future[Any], watch: Watch, task: object
+    ) -> tuple[bool, Any]:
+        """Run one task, again and again if need be; tell whether it succeeded, and with what."""
+        own, deaths = 0, 0
+        while future not in self._unwanted and not self._closed.is_set():
             try:
-                if worker is None:
-                    worker = self._replace(index)
-                succeeded, result = worker.ask(task)
-            except (EOFError, OSError):  # the process died: the pipe ended
-                if worker is not None:
-                    worker.end(kill=True)
-                    worker = None
-                if self._closed:
+                return self._worker(index).ask(task, watch)
+            except DiedError as error:
+                with self._lock:
+                    self._workers.pop(index, None)
+                if future in self._unwanted or self._closed.is_set():
                     break
+                own, deaths = own + error.own, deaths + 1
+                _log.warning("a worker died (%s); its task is run again", error)
+                if own >= _OWN_DEATHS or deaths >= _DEATHS:
+                    message = f"a part of the computation ended {deaths} processes, last: {error}"
+                    return False, WorkerDiedError(message)
             except Exception as error:  # the task cannot be pickled
-                future.set_exception(error)
-                return worker
-            else:
-                if succeeded:
-                    future.set_result(result)
-                else:
-                    future.set_exception(result)
-                return worker
-        message = "the pool was closed" if self._closed else f"a task ended {_ATTEMPTS} processes"
-        future.set_exception(WorkerDiedError(message))
-        return worker
+                return False, error
+            self._closed.wait(min(_FIRST_PAUSE_S * 2 ** (deaths - 1), _LONGEST_PAUSE_S))
+        return False, WorkerDiedError("the task was given up, or the pool was closed")
 
-    def _replace(self, index: int) -> _Worker:
-        worker = _Worker()
+    def _worker(self, index: int) -> WorkerProcess:
+        """Return the process of a thread; to be called in that thread."""
+        with self._lock:
+            worker = self._workers.get(index)
+        if worker is not None:
+            return worker
+        # started in the thread that serves it until its end: it ends with that thread
+        worker = WorkerProcess()
         with self._lock:
             self._workers[index] = worker
-            if self._closed:  # shutdown did not see this process
+            if self._closed.is_set():  # shutdown did not see this process
                 worker.process.kill()
         return worker

@@ -25,10 +25,15 @@ class ServiceSettings(pydantic.BaseModel):
         Threads for estimates and simulations.
     max_body_bytes : int
         Largest request body: a million frames of six columns need about 128 MiB.
+    database : str or None
+        Address of the store of jobs, of an SQLite file or PostgreSQL; None: a file in the user's
+        state folder.
     max_jobs : int
         Posteriors that are kept; finished ones make room for new ones, the oldest first.
     max_draws_bytes : int
-        Memory for the draws of finished posteriors; the oldest make room.
+        Bytes for the draws of finished posteriors; the oldest make room.
+    keep_days : float
+        How long finished posteriors are kept [days].
     shutdown_s : float
         How long open requests may take to end after SIGTERM [s].
     """
@@ -38,8 +43,10 @@ class ServiceSettings(pydantic.BaseModel):
     workers: Count = pydantic.Field(default_factory=lambda: os.cpu_count() or 1)
     threads: Count = 2
     max_body_bytes: Count = 128 * 2**20
+    database: str | None = None
     max_jobs: Count = 1000
     max_draws_bytes: Count = 2**30
+    keep_days: Annotated[float, pydantic.Field(gt=0)] = 30.0
     shutdown_s: Annotated[float, pydantic.Field(ge=0, le=10)] = 5.0
 
     @classmethod

@@ -174,6 +174,10 @@ def answer_of(track: Track, i: int) -> dict[str, Any]:
         "status": Status(int(track.status[i])).name.lower(),
         "range_m": _number(track.range_m[i]),
         "sd_m": _number(track.sd_m[i]),
+        "sd_parts_m": {
+            name: _number(part[i]) if math.isfinite(track.sd_m[i]) else None
+            for name, part in track.sd_parts_m._asdict().items()
+        },
         "hypotheses": [
             {"range_m": _number(range_m), "sd_m": _number(sd_m), "weight": _number(weight)}
             for range_m, sd_m, weight in hypotheses

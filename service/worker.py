@@ -11,11 +11,15 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
+from service.compile_watch import compiling_s, watch_compiling
 from service.parent_death import end_with_parent
 
-__all__ = ["THREAD_VARIABLES", "timed", "work"]
+__all__ = ["COMPILING", "THREAD_VARIABLES", "timed", "work"]
 
 T = TypeVar("T")
+
+COMPILING = "compiling"
+"""Marks a message that says whether machine code is being made; the others are answers."""
 
 # numerical libraries read these when they are imported: one thread a process
 THREAD_VARIABLES = (
@@ -30,6 +34,8 @@ THREAD_VARIABLES = (
 
 def work(pipe: "Connection[object, object]") -> None:
     """Run tasks from a pipe and send back ``(True, result)`` or ``(False, exception)``.
+
+    Before it there may be any number of ``(COMPILING, True or False)``.
 
     Parameters
     ----------
@@ -52,6 +58,8 @@ def work(pipe: "Connection[object, object]") -> None:
         except Exception as error:
             answer: tuple[bool, object] = (False, _portable(error))
         else:
+            # the task has brought numba with it, if it needs any
+            watch_compiling(lambda going: pipe.send((COMPILING, going)))
             answer = _run(task)
         try:
             pipe.send(answer)
@@ -79,7 +87,7 @@ def _portable(error: Exception) -> Exception:
 
 
 def timed(function: Callable[..., T], *arguments: Any) -> tuple[T, float]:
-    """Run a function and measure it.
+    """Run a function and measure it, the making of machine code apart.
 
     Parameters
     ----------
@@ -93,6 +101,6 @@ def timed(function: Callable[..., T], *arguments: Any) -> tuple[T, float]:
     tuple
         The result, and the processor time of this process [s].
     """
-    before = time.process_time()
+    before, compiled = time.process_time(), compiling_s()
     result = function(*arguments)
-    return result, time.process_time() - before
+    return result, time.process_time() - before - (compiling_s() - compiled)

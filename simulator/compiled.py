@@ -15,7 +15,7 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 
-__all__ = ["compiled"]
+__all__ = ["compiled", "compiled_for_both"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -93,6 +93,22 @@ def _dispatcher(
         _config.CACHE_DIR = previous
 
 
+def _answer_calls(kernel: Any, called: Any) -> None:
+    """Let the machine code of one dispatcher answer the calls of kernels to another.
+
+    A number that a caller writes out is one of its type there: as numba has it, a type of its own,
+    a kernel is compiled anew for every 0 and 1.
+    """
+    template: Any = called.get_call_template
+    unliteral: Any = numba.types.unliteral
+
+    def of_types(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+        kinds = {name: unliteral(kind) for name, kind in kws.items()}
+        return template(tuple(map(unliteral, args)), kinds)
+
+    kernel.get_call_template, kernel.get_overload = of_types, called.get_overload
+
+
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a pure function of numbers, tuples and arrays to machine code.
 
@@ -108,6 +124,12 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     kernel = _dispatcher(function, directory)
     below = None if directory is None else str(Path(directory) / "called")
     kernel.called = _dispatcher(function, below, no_cpython_wrapper=True)
-    kernel.get_call_template = kernel.called.get_call_template
-    kernel.get_overload = kernel.called.get_overload
+    _answer_calls(kernel, kernel.called)
+    return cast("Callable[P, R]", kernel)
+
+
+def compiled_for_both(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a kernel that Python and kernels call with arguments of the same types: once."""
+    kernel = _dispatcher(function, _cache_directory(Path(function.__code__.co_filename).resolve()))
+    _answer_calls(kernel, kernel)
     return cast("Callable[P, R]", kernel)

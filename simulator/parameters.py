@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from simulator.errors import RefusedError
 from simulator.range_prior import RangePrior, range_prior, range_prior_rows, stroke_unknowns
-from simulator.scene import Reference, Scene, Stroke, check_scene
+from simulator.scene import Reference, Scene, Stroke
+from simulator.scene_checks import check_scene
 from simulator.sensor import PulsedSensor, Sensor
 from simulator.unknowns import Unknown, Values, add_quantity, add_reflectance, add_shape
 

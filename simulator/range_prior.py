@@ -29,7 +29,13 @@ _STROKE_SPREAD = LogNormal(median=0.5, sigma=1.0).distribution()
 
 
 def range_prior(sensor: Sensor, scene: Scene) -> RangePrior:
-    """Return the prior of the ranges, cut to what the sensor reaches and a known background."""
+    """Return the prior of the ranges, cut to what the sensor reaches and a known background.
+
+    Where the scene states none it is the reference prior: an object on its way is the rule, and
+    independent draws are for those to state who know that they are. The one range of an object at
+    rest is one draw: there is no spread to take anything from, and its law is log-uniform, which
+    unlike a reference prior has the same mass whatever the other unknowns are.
+    """
     limit = sensor.r0 if isinstance(sensor, PulsedSensor) else math.inf
     if scene.background is not None and isinstance(scene.background.distance_m, float | int):
         limit = min(limit, scene.background.distance_m)
@@ -37,8 +43,10 @@ def range_prior(sensor: Sensor, scene: Scene) -> RangePrior:
         high = min(sensor.max_range_m, _DEFAULT_RANGE[1], limit)
         # a sensor that sees less than 2 cm still has ranges
         low = _DEFAULT_RANGE[0] if high > _DEFAULT_RANGE[0] else high / 100
-        # not a `LogUniform`: sizes are asked of what is stated, not of what follows from it
-        return UniformDistribution(log=True, low=low, high=high)
+        # neither is validated: sizes are asked of what is stated, not of what follows from it
+        if scene.motion == "static":
+            return UniformDistribution(log=True, low=low, high=high)
+        return Reference.model_construct(low=low, high=high)
     if isinstance(scene.range_m, Stroke | Reference):
         return type(scene.range_m)(low=scene.range_m.low, high=min(scene.range_m.high, limit))
     return scene.range_m.distribution().truncated(0.0, limit)

@@ -5,10 +5,8 @@ from typing import Annotated, Literal, Self
 
 import pydantic
 
-from simulator.discrepancy import DISCREPANCY_SD
-from simulator.errors import InvalidInputError, Problem
-from simulator.priors import LEAST_LOG_MASS, Prior
-from simulator.sensor import PulsedSensor, Sensor
+from simulator.model_error import Discrepancy, ModelError
+from simulator.priors import Prior
 from simulator.validated import Number, Positive, Validated, parse
 
 __all__ = [
@@ -21,8 +19,6 @@ __all__ = [
     "Scene",
     "Shadow",
     "Stroke",
-    "check_scene",
-    "largest",
     "parse_scene",
 ]
 
@@ -143,9 +139,9 @@ class Reference(_Support):
     """Ranges inside [low, high] [m] of whose spread nothing is assumed.
 
     Given the other unknowns every range has its own reference prior (Berger and Bernardo 1992): the
-    square root of its Fisher information, joined to a log-uniform density where the readings say
-    less than that. How the ranges are spread then tells nothing of the other unknowns, as it would
-    if they were taken for independent draws of one law.
+    square root of its Fisher information, joined to a log-uniform density where the readings tell
+    it to worse than a fifth of itself. How the ranges are spread then tells nothing of the other
+    unknowns, as it would if they were taken for independent draws of one law.
     """
 
     prior: Literal["reference"] = "reference"
@@ -169,14 +165,6 @@ def _no_number(value: object) -> object:
     return value
 
 
-def _size_of_discrepancy(value: object) -> object:
-    if value == "default":
-        return DISCREPANCY_SD
-    if isinstance(value, str):
-        raise ValueError('must be a standard deviation, such as 0.07, or "default"')
-    return value
-
-
 class Scene(Validated):
     """A scene. Everything that it does not mention is left out of every model made from it.
 
@@ -189,13 +177,15 @@ class Scene(Validated):
     background : Background, optional
         Left out: there is none.
     range_m : Prior, Stroke or Reference, optional
-        Prior of every range [m]. Left out: loguniform (0.02 m, the smaller of the sensor's
-        unambiguous range and 20 m).
+        Prior of every range [m]. Left out: `Reference` (0.02 m, the smaller of the sensor's
+        unambiguous range and 20 m); for the one range of an object at rest, loguniform there.
     motion : "radial", "tangential" or "static"
         Tangential: the range is fixed and the amplitude changes.
-    discrepancy : float, optional
-        Standard deviation of a smooth relative error of the object's flux along log r; "default"
-        stands for `simulator.discrepancy.DISCREPANCY_SD`, measured on the optical simulator.
+    discrepancy : float, "default" or ErrorSizes, optional
+        How wrong the model may be: standard deviations of a smooth relative error of the object's
+        flux and of a smooth error of the effective distance, both along log r; one number is the
+        flux's alone, 0 is an exact model. Left out: "default", the sizes that were measured
+        (`simulator.model_error`), since no object is exactly as the model.
     """
 
     object: ObjectTerm = ObjectTerm()
@@ -221,13 +211,17 @@ class Scene(Validated):
         | None
     ) = None
     motion: Motion = "radial"
-    discrepancy: Annotated[
-        Positive | None,
-        pydantic.BeforeValidator(
-            _size_of_discrepancy,
-            json_schema_input_type=Positive | Literal["default"] | None,
-        ),
-    ] = None
+    discrepancy: Discrepancy | None = None
+
+    @property
+    def model_error(self) -> ModelError:
+        """How wrong the model of flux and time of flight may be."""
+        return ModelError.stated(self.discrepancy)
+
+    @property
+    def stated_flux_error(self) -> float | None:
+        """The flux's error where the scene states one: only until all floors use `model_error`."""
+        return (self.model_error.flux or None) if self.discrepancy is not None else None
 
     @property
     def crosstalk_values(self) -> tuple[Quantity, Quantity] | None:
@@ -274,92 +268,3 @@ def parse_scene(data: object) -> Scene:
         With a pointer for each offending field.
     """
     return parse(Scene, data)
-
-
-def _check_support(value: Quantity | None, low: float, high: float, where: str) -> list[Problem]:
-    """Check a number against an open interval, a prior for any mass inside it."""
-    if value is None:
-        return []
-    if isinstance(value, float | int):
-        if not low < value < high:
-            wanted = f"above {low:g}" if high == math.inf else f"between {low:g} and {high:g}"
-            return [Problem(where, f"must be {wanted}, is {value:g}")]
-        return []
-    if not float(value.distribution().log_mass(low, high)) > LEAST_LOG_MASS:
-        return [Problem(where, f"the prior has no mass between {low:g} and {high:g}")]
-    return []
-
-
-def largest(value: Quantity | None) -> float:
-    """Return the largest value that a quantity can take (None: a default, without a bound)."""
-    if value is None:
-        return math.inf
-    return float(value) if isinstance(value, float | int) else value.distribution().high
-
-
-def _check_shape(c0: Quantity | None, c1: Quantity | None, where: str) -> list[Problem]:
-    """Check c0 > 0 and c1 > -2 sqrt(c0): else the flux has poles (docs/model.md, conventions)."""
-    problems = _check_support(c0, 0.0, math.inf, f"{where}/c0")
-    if problems or c1 is None:
-        return problems
-    # with c0 free the widest support decides: a joint prior is refused only where nothing is left
-    least = -2 * math.sqrt(largest(c0)) if largest(c0) < math.inf else -math.inf
-    if isinstance(c1, float | int) and isinstance(c0, float | int):
-        if not c1 > least:
-            return [Problem(f"{where}/c1", f"must be above -2 sqrt(c0) = {least:g}, is {c1:g}")]
-        return []
-    if isinstance(c1, float | int):
-        if not c1 > least:
-            return [Problem(f"{where}/c1", "no c0 of its prior satisfies c1 > -2 sqrt(c0)")]
-        return []
-    return _check_support(c1, least, math.inf, f"{where}/c1")
-
-
-def check_scene(sensor: Sensor, scene: Scene) -> None:
-    """Check known numbers and priors against physics and against the sensor.
-
-    Parameters
-    ----------
-    sensor : Sensor
-        A pulsed sensor cannot tell ranges or backgrounds beyond r0.
-    scene : Scene
-        The scene.
-
-    Raises
-    ------
-    InvalidInputError
-        With a pointer into the scene for each offending field.
-    """
-    problems = _check_shape(scene.object.c0, scene.object.c1, "/object")
-    problems += _check_support(scene.object.c2, 0.0, math.inf, "/object/c2")
-    limit, of_limit = (sensor.r0 if isinstance(sensor, PulsedSensor) else math.inf), "r0 ="
-    if scene.background is not None:
-        where = "/background"
-        problems += _check_support(scene.background.strength, 0.0, math.inf, f"{where}/strength")
-        distance = scene.background.distance_m
-        problems += _check_support(distance, 0.0, math.inf, f"{where}/distance_m")
-        if isinstance(distance, float | int):
-            if distance > limit:
-                message = (
-                    f"lies beyond r0 = {limit:g} m, where the late window of a pulse saturates"
-                )
-                problems.append(Problem(f"{where}/distance_m", message))
-        else:
-            problems += _check_support(distance, 0.0, limit, f"{where}/distance_m")
-        if isinstance(scene.background.shadow, Shadow):
-            shadow = scene.background.shadow
-            problems += _check_shape(shadow.c0, shadow.c1, f"{where}/shadow")
-        if isinstance(distance, float | int) and 0 < distance < limit:
-            limit, of_limit = float(distance), "the background at"
-    if isinstance(scene.range_m, Stroke | Reference):
-        # in logarithms, which are what a common law of the ranges is made from
-        if math.log(scene.range_m.low) >= math.log(limit):
-            problems.append(Problem("/range_m/low", f"lies beyond {of_limit} {limit:g} m"))
-    elif scene.range_m is not None:
-        problems += _check_support(scene.range_m, 0.0, limit, "/range_m")
-        if scene.range_m.distribution().range_form is None:
-            problems.append(
-                Problem("/range_m/prior", f"{scene.range_m.prior!r} cannot be the prior of ranges")
-            )
-    if problems:
-        raise InvalidInputError(*dict.fromkeys(problems))

@@ -1,6 +1,7 @@
 """Seeded simulation of frames from a scene, a sensor and a trajectory."""
 
 import dataclasses
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,7 @@ class Simulation:
 def _frame_moments(
     ranges: Array,
     factor: Array,
+    late: Array | None,
     gain: float,
     r0: float,
     wave: Pair | None,
@@ -56,13 +58,22 @@ def _frame_moments(
     shot: float | None,
     relative: float | None,
 ) -> Array:
-    """Return means and noise parts of every frame, shape (n, 7)."""
+    """Return means and noise parts of every frame, shape (n, 7).
+
+    ``late`` is what the time of flight tells too much [m]; None for an exact one.
+    """
     out = np.empty((ranges.size, 7))
     for i in range(ranges.size):
         o1, o2 = 0.0, 0.0
         if np.isfinite(ranges[i]):
             strength = gain * shape[0] * shape[2] * factor[i]
             o1, o2 = object_readings(ranges[i], r0, wave, strength, shape[0], shape[1])
+            if late is not None:
+                if wave is not None:
+                    cosine, sine = math.cos(wave[0] * late[i]), math.sin(wave[0] * late[i])
+                    o1, o2 = o1 * cosine - o2 * sine, o1 * sine + o2 * cosine
+                else:
+                    o1 = o2 * max(min((ranges[i] + late[i]) / r0, 1.0), 0.0)
         m1, m2 = o1, o2
         if background is not None:
             b1, b2 = background_readings(ranges[i], r0, wave, background)
@@ -76,13 +87,16 @@ def _frame_moments(
     return out
 
 
-def _moments(sensor: Sensor, terms: Terms, ranges: Array, factor: Array) -> Array:
+def _moments(
+    sensor: Sensor, terms: Terms, ranges: Array, factor: Array, late: Array | None = None
+) -> Array:
     c0, c1, c2 = terms.object[0].tolist()
     noise = sensor.noise
     r0, wave = instrument(sensor)
     return _frame_moments(
         ranges,
         factor,
+        late,
         sensor.gain,
         r0,
         wave,
@@ -116,17 +130,17 @@ def mean_readings(sensor: Sensor, terms: Terms, ranges: Array) -> Array:
     return _moments(sensor, terms, ranges, np.ones(ranges.size))[:, :2]
 
 
-def _discrepancy(rng: np.random.Generator, ranges: Array, sd: float) -> Array:
-    """Draw factors exp(delta(log r)), delta a Gaussian process with Matern 5/2 covariance."""
+def _smooth_error(rng: np.random.Generator, ranges: Array, sd: float) -> Array:
+    """Draw a Gaussian process along log r with Matern 5/2 covariance at given ranges."""
     logs = np.log(ranges[np.isfinite(ranges)])
     if logs.size == 0:
-        return np.ones(ranges.size)
+        return np.zeros(ranges.size)
     knots = np.linspace(logs.min() - 1e-9, logs.max() + 1e-9, 200)
     # a smooth kernel is singular to rounding: the square root is taken from its eigenvalues
     values, vectors = linalg.eigh(matern(knots[:, None] - knots[None, :]))
     path = sd * vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(knots.size))
     finite = np.where(np.isfinite(ranges), ranges, np.exp(knots[0]))
-    return np.asarray(np.exp(np.interp(np.log(finite), knots, path)))
+    return np.asarray(np.interp(np.log(finite), knots, path))
 
 
 def simulate(
@@ -142,7 +156,8 @@ def simulate(
     sensor : Sensor
         Its noise is added; readings are cut at its full scale.
     scene : Scene
-        Unknowns are drawn once from their priors.
+        Unknowns are drawn once from their priors, and so are model errors that it states in
+        numbers; its default of them adds nothing.
     trajectory : RadialTrajectory or SampledTrajectory
         True ranges, used as they are; a scene's ``range_m`` plays no part.
     seed : int or numpy.random.Generator
@@ -180,9 +195,13 @@ def simulate(
             ranges = np.where(present, ranges, np.inf)
     # overflow shows in the result, which is checked
     with np.errstate(over="ignore", invalid="ignore"):
-        if scene.discrepancy is not None:
-            factor = factor * _discrepancy(rng, ranges, scene.discrepancy)
-        moments = _moments(sensor, parameters.terms(z), ranges, factor)
+        late = None
+        wrong = scene.model_error
+        if wrong.integrated and wrong.flux > 0:
+            factor = factor * np.exp(_smooth_error(rng, ranges, wrong.flux))
+        if wrong.integrated and wrong.range_m > 0:
+            late = _smooth_error(rng, ranges, wrong.range_m)
+        moments = _moments(sensor, parameters.terms(z), ranges, factor, late)
         readings = moments[:, :2] + _noise(rng, *moments[:, 2:].T)
     check_readings(sensor, trajectory, factor, moments, readings)
     if sensor.full_scale is not None:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulator.priors import HalfNormal, LogNormal
-from simulator.scene import Quantity, largest
+from simulator.scene import Quantity
+from simulator.scene_checks import largest
 
 __all__ = ["Unknown", "Values", "add_quantity", "add_reflectance", "add_shape"]
 

@@ -9,9 +9,39 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import itertools
 import sys
 import time
+import uuid
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+
+# folders whose tests compile the same kernels, and the group that they make
+_TOGETHER = {
+    "density": "density",
+    "frame": "density",
+    "contract": "fits",
+    "fits": "fits",
+    "identifiability": "fits",
+    "realtime": "fits",
+    "optics": "optics",
+    "tracking": "tracking",
+}
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let one process run what compiles the same kernels, and begin with what takes long.
+
+    Without groups both of two processes compile nearly every kernel.
+    """
+    slow = set()
+    for item in items:
+        folder, *rest = item.path.relative_to(Path(__file__).parent).parts
+        group = _TOGETHER.get(folder, "/".join((folder, *rest)))
+        item.add_marker(pytest.mark.xdist_group(group))
+        if item.get_closest_marker("slow") or folder in _TOGETHER:
+            slow.add(group)
+    items.sort(key=lambda item: next(item.iter_markers("xdist_group")).args[0] not in slow)
 
 
 @pytest.fixture(autouse=True)
@@ -26,3 +56,12 @@ def _chunks_for_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
         ticks = itertools.count(0.0, 1.0)
         clock = SimpleNamespace(perf_counter=ticks.__next__, process_time=time.process_time)
         monkeypatch.setattr(infer, "time", clock)
+
+
+@pytest.fixture(autouse=True)
+def _state_of_its_own(
+    monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Let every test have a store of jobs of its own, and leave the user's alone."""
+    home = tmp_path_factory.getbasetemp() / "state" / uuid.uuid4().hex
+    monkeypatch.setenv("XDG_STATE_HOME", str(home))

@@ -54,6 +54,9 @@ ALLOWED: dict[str, str] = {
     "service/exports": "service.fold inference",
     "service/report": "service inference",
     "service/routes": "service inference",
+    "service/store": "service",
+    "service/store/migrations": "service.store",
+    "service/store/migrations/versions": "",
     "hybridtof": "inference service.frame_files",
 }
 

@@ -16,7 +16,7 @@ from service.cli import main
 from service.commands import COMMANDS
 from service.service_settings import ServiceSettings
 from service.technique_table import END, START, technique_table
-from simulator.scene import check_scene
+from simulator.scene_checks import check_scene
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -46,6 +46,8 @@ def rounded(value: Any) -> Any:
         return float(f"{value:.2g}")
     if isinstance(value, list):
         return [rounded(item) for item in value]
+    if isinstance(value, dict):
+        return {name: rounded(item) for name, item in value.items()}
     return value
 
 

@@ -20,7 +20,18 @@ from simulator.optics.motion import series
 from simulator.optics.surfaces import Disk, Rectangle, Shell
 from simulator.sensor import Sensor, parse_sensor
 
-__all__ = ["CLASSES", "FRAMES", "TERMS", "DataSet", "SceneClass", "class_row", "draw", "told"]
+__all__ = [
+    "CLASSES",
+    "FRAMES",
+    "TERMS",
+    "DataSet",
+    "SceneClass",
+    "at",
+    "class_row",
+    "draw",
+    "surface",
+    "told",
+]
 
 Array = NDArray[np.float64]
 
@@ -50,7 +61,7 @@ _WITH: Mapping[str, Any] = {
 # the default prior of c0 leaves a percent to mirrors, whose flux is a square law at any range: the
 # same median, twice the spread of its logarithm
 TERMS: Mapping[str, Mapping[str, Any]] = {
-    "without": {},
+    "without": {"range_m": {"prior": "loguniform", **SUPPORT}, "discrepancy": 0},
     "with": _WITH,
     "wide": {**_WITH, "object": {"c0": {"prior": "lognormal", "median": 0.1, "sigma": 4.0}}},
 }
@@ -129,7 +140,7 @@ class DataSet:
     terms: dict[str, Any]
 
 
-def _surface(group: SceneClass, rng: np.random.Generator) -> tuple[str, PlateScene, float]:
+def surface(group: SceneClass, rng: np.random.Generator) -> tuple[str, PlateScene, float]:
     """Choose a surface: its name, a plate that carries material and tilt, a disk's radius or 0."""
     material = MATERIALS[str(rng.choice(group.materials))]
     tilt = str(rng.choice(TILTS[str(rng.choice(group.tilts))]))
@@ -140,7 +151,7 @@ def _surface(group: SceneClass, rng: np.random.Generator) -> tuple[str, PlateSce
     return f"disk {radius:g} {material}{tilt}", plate_scene(f"W01H01{material}{tilt}"), radius
 
 
-def _at(plate: PlateScene, radius: float, distance_m: float) -> Rectangle | Disk:
+def at(plate: PlateScene, radius: float, distance_m: float) -> Rectangle | Disk:
     rectangle = plate.plate(distance_m)
     if not radius:
         return rectangle
@@ -168,20 +179,20 @@ def draw(group: SceneClass, number: int) -> DataSet:
     """
     rng = np.random.default_rng([zlib.crc32(group.slug.encode()), number])
     kind = KINDS[number % 2]
-    name, plate, radius = _surface(group, rng)
+    name, plate, radius = surface(group, rng)
     low = float(np.exp(rng.uniform(np.log(0.1), np.log(0.4))))
     high = low * float(np.exp(rng.uniform(np.log(2.0), np.log(6.0))))
     distances = np.exp(np.sort(rng.uniform(np.log(low), np.log(high), FRAMES)))
     silent = parse_sensor({**kind, "noise": {"read": [1.0, 1.0]}})
 
     def signal(distance_m: float) -> tuple[float, float]:
-        scene = OpticalScene(surfaces=(_at(plate, radius, distance_m),))
+        scene = OpticalScene(surfaces=(at(plate, radius, distance_m),))
         return read(scene, silent, tolerance=1e-6).mean
 
     middle = float(np.hypot(*signal(math.sqrt(low * high))))
     noise = middle / SNR
     sensor = parse_sensor({**kind, "noise": {"read": [noise, noise]}})
-    scene = OpticalScene(surfaces=(_at(plate, radius, 1.0),))
+    scene = OpticalScene(surfaces=(at(plate, radius, 1.0),))
     terms: dict[str, Any] = {}
     if group.crosstalk:
         first, second = (0.1 * middle * rng.standard_normal(2)).tolist()
@@ -200,7 +211,7 @@ def draw(group: SceneClass, number: int) -> DataSet:
             "distance_m": distance,
             "shadow": SHADOW,
         }
-    seen = series(scene, lambda d: _at(plate, radius, d).pose, distances, sensor, rng)
+    seen = series(scene, lambda d: at(plate, radius, d).pose, distances, sensor, rng)
     return DataSet(sensor, Frames(seen.frames.readings), seen.range_m, name, terms)
 
 

@@ -81,7 +81,7 @@ def interval_row(
         "inside": float(np.mean((low <= truth_m) & (truth_m <= high))),
         "width": float(np.median((high - low) / truth_m)),
         "error": float(np.median(middle / truth_m - 1.0)),
-        "misfit": int(posterior.fit.misfit),
+        "misfit": int(posterior.fit.misfit is True),
         "scale": status["range_m"],
         "converged": int(settled or posterior.verdict.converged),
         "ess": "" if found.ess is None else round(found.ess),

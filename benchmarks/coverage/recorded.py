@@ -16,7 +16,7 @@ __all__ = ["CELLS", "TERMS", "RecordedCell", "recorded_row"]
 
 SUPPORT = {"low": 0.05, "high": 1.0}
 TERMS: Mapping[str, Mapping[str, Any]] = {
-    "without": {"range_m": {"prior": "loguniform", **SUPPORT}},
+    "without": {"range_m": {"prior": "loguniform", **SUPPORT}, "discrepancy": 0},
     "with": {"range_m": {"prior": "reference", **SUPPORT}, "discrepancy": "default"},
 }
 

@@ -201,10 +201,32 @@ class CollapsedDensity:
         ndarray, shape (n, frames)
             log r; nan for a frame without object.
         """
+        return self.common(self._draw_blocks(z, rng)[0])
+
+    def unfinished_integrals(self, z: Array, rng: np.random.Generator) -> int:
+        """Count the integrals over ranges that did not settle: density and draws are wrong there.
+
+        Parameters
+        ----------
+        z : ndarray, shape (n, d)
+            Draws of the parameters, of positive density.
+        rng : numpy.random.Generator
+            For an error of the flux.
+
+        Returns
+        -------
+        int
+            Of n times the frames.
+        """
+        return int(np.count_nonzero(self._draw_blocks(z, rng)[1]))
+
+    def _draw_blocks(self, z: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Draw log r of every block, and count what did not settle, each of shape (n, blocks)."""
         rows = self._with_flux_errors(self.integral_rows(self.parameters.terms(z)), z, rng)
-        out = np.empty((len(z), self.data.blocks))
-        fill_range_draws(out, rng.random((*out.shape, 2)), rows, self.data, self.instrument)
-        return self.common(out)
+        out, unfinished = np.empty((2, len(z), self.data.blocks))
+        uniforms = rng.random((*out.shape, 2))
+        fill_range_draws(out, unfinished, uniforms, rows, self.data, self.instrument)
+        return out, unfinished
 
     def best_ranges(self, z: Array) -> Array:
         """Find each frame's best range (`inference.density.profile.best_ranges`)."""

@@ -29,6 +29,7 @@ from inference.frame.log_density import empty_log_likelihood
 from inference.frame.modes import LOG_MASS, find_modes, room_for_modes
 from inference.frame.range_prior import integration_bounds
 from inference.frame.table import tabulate
+from simulator.assign import assign
 from simulator.compiled import compiled
 
 __all__ = ["integrate_flux_error"]
@@ -96,7 +97,8 @@ def _round(
             if weight < _FEW:
                 continue
             add_mode(gradient, row, weight, modes[m], block, scene, functions)
-            rows[:, count] = row
+            for k in range(size):
+                rows[k, count] = row[k]
             count += 1
             if count == n:
                 update_factor(factor, rows, count)
@@ -133,21 +135,21 @@ def _newton(
             if gain < _SMALL:
                 break
             last *= 0.3
-            trial[:] = coefficients + last
+            assign(trial, coefficients + last)
             continue
         best = value
-        values[:] = trial_values
-        coefficients[:] = trial
-        factor[:] = trial_factor
+        assign(values, trial_values)
+        assign(coefficients, trial)
+        assign(factor, trial_factor)
         gain = solve_factor(factor, step)
         fill_knots(curve, functions.basis, step)
         longest = np.abs(curve[:, 0]).max()
         if not math.isfinite(longest):
             return -math.inf
-        last[:] = step * min(1.0, _LONGEST / max(longest, _LONGEST))
+        last = step * min(1.0, _LONGEST / max(longest, _LONGEST))
         if gain < _DONE or gain > _LOST:
             break
-        trial[:] = coefficients + last
+        assign(trial, coefficients + last)
     coefficients += last
     total = best + min(gain, 1.0)
     for k in range(size):
@@ -192,7 +194,8 @@ def _laplace(
         total += values[j]
         row[:] = 0.0
         add_row(row, functions, positions[j], math.sqrt(free if bend > 0.0 else stiff))
-        rows[:, j] = row
+        for k in range(size):
+            rows[k, j] = row[k]
     update_factor(factor, rows, n)
     for k in range(size):
         total -= math.log(abs(factor[k, k]))

@@ -13,7 +13,12 @@ from inference.frame.flux_error import cubic_weights, slope_weights
 from inference.frame.gaussian import covariance_slope, gaussian, precision_times, squared_cross
 from inference.frame.mean_readings import readings_along
 from inference.frame.modes import LEFT, POSITION, RIGHT, SD, TOP
-from inference.frame.range_prior import log_range_density, prior_curvature, prior_slope
+from inference.frame.range_prior import (
+    LEAST_INFORMATION,
+    log_range_density,
+    prior_curvature,
+    prior_slope,
+)
 from simulator.compiled import compiled
 
 __all__ = ["Expansion", "FluxFunctions", "add_mode", "add_row", "expand"]
@@ -106,7 +111,7 @@ def expand(u: float, block: Block, scene: FrameScene) -> Expansion:
     if bend > 0.0:
         cross = squared_cross(slope, signal, mean, signal, instrument)
         free = (cross + held * stiff) / bend
-    information = 1.0 + t1 * pressed[0] + t2 * pressed[1]
+    information = LEAST_INFORMATION + t1 * pressed[0] + t2 * pressed[1]
     resolved, pushed, turn = _resolution(
         information, signal, signal_slope, pressed, prior.reference
     )
@@ -125,7 +130,7 @@ def _resolution(
     if reference is not None:
         p1, p2 = pressed
         return (
-            0.5 * math.log(information),
+            0.5 * math.log(information / LEAST_INFORMATION),
             (signal_slope[0] * p1 + signal_slope[1] * p2) / information,
             (signal[0] * p1 + signal[1] * p2) / information,
         )

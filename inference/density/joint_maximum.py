@@ -28,6 +28,7 @@ from inference.frame.log_density import empty_log_likelihood, log_density, slope
 from inference.frame.modes import POSITION, find_modes, room_for_modes
 from inference.frame.range_prior import integration_bounds
 from inference.frame.table import tabulate
+from simulator.assign import assign
 from simulator.compiled import compiled
 
 __all__ = [
@@ -185,8 +186,8 @@ def climb_jointly(
                 at[j] = positions[j] + _SHORTER * (at[j] - positions[j])
             continue
         best = value
-        coefficients[:] = trial
-        positions[:] = at
+        assign(coefficients, trial)
+        assign(positions, at)
         if not cholesky(equations.precision):
             break
         gain = solve_factor(equations.precision, step)

@@ -16,6 +16,7 @@ from inference.frame.modes import (
     RIGHT,
     SD,
     TOP,
+    UNFINISHED,
     find_modes,
     room_for_modes,
 )
@@ -99,7 +100,12 @@ def _draw(
 
 @compiled
 def fill_range_draws(
-    out: Array, uniforms: Array, rows: Rows, data: Data, instrument: Instrument
+    out: Array,
+    unfinished: Array,
+    uniforms: Array,
+    rows: Rows,
+    data: Data,
+    instrument: Instrument,
 ) -> None:
     """Draw the range of every block of frames under every parameter vector.
 
@@ -107,6 +113,8 @@ def fill_range_draws(
     ----------
     out : ndarray, shape (n, blocks)
         Filled with log r; nan for frames without object.
+    unfinished : ndarray, shape (n, blocks)
+        Filled with how many panels of the integral over the range were taken as they are.
     uniforms : ndarray, shape (n, blocks, 2)
         Independent, on (0, 1).
     rows, data, instrument
@@ -119,10 +127,12 @@ def fill_range_draws(
         values = np.empty(table.shape[1])
         modes = room_for_modes(table)
         for b in range(out.shape[1]):
-            out[i, b] = math.nan
+            out[i, b], unfinished[i, b] = math.nan, 0.0
             if is_empty(data, b):
                 continue
             block = block_of(data, b)
             count = find_modes(modes, values, table, block, scene)
             integrate_range(modes, count, block, scene)
+            for k in range(count):
+                unfinished[i, b] += modes[k, UNFINISHED]
             out[i, b] = _draw(modes, count, uniforms[i, b], block, scene, grid)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from inference.frame.arguments import FrameScene, Pair
 from inference.frame.blocks import Block, frame_count
 from inference.frame.gaussian import log_top
-from inference.frame.log_density import log_density, slope_and_curvature
-from inference.frame.modes import LEFT, LOG_MASS, POSITION, RIGHT, SD, TOP
+from inference.frame.log_density import log_density, rounding, slope_and_curvature
+from inference.frame.modes import LEFT, LOG_MASS, POSITION, RIGHT, SD, TOP, UNFINISHED
 from simulator.compiled import compiled
 
 __all__ = ["best_mode", "falls_off", "integrate_range"]
@@ -28,6 +28,8 @@ _HALF = 10  # its points on either side of the mode
 
 _FAR = 12.0  # standard deviations at which a peak must have vanished
 _MOST_PANELS = 300
+_MOST_HALVINGS = 30
+_ROUNDINGS = 4.0  # of the density at a panel's start, by which two rules for it may differ
 _NEARLY_GAUSSIAN = 3e-3  # standard deviation of log r
 
 _HERMITE_NODES, _HERMITE_WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
@@ -131,18 +133,27 @@ def _march(
     best: float,
     block: Block,
     scene: FrameScene,
-) -> float:
-    """Integrate a mode's interval by panels from the mode outward; the log of its mass."""
+) -> Pair:
+    """Integrate a mode's interval by panels from the mode outward.
+
+    Returns
+    -------
+    (float, float)
+        Log of the mass, and how many panels were taken as they are: there are no more, or halves
+        of halves still contradicted them.
+    """
     # halves of a smooth panel are 2^-16 of its error off
-    allowed = 1e-4 if scene.instrument.shot is None else 1e-8
-    total = -math.inf
+    smooth = 1e-4 if scene.instrument.shot is None else 1e-8
+    total, unfinished = -math.inf, 0.0
     for sign in (-1.0, 1.0):
         end = mode[LEFT] if sign < 0.0 else mode[RIGHT]
         edge = mode[POSITION]
         width = min(1.7 * mode[SD], 0.4, mode[RIGHT] - mode[LEFT])
+        ended = False
         # at 1e20 nats the density is rounding noise, which never falls off: panels are bounded
         for _ in range(_MOST_PANELS):
             if not (end - edge) * sign > 0.0:
+                ended = True
                 break
             slope = slope_and_curvature(edge, block, scene)[0]
             if abs(slope) * width > 8.0:
@@ -158,10 +169,14 @@ def _march(
             if last:
                 width = (end - edge) * sign
             mass, highest = _panel(edge, sign * width, block, scene)
+            # no rule knows a panel better than the density on it is rounded
+            allowed = smooth + _ROUNDINGS * rounding(edge, block, scene)
             # a panel can be wider than the peak, whose curvature says little of a flat top; and the
             # variance of shot noise has a kink where a mean reading changes sign
-            for _ in range(30):
+            settled = False
+            for _ in range(_MOST_HALVINGS):
                 if mass < total - 20.0:
+                    settled = True
                     break
                 half = 0.5 * sign * width
                 near, high1 = _panel(edge, half, block, scene)
@@ -172,14 +187,20 @@ def _march(
                 # a log mass of a million nats is itself known to no better than its rounding, and a
                 # panel of a few roundings is as short as it can be
                 if error <= allowed + 1e-14 * abs(mass) or abs(half) < 1e-14 * (1.0 + abs(edge)):
+                    settled = True
                     break
                 width, mass, highest, last = 0.5 * width, near, high1, False
+            if not settled:
+                unfinished += 1.0
             total = _log_add(total, mass)
             edge += sign * width
             if last or highest < best - _NEGLIGIBLE:
+                ended = True
                 break
             width = min(1.6 * width, 0.7)
-    return total
+        if not ended:
+            unfinished += 1.0
+    return total, unfinished
 
 
 @compiled
@@ -199,7 +220,7 @@ def integrate_range(modes: Array, count: int, block: Block, scene: FrameScene) -
     Parameters
     ----------
     modes : ndarray
-        From `inference.frame.modes.find_modes`; `LOG_MASS` is filled.
+        From `inference.frame.modes.find_modes`; `LOG_MASS` and `UNFINISHED` are filled.
     count : int
         Number of modes.
     block, scene
@@ -215,13 +236,13 @@ def integrate_range(modes: Array, count: int, block: Block, scene: FrameScene) -
         best = max(best, modes[j, TOP])
     total = -math.inf
     for j in range(count):
-        mass = -math.inf
+        mass, unfinished = -math.inf, 0.0
         if modes[j, TOP] > best - _NEGLIGIBLE:
             narrow = _narrow(modes[j], block, scene)
             if narrow > 0.0:
                 mass = modes[j, TOP] + math.log(narrow)
             else:
-                mass = _march(modes[j], best, block, scene)
-        modes[j, LOG_MASS] = mass
+                mass, unfinished = _march(modes[j], best, block, scene)
+        modes[j, LOG_MASS], modes[j, UNFINISHED] = mass, unfinished
         total = _log_add(total, mass)
     return float(frame_count(block) * log_top(scene.instrument.read) + total)

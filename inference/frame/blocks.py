@@ -65,9 +65,8 @@ class Data(NamedTuple):
     ----------
     frames : ndarray, shape (n, 3)
         As `Frame`.
-    present : ndarray of bool, shape (n,), or None
-        False where it is known that no object is there, the same within a block; None where one may
-        be in all frames.
+    present : ndarray of bool, shape (n,)
+        False where it is known that no object is there, the same within a block.
     starts : ndarray of int, shape (blocks + 1,), or None
         First frame of each block, and last the number of frames; None where every frame is a block.
     strongest : float
@@ -75,7 +74,7 @@ class Data(NamedTuple):
     """
 
     frames: Array
-    present: Flags | None
+    present: Flags
     starts: NDArray[np.int64] | None
     strongest: float
 
@@ -85,21 +84,25 @@ class Data(NamedTuple):
         return len(self.frames) if self.starts is None else len(self.starts) - 1
 
 
+def _flags(frames: Array, present: Flags | None) -> Flags:
+    # an array in any case: kernels are compiled once, for frames with and without such flags
+    return np.ones(len(frames), dtype=bool) if present is None else present
+
+
 def own_blocks(frames: Array, present: Flags | None) -> Data:
     """Return every frame as a block of its own."""
-    return Data(frames, present, None, float(frames[:, GAIN].max()))
+    return Data(frames, _flags(frames, present), None, float(frames[:, GAIN].max()))
 
 
 def one_block(frames: Array, present: Flags | None) -> Data:
     """Return all frames that may hold an object as one block, and behind it each of the others."""
-    seen = frames if present is None else frames[present]
+    flags = _flags(frames, present)
+    seen = frames[flags]
     count = max(len(seen), 1)
     starts = np.concatenate([[0], np.arange(count, len(frames) + 1)])
-    if present is None:
-        return Data(frames, None, starts, float(frames[:, GAIN].max()))
-    order = np.argsort(~present, kind="stable")
+    order = np.argsort(~flags, kind="stable")
     strongest = float((seen if len(seen) else frames)[:, GAIN].max())
-    return Data(frames[order], present[order], starts, strongest)
+    return Data(frames[order], flags[order], starts, strongest)
 
 
 @compiled
@@ -155,15 +158,7 @@ def _compile_block(frames: Any, starts: Any, b: Any) -> Callable[..., Any]:  # n
 @compiled
 def is_empty(data: Data, b: int) -> bool:
     """Tell whether block b is known to hold no object."""
-    return _is_empty(data.present, data.starts, b)
-
-
-@compiled
-def _is_empty(present: Flags | None, starts: NDArray[np.int64] | None, b: int) -> bool:
-    if present is not None:
-        return not present[_start(starts, b)]
-    else:  # noqa: RET505
-        return False
+    return not data.present[_start(data.starts, b)]
 
 
 @compiled

@@ -12,14 +12,25 @@ from inference.frame.log_density import log_density, slope_and_curvature
 from inference.frame.table import LOG_PRIOR, LOG_RANGE, MEAN_1, MEAN_2, SIGNAL_1, SIGNAL_2
 from simulator.compiled import compiled
 
-__all__ = ["LEFT", "LOG_MASS", "POSITION", "RIGHT", "SD", "TOP", "find_modes", "room_for_modes"]
+__all__ = [
+    "LEFT",
+    "LOG_MASS",
+    "POSITION",
+    "RIGHT",
+    "SD",
+    "TOP",
+    "UNFINISHED",
+    "find_modes",
+    "room_for_modes",
+]
 
 Array = NDArray[np.float64]
 
 # columns of modes: log r, log density there, standard deviation in log r, the ends of the interval
-# between valleys, and the log of the mass in it, which an integral fills
-POSITION, TOP, SD, LEFT, RIGHT, LOG_MASS = 0, 1, 2, 3, 4, 5
-_COLUMNS = 6
+# between valleys; and what an integral fills: the log of the mass in it, and how many panels of it
+# were taken as they are
+POSITION, TOP, SD, LEFT, RIGHT, LOG_MASS, UNFINISHED = 0, 1, 2, 3, 4, 5, 6
+_COLUMNS = 7
 _KNOT = SD  # while a mode is still a knot of the table
 
 
@@ -149,7 +160,7 @@ def find_modes(modes: Array, values: Array, table: Array, block: Block, scene: F
     Parameters
     ----------
     modes : ndarray
-        From `room_for_modes`; filled but for `LOG_MASS`.
+        From `room_for_modes`; filled but for `LOG_MASS` and `UNFINISHED`.
     values : ndarray, shape (knots,)
         Work space.
     table : ndarray, shape (6, knots)

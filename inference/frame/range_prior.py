@@ -3,9 +3,24 @@
 import math
 
 from inference.frame.arguments import Pair, RangePrior
-from simulator.compiled import compiled
+from simulator.compiled import compiled, compiled_for_both
 
-__all__ = ["integration_bounds", "log_range_density", "prior_curvature", "prior_slope"]
+__all__ = [
+    "LEAST_INFORMATION",
+    "integration_bounds",
+    "log_range_density",
+    "prior_curvature",
+    "prior_slope",
+]
+
+LEAST_INFORMATION = 25.0
+"""Fisher information on log r below which a reference prior turns log-uniform.
+
+A range is then told to worse than a fifth of itself. Frames that dark lie at the end of the curve
+of readings, where the root of the information leaves next to no mass: it would take them for
+brighter ones, each by a fraction of its noise and all in one direction (docs/model.md,
+reference-prior).
+"""
 
 _REACH = 9.0  # standard deviations of a normal prior beyond which it leaves nothing
 _FARTHEST = 38.5  # at which its density is no number any more: so far readings may contradict it
@@ -42,7 +57,7 @@ def prior_curvature(r: float, prior: RangePrior) -> Pair:
     )
 
 
-@compiled
+@compiled_for_both
 def integration_bounds(prior: RangePrior) -> Pair:
     """Return the interval of u = log r that holds all the mass but rounding.
 

@@ -157,7 +157,8 @@ def tabulate(bounds: Pair, scene: FrameScene, strongest: float) -> Array:
         finer = np.empty((_ROWS, n + more))
         k = 0
         for j in range(n):
-            finer[:, k] = table[:, j]
+            for i in range(_ROWS):
+                finer[i, k] = table[i, j]
             k += 1
             if j < n - 1 and split[j]:
                 middle = 0.5 * (table[LOG_RANGE, j] + table[LOG_RANGE, j + 1])

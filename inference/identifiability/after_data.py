@@ -22,7 +22,7 @@ _STILL = 4.0
 def statuses_of_draws(
     sensor: Sensor,
     parameters: Parameters,
-    z: Array,
+    spread: Spread,
     chosen: Array,
     log_r: Array,
     gain: Array | None = None,
@@ -38,10 +38,10 @@ def statuses_of_draws(
         The sensor.
     parameters : Parameters
         The unknowns.
-    z : ndarray, shape (n, d)
-        Draws in the coordinates whose prior is standard normal.
+    spread : Spread
+        Of all draws, the errors of the model included.
     chosen : ndarray, shape (m, d)
-        Draws to which ``log_r`` belongs.
+        Draws in the coordinates whose prior is standard normal, to which ``log_r`` belongs.
     log_r : ndarray, shape (m, frames)
         Draws of log r [log m]; nan for a frame without object.
     gain : ndarray, shape (frames,), optional
@@ -61,16 +61,14 @@ def statuses_of_draws(
     Reasons are computed at the draw nearest to the mean, with its own ranges: the mean itself may
     lie where no draw is.
     """
-    sd = z.std(axis=0)
+    sd = chosen.std(axis=0)
     unit = np.where(sd > 0, sd, 1.0)
-    centre = int(np.argmin(np.square((chosen - z.mean(axis=0)) / unit).sum(axis=1)))
+    centre = int(np.argmin(np.square((chosen - chosen.mean(axis=0)) / unit).sum(axis=1)))
     present = np.isfinite(log_r[centre])
     here = log_r[centre]
-    still, scale = False, np.nan
+    still = False
     if present.any():
-        drawn = log_r[:, present]
-        scale = float(drawn.mean(axis=1).std())
-        still = _is_still(drawn)
+        still = _is_still(log_r[:, present])
         if still:
             here = np.where(present, here[present].mean(), np.nan)
     experiment = Experiment(
@@ -83,7 +81,7 @@ def statuses_of_draws(
         common_range=common_range,
     )
     expected = expected_posterior(experiment) if experiment.finite else None
-    return statuses_of(experiment, Spread(sd, scale), expected, still)
+    return statuses_of(experiment, spread, expected, still)
 
 
 def _is_still(drawn: Array) -> bool:

@@ -147,7 +147,7 @@ def check_discrepancy(scene: Scene) -> None:
     RefusedError
         Where the object is stated not to move.
     """
-    if scene.motion == "static" and scene.discrepancy is not None:
+    if scene.motion == "static" and scene.stated_flux_error is not None:
         raise RefusedError(
             "an object at rest has one range, at which a discrepancy of its flux is no different "
             "from another c2; leave `discrepancy` out, and give `object.c2` a wider prior"
@@ -181,6 +181,7 @@ def identifiability(
     ranges_m: Sequence[float],
     object_present: Sequence[bool] | None = None,
     at: Mapping[str, float] | None = None,
+    gain: Sequence[float] | None = None,
 ) -> Foresight:
     """Foresee what frames at given ranges tell of a scene, before any data.
 
@@ -197,6 +198,8 @@ def identifiability(
     at : mapping of str to float, optional
         Values of unknowns, by scene path [SI units], at which the readings are linearised; the
         others are at the medians of their priors.
+    gain : sequence of float, optional
+        Factor of each frame on the sensor's gain.
 
     Returns
     -------
@@ -227,7 +230,8 @@ def identifiability(
         parameters,
         z,
         log_r,
-        discrepancy=scene.discrepancy,
+        None if gain is None else np.asarray(gain, dtype=float),
+        discrepancy=scene.stated_flux_error,
         common_range=scene.motion == "static",
     )
     _check_ranges(experiment, scene)

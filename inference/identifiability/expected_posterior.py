@@ -11,7 +11,14 @@ from inference.identifiability.experiment import Experiment
 from simulator.parameters import Parameters
 from simulator.scene import Reference, Stroke
 
-__all__ = ["STEP", "ExpectedPosterior", "expected_posterior", "log_range_spread"]
+__all__ = [
+    "STEP",
+    "ExpectedPosterior",
+    "expected_posterior",
+    "log_range_spread",
+    "rows_of",
+    "without_ranges",
+]
 
 Array = NDArray[np.float64]
 
@@ -78,8 +85,8 @@ def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
         except that no range is known worse than by its prior.
     """
     p, present = experiment.parameters, np.isfinite(experiment.log_r)
-    jacobian, along, extra = _rows(experiment)
-    across, response, variance = _without_ranges(experiment, jacobian, along)
+    jacobian, along, extra = rows_of(experiment)
+    across, response, variance = without_ranges(experiment, jacobian, along)
     independent = 1 if experiment.common_range else int(present.sum())
     room = _room(experiment)
     if math.isfinite(room):
@@ -103,7 +110,7 @@ def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
     return ExpectedPosterior(factor[:d], range_sd, float(_limited(scale, limit)[0]))
 
 
-def _rows(experiment: Experiment) -> tuple[Array, Array, list[Array]]:
+def rows_of(experiment: Experiment) -> tuple[Array, Array, list[Array]]:
     """Return what readings and priors tell.
 
     Of every frame two whitened readings and the prior of its range: derivatives along z and the
@@ -143,7 +150,7 @@ def _rows(experiment: Experiment) -> tuple[Array, Array, list[Array]]:
     return jacobian, along, extra
 
 
-def _without_ranges(
+def without_ranges(
     experiment: Experiment, jacobian: Array, along: Array
 ) -> tuple[Array, Array, Array]:
     """Eliminate the ranges: what is across them, how log r responds, and its own variance."""

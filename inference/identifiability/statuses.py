@@ -28,7 +28,7 @@ _LEANING = (
 )
 _HELP = 2.0  # a term is to blame where the scale would be known so many times better with it known
 _ALIKE = (
-    ": {term} and an error of the object's flux of {error:.2g}, as stated by `discrepancy`, look "
+    ": {term} and an error of the object's flux of {error:.2g}, as `discrepancy` allows for, look "
     "alike in these frames and leave it open by {spread:.2g} of itself, more than the error of the "
     "flux; were {term} known{how}, it would be known to {known:.2g}"
 )

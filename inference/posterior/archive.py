@@ -1,6 +1,7 @@
 """Jobs and checkpoints as bytes: numpy archives without pickle, for any store."""
 
 import dataclasses
+import hashlib
 import io
 import json
 from collections.abc import Mapping
@@ -16,6 +17,7 @@ from inference.posterior.sampling.proposal import Mixture, Proposal
 from inference.posterior.sampling.reparametrisation import Reparametrisation
 from inference.posterior.sampling.transport import TriangularMap
 from inference.posterior.sampling.verdict import Verdict
+from inference.posterior.selection.consequence import Reported
 from inference.posterior.selection.models import Candidate
 from inference.posterior.selection.selection import Decision, Selection
 from inference.posterior.stages.stage import (
@@ -28,7 +30,7 @@ from inference.posterior.stages.stage import (
 )
 from simulator.frames import Frames
 
-__all__ = ["pack", "pack_parts", "unpack", "unpack_parts"]
+__all__ = ["FORMAT", "pack", "pack_addition", "pack_parts", "unpack", "unpack_parts"]
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -54,12 +56,59 @@ def pack(meta: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> bytes:
     return buffer.getvalue()
 
 
-def unpack(data: bytes) -> tuple[dict[str, Any], Arrays]:
-    """Read what `pack` wrote."""
-    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-        arrays = {name: archive[name] for name in archive.files}
-    meta: dict[str, Any] = json.loads(arrays.pop("meta").tobytes())
-    return meta, arrays
+def pack_addition(
+    meta: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], before: Mapping[str, NDArray[Any]]
+) -> bytes | None:
+    """Write what was appended to arrays that were written before.
+
+    Parameters
+    ----------
+    meta, arrays : mapping
+        As of `pack`.
+    before : mapping of str to ndarray
+        The arrays that were written before.
+
+    Returns
+    -------
+    bytes or None
+        An npz archive that `unpack` reads behind those of before; None where less than half of what
+        was written is still of use: all is better written anew.
+    """
+    continued = [name for name, array in before.items() if _continues(arrays.get(name), array)]
+    kept = sum(before[name].nbytes for name in continued)
+    if 2 * kept < sum(array.nbytes for array in before.values()) or not kept:
+        return None
+    added = {name: a[len(before[name]) :] if name in continued else a for name, a in arrays.items()}
+    return pack({"continued": continued, "meta": dict(meta)}, added)
+
+
+def _continues(array: NDArray[Any] | None, before: NDArray[Any]) -> bool:
+    """Tell whether an array begins with all of another one, to the last bit."""
+    if array is None or array.ndim == 0 or not before.size:
+        return False
+    if array.dtype != before.dtype or array.shape[1:] != before.shape[1:]:
+        return False
+    return array[: len(before)].tobytes() == before.tobytes()
+
+
+def unpack(*pieces: bytes) -> tuple[dict[str, Any], Arrays]:
+    """Read what `pack` wrote, and what `pack_addition` wrote after it, in this order."""
+    meta: dict[str, Any] = {}
+    parts: dict[str, list[NDArray[Any]]] = {}
+    for data in pieces:
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        meta = json.loads(arrays.pop("meta").tobytes())
+        continued = meta.get("continued", ())
+        parts = {
+            name: [*parts[name], array] if name in continued else [array]
+            for name, array in arrays.items()
+        }
+        meta = meta["meta"] if "continued" in meta else meta
+    return meta, {
+        name: found[0] if len(found) == 1 else np.concatenate(found)
+        for name, found in parts.items()
+    }
 
 
 # frozen dataclasses of arrays, numbers and one another; anything else is a mistake
@@ -74,6 +123,7 @@ _PARTS = {
         Mixture,
         Population,
         Proposal,
+        Reported,
         Selecting,
         Selection,
         Reparametrisation,
@@ -86,6 +136,15 @@ _PARTS = {
         WeightedDraws,
     )
 }
+
+
+def _format() -> str:
+    named = {name: [f.name for f in dataclasses.fields(part)] for name, part in _PARTS.items()}
+    return hashlib.sha256(json.dumps(named, sort_keys=True).encode()).hexdigest()[:12]
+
+
+FORMAT = _format()
+"""Names the parts and their fields: what was written under another one cannot be read."""
 
 
 def pack_parts(value: Any, path: str, arrays: Arrays) -> Any:

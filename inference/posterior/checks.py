@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.frame.gaussian import log_top
 from inference.identifiability.before_data import check_discrepancy
+from inference.posterior.criticism.prior_conflict import ranges_beyond
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.parameters import Parameters, parameters_of
@@ -16,6 +17,7 @@ __all__ = [
     "MOST_FRAMES",
     "MOST_UNKNOWNS",
     "check_best_fit",
+    "check_ranges",
     "check_scene_for_posterior",
 ]
 
@@ -54,6 +56,7 @@ def check_scene_for_posterior(sensor: Sensor, scene: Scene, frames: Frames) -> N
     except InvalidInputError as error:
         raise error.below("/scene") from None
     check_discrepancy(scene)
+    _check_optional(scene, parameters)
     if len(parameters) > MOST_UNKNOWNS:
         raise RefusedError(
             f"the scene has {len(parameters)} unknowns, and posteriors were tested up to "
@@ -95,6 +98,51 @@ def check_best_fit(density: CollapsedDensity, z: Array) -> None:
             "the readings and of the noise's `read`, leave out frames that something else has "
             "spoilt, or widen the priors"
         )
+
+
+def check_ranges(density: CollapsedDensity, scene: Scene, z: Array) -> None:
+    """Refuse a stated `range_m` that the readings contradict.
+
+    Parameters
+    ----------
+    density : CollapsedDensity
+        The density.
+    scene : Scene
+        As stated.
+    z : ndarray, shape (d,)
+        The best parameters that were found.
+
+    Raises
+    ------
+    InvalidInputError
+        Pointer /scene/range_m, where most frames that hold the object would fit far better at
+        ranges beyond its ends: nothing that lies within them is then an answer. Of fewer frames
+        the posterior says so in its `fit`.
+    """
+    if scene.range_m is None or not density.holds.any():
+        return
+    beyond, best = ranges_beyond(density, z)
+    count, n = int(beyond[density.holds].sum()), int(density.holds.sum())
+    if 2 * count <= n:
+        return
+    low, high = float(best[beyond].min()), float(best[beyond].max())
+    raise InvalidInputError.at(
+        "/scene/range_m",
+        f"contradicts the readings: {count} of {n} frames would fit far better beyond its ends, at "
+        f"{low:.3g} to {high:.3g} m; widen it, or leave it out. If the ranges stated are right, "
+        "check the sensor's pulse width, frequency or phase offset and the order of the columns",
+    )
+
+
+def _check_optional(scene: Scene, parameters: Parameters) -> None:
+    """Refuse an optional term of which nothing is unknown."""
+    for term in scene.optional_terms:
+        if not any(name.startswith(f"{term}.") for name in parameters.names):
+            raise InvalidInputError.at(
+                f"/scene/{term}/optional",
+                "the data decide whether a term stays by what they tell of it, and all of this one "
+                "is known: give one of its members a prior, or leave `optional` out",
+            )
 
 
 def _check_priors(parameters: Parameters) -> None:

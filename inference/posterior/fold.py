@@ -18,7 +18,9 @@ its coordinates. What each stage does is in `inference.posterior.stages`.
 from collections.abc import Sequence
 from typing import TypeVar
 
+from inference.posterior.archive import FORMAT
 from inference.posterior.job import Job, prepare
+from inference.posterior.progress import Progress
 from inference.posterior.sampling.ensemble import Ensemble
 from inference.posterior.sampling.population import Population
 from inference.posterior.selection.models import Candidate
@@ -26,7 +28,6 @@ from inference.posterior.stages import selecting, tempering, walking
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.selecting import AssessTask, sampled
 from inference.posterior.stages.stage import (
-    Progress,
     Selecting,
     Settled,
     Starting,
@@ -40,6 +41,7 @@ from inference.posterior.stages.walking import WalkTask
 from inference.posterior.summary import draw, summarise
 
 __all__ = [
+    "FORMAT",
     "Checkpoint",
     "Job",
     "Piece",

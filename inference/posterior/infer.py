@@ -7,7 +7,17 @@ from concurrent.futures import Executor
 from typing import Any, TypeVar
 
 from inference.posterior.answer.posterior import Posterior
-from inference.posterior.fold import merge, prepare, run, start, summarise, tasks
+from inference.posterior.fold import (
+    Progress,
+    merge,
+    prepare,
+    progress,
+    run,
+    start,
+    summarise,
+    tasks,
+)
+from inference.posterior.pace import Pace
 from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames
 from simulator.scene import Scene
@@ -24,6 +34,7 @@ def infer(
     frames: Frames,
     settings: SamplerSettings | None = None,
     executor: Executor | None = None,
+    report: Callable[[Progress], None] | None = None,
 ) -> Posterior:
     """Infer parameters and ranges.
 
@@ -35,6 +46,8 @@ def infer(
         Defaults: emcee, 4 ensembles, 400 effective draws, 120 s, a seed that is drawn.
     executor : concurrent.futures.Executor, optional
         Runs the ensembles side by side; the answer is the same without.
+    report : callable, optional
+        Is told how far it is: before the start and after every chunk.
 
     Returns
     -------
@@ -48,17 +61,24 @@ def infer(
     RefusedError
         Where no honest answer exists.
     """
-    begin = time.perf_counter()
+    begin, pace = time.perf_counter(), None
+    tell: Callable[[Progress], None] = report or (lambda _: None)
+    tell(Progress("starting", 0, None, None, None, False))
     settings = SamplerSettings() if settings is None else settings
     job = prepare(sensor, scene, frames, settings)
     checkpoint, cpu_s = _timed(start, job)
     wall_s = time.perf_counter() - begin
+    reached = progress(job, checkpoint)
+    tell(reached)
     while chunk := tasks(job, checkpoint, wall_s):
         timed_run = functools.partial(_timed, run)
         done = list(map(timed_run, chunk) if executor is None else executor.map(timed_run, chunk))
         checkpoint, spent = _timed(merge, job, checkpoint, [piece for piece, _ in done])
         cpu_s += spent + sum(seconds for _, seconds in done)
         wall_s = time.perf_counter() - begin
+        reached = progress(job, checkpoint)
+        pace = Pace.followed(pace, reached, wall_s)
+        tell(pace.foretell(reached, wall_s))
     return summarise(job, checkpoint, wall_s, cpu_s)
 
 

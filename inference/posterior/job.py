@@ -81,12 +81,13 @@ class Job:
 
     def density(self) -> CollapsedDensity:
         """Return the collapsed density of the usable frames."""
-        density = collapsed_density(self.sensor, self.scene, self.frames.select(self.usable))
+        frames, error = self.frames.select(self.usable), self.scene.model_error
+        density = collapsed_density(self.sensor, self.scene, frames)
         if self.scene.motion == "static":
             return with_common_range(density)
-        if self.scene.discrepancy is None:
-            return density
-        return with_discrepancy(density, self.scene.discrepancy)
+        if error.integrated and error.flux > 0:
+            return with_discrepancy(density, error.flux)
+        return density
 
     def seeds(self, purpose: Stream, *numbers: int) -> np.random.SeedSequence:
         """Return the seed of one purpose; those of different purposes are independent."""

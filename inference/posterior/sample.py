@@ -9,13 +9,13 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.proposal import Mixture
 from inference.posterior.sampling.verdict import Chains
-from inference.posterior.stages.stage import Drawing, Settled, Tempering, Walking, Weighted
+from inference.posterior.stages.stage import Drawing, Settled, Walking, Weighted
 
 __all__ = ["Sample", "sample_of"]
 
 Array = NDArray[np.float64]
 
-_NOTHING_DRAWN = 1000
+_SETTLED_DRAWS = 1000  # of the ranges alone
 _LEAST_STEPS = 4  # of which anything is said
 
 
@@ -27,7 +27,7 @@ class Sample:
     ----------
     z : ndarray, shape (ensembles, walkers, steps, d)
         In the prior's normal coordinates. With importance sampling one ensemble of one walker,
-        resampled by weight; before the first chunk one walker that visits the starting points.
+        resampled by weight; before the first chunk there are none.
     log_density : ndarray, shape (ensembles, walkers, steps)
         Collapsed log density.
     step : ndarray of int, shape (steps,)
@@ -52,7 +52,7 @@ class Sample:
 
     @property
     def drawn(self) -> bool:
-        """Whether these are draws of the posterior, or all is known; else starting points."""
+        """Whether there are draws of the posterior, or all is known."""
         return self.chains is not None or self.weighted is not None or self.z.shape[-1] == 0
 
     @property
@@ -86,10 +86,9 @@ def sample_of(density: CollapsedDensity, stage: Drawing, rng: np.random.Generato
             z, log_density = weighted.z[keep], weighted.log_density[keep]
             return _lined_up(z, log_density, stage.optima, weighted)
         case Settled():
-            z, optima = np.empty((_NOTHING_DRAWN, 0)), None
-        case _:
-            # stopped before the first chunk: the starts are all there is
-            z, optima = _starts(density, stage, rng), stage.proposal.optima
+            z, optima = np.empty((_SETTLED_DRAWS, 0)), None
+        case _:  # stopped before the first chunk: starting points are no draws
+            z, optima = np.empty((0, len(density.parameters))), stage.proposal.optima
     return _lined_up(z, density(z), optima, None)
 
 
@@ -116,18 +115,3 @@ def _lined_up(
         None,
         weighted,
     )
-
-
-def _starts(
-    density: CollapsedDensity, stage: Tempering | Walking, rng: np.random.Generator
-) -> Array:
-    """Return where the walkers, or else the populations on their way, stand."""
-    proposal = stage.proposal
-    if isinstance(stage, Walking):
-        return np.concatenate([proposal.bend(e.coords)[0] for e in stage.ensembles])
-    arrived = [p.z for p in stage.populations if p is not None and len(p.z)]
-    if arrived:
-        return np.concatenate(arrived)
-    around = proposal.optima.draw(rng, _NOTHING_DRAWN)
-    inside = np.isfinite(density(around))
-    return around[inside] if inside.sum() > 1 else np.repeat(proposal.optima.centres, 2, axis=0)

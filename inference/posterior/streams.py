@@ -30,5 +30,9 @@ class Stream(enum.IntEnum):
     """Populations, each by its number and that of the temperature."""
     MEMBERS = 10
     """Which members of a population the ensembles start from."""
+    INTEGRALS = 11
+    """Draws at which the integrals over ranges are looked at."""
+    MODEL_ERROR = 12
+    """Errors of the model that draws are moved by."""
     CANDIDATES = 1000
     """Assessment of the models with and without optional terms, each by its number."""

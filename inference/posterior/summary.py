@@ -1,67 +1,72 @@
 """From where a job stands to its draws and its answer."""
 
 import dataclasses
-import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.density.discrepant import DiscrepantDensity
 from inference.identifiability.after_data import statuses_of_draws
 from inference.identifiability.status import Identifiability
 from inference.posterior.answer.draws import Draws, draws_of
+from inference.posterior.answer.error_parts import ErrorParts
 from inference.posterior.answer.folds import near_fold
 from inference.posterior.answer.mode_summary import mode_summary
 from inference.posterior.answer.parameter_summary import summaries_of_chains, summaries_of_weights
 from inference.posterior.answer.posterior import (
-    Fit,
     LeftOutTerm,
     ParameterSummary,
     Posterior,
     Runtime,
 )
 from inference.posterior.answer.range_summary import range_summary
+from inference.posterior.answer.whole import Whole, with_model_error
 from inference.posterior.criticism.cross_check import cross_check
-from inference.posterior.criticism.discrepancy_check import (
-    judge_fit,
-    judge_scale,
-    larger_discrepancy,
-)
+from inference.posterior.criticism.discrepancy_check import judge_fit, with_model_part
 from inference.posterior.criticism.predictive_check import predictive_check
 from inference.posterior.criticism.prior_conflict import prior_conflicts
-from inference.posterior.criticism.prior_sensitivity import mark_sensitive, prior_sensitivity
+from inference.posterior.criticism.prior_contradiction import contradicted
+from inference.posterior.criticism.prior_dark import mark_dark
+from inference.posterior.criticism.prior_sensitivity import mark_sensitive
+from inference.posterior.findings import Findings
 from inference.posterior.job import Job
 from inference.posterior.sample import Sample, sample_of
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.selection.selection import Selection, selection_summary
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.selecting import sampled
-from inference.posterior.stages.stage import Drawing, Selecting, Starting, Walking, Weighted
+from inference.posterior.stages.stage import (
+    Drawing,
+    Selecting,
+    Starting,
+    Tempering,
+    Walking,
+    Weighted,
+)
 from inference.posterior.stages.starting import begin
 from inference.posterior.streams import Stream
+from inference.posterior.undrawn import without_draws
 from simulator.scene import Scene
 
 __all__ = ["draw", "summarise"]
 
 Array = NDArray[np.float64]
 
-_UNCHECKED = Fit(
-    math.nan, False, ("not checked: nothing was drawn yet",), math.nan, math.nan, (), ()
-)
+_INTEGRALS = 100  # draws at which the integrals over ranges are looked at
 
 
 def _left_out(scene: Scene, selection: Selection | None) -> tuple[LeftOutTerm, ...]:
     absent = {
         "crosstalk": scene.crosstalk,
         "background": scene.background,
-        "discrepancy": scene.discrepancy,
     }
     rows = [
         LeftOutTerm(term, "the scene states none")
         for term, value in absent.items()
         if value is None
     ]
+    if scene.model_error.flux == scene.model_error.range_m == 0:
+        rows.append(LeftOutTerm("discrepancy", "the scene states none"))
     if selection is not None:
         rows += [
             LeftOutTerm(decision.term, decision.reason)
@@ -71,47 +76,58 @@ def _left_out(scene: Scene, selection: Selection | None) -> tuple[LeftOutTerm, .
     return tuple(rows)
 
 
-def _parameters(density: CollapsedDensity, sample: Sample) -> dict[str, ParameterSummary]:
-    names = density.parameters.names
+def _parameters(
+    density: CollapsedDensity, sample: Sample, whole: Whole
+) -> dict[str, ParameterSummary]:
+    names, shares = density.parameters.names, whole.budget.of_z
     if sample.chains is not None:
         natural = density.parameters.natural(sample.flat).reshape(sample.z.shape)
-        return summaries_of_chains(names, natural)
+        return summaries_of_chains(names, natural, whole.parameters, shares)
     if sample.weighted is not None:
-        natural = density.parameters.natural(sample.weighted.z)
-        return summaries_of_weights(names, natural, sample.weighted.weights)
-    n = len(sample.flat)
-    found = summaries_of_weights(names, density.parameters.natural(sample.flat), np.full(n, 1 / n))
-    # starting points are no draws: nothing is known of how well they stand for the posterior
-    unknown = math.nan
-    return {
-        name: dataclasses.replace(row, ess_bulk=unknown, ess_tail=unknown, mcse_mean=unknown)
-        for name, row in found.items()
-    }
+        return summaries_of_weights(names, whole.parameters, sample.weighted.weights, shares)
+    return {}  # nothing is unknown
 
 
-def _judged(
-    job: Job, density: CollapsedDensity, z: Array, chosen: Array, log_r: Array
-) -> tuple[Identifiability, ...]:
-    """Judge every unknown by its draws, and by what it owes to the prior of the ranges."""
+def _judged(job: Job, density: CollapsedDensity, whole: Whole) -> tuple[Identifiability, ...]:
+    """Judge every unknown by its draws, and by what it owes to model and prior of the ranges."""
+    chosen, log_r, static = whole.chosen, whole.log_r, job.scene.motion == "static"
     rows = statuses_of_draws(
         job.sensor,
         density.parameters,
-        z,
+        whole.spread,
         chosen,
         log_r,
         density.frames[:, 2],
-        discrepancy=job.scene.discrepancy,
-        common_range=job.scene.motion == "static",
+        # at rest it is no different from another c2
+        discrepancy=None if static else job.scene.model_error.flux or None,
+        common_range=static,
     )
-    return mark_sensitive(density.parameters.names, rows, prior_sensitivity(density, chosen, log_r))
+    rows = with_model_part(rows, whole.scale_error, whole.spread.scale, whole.budget.curvature)
+    rows = mark_sensitive(density.parameters.names, rows, whole.sensitivity)
+    return mark_dark(density, rows, chosen, log_r)
 
 
-def _unknown_yet(names: tuple[str, ...]) -> tuple[Identifiability, ...]:
-    """Return what can be said where nothing was drawn: starting points say nothing."""
-    reason = "not known yet: nothing was drawn from the posterior, give it more time"
+def _settled(
+    rows: tuple[Identifiability, ...], reasons: tuple[str, ...]
+) -> tuple[Identifiability, ...]:
+    """Call nothing identified by draws that there is a reason not to believe."""
+    if not reasons:
+        return rows
     return tuple(
-        Identifiability(name, "not_identified", math.nan, reason) for name in (*names, "range_m")
+        dataclasses.replace(
+            row, status="weak", reason=f"{row.reason}, by draws that have not converged"
+        )
+        if row.status == "identified"
+        else row
+        for row in rows
     )
+
+
+def _of_all_frames(job: Job, shares: ErrorParts) -> ErrorParts:
+    """Return shares of the usable frames as those of all."""
+    whole = np.full((3, len(job.frames)), np.nan)
+    whole[:, job.usable] = shares.noise, shares.scene, shares.model
+    return ErrorParts(*whole)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -124,6 +140,7 @@ class _Drawn:
     calls: int
     sample: Sample
     draws: Draws
+    whole: Whole | None
     rng: np.random.Generator
 
 
@@ -135,7 +152,11 @@ def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
         calls += used
     density, rng = job.density(), job.stream(Stream.ANSWER)
     sample = sample_of(density, stage, rng)
-    return _Drawn(job, density, stage, calls, sample, draws_of(density, job, sample, rng), rng)
+    draws, whole = draws_of(density, job, sample, rng), None
+    if sample.drawn:
+        whole = with_model_error(job, density, sample, draws)
+        draws = whole.draws
+    return _Drawn(job, density, stage, calls, sample, draws, whole, rng)
 
 
 def draw(job: Job, checkpoint: Checkpoint) -> tuple[Job, Draws]:
@@ -162,6 +183,19 @@ def _out_of_time(job: Job, checkpoint: Checkpoint, wall_s: float) -> tuple[str, 
     return (f"stopped at the time limit of {limit:g} s",)
 
 
+def _unfinished(density: CollapsedDensity, z: Array, rng: np.random.Generator) -> tuple[str, ...]:
+    """Find integrals over ranges that did not settle: what was drawn is then not the posterior."""
+    chosen = z[np.linspace(0, len(z) - 1, min(len(z), _INTEGRALS)).astype(int)]
+    lost = density.unfinished_integrals(chosen, rng)
+    if not lost:
+        return ()
+    share = lost / (len(chosen) * density.data.blocks)
+    return (
+        f"{share:.2%} of the integrals over ranges ran out of panels before they settled: the "
+        "density is not known well enough there",
+    )
+
+
 def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> Posterior:
     """Make the answer of a job, finished or not.
 
@@ -178,41 +212,54 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
     Posterior
     """
     drawn = _drawn(job, checkpoint)
-    stage, density, sample, draws = drawn.stage, drawn.density, drawn.sample, drawn.draws
-    parameters = density.parameters
+    stage, sample = drawn.stage, drawn.sample
+    if drawn.whole is None:
+        assert isinstance(stage, Tempering | Walking)  # noqa: S101  # all others have drawn
+        found = without_draws(drawn.job, drawn.density, stage)
+    else:
+        found = _of_draws(drawn, drawn.whole)
+    reasons = (*_out_of_time(job, checkpoint, wall_s), *found.reasons)
+    return Posterior(
+        Checkpoint(stage, drawn.calls).method,
+        job.seed,
+        sample.drawn,
+        Verdict(not reasons, reasons),
+        found.parameters,
+        mode_summary(drawn.density, stage, sample),
+        found.range_m,
+        _settled(found.identifiability, reasons) if sample.drawn else found.identifiability,
+        found.fit,
+        _left_out(job.scene, checkpoint.selection),
+        Runtime(wall_s, cpu_s, drawn.calls, found.k_hat),
+        drawn.draws,
+        selection_summary(job.scene, checkpoint.selection),
+    )
+
+
+def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
+    """Say what draws say: of every unknown and range, of themselves, and of the model."""
+    job, stage, density, sample = drawn.job, drawn.stage, drawn.density, drawn.sample
+    chosen, log_r = whole.chosen, whole.log_r
     reasons, k_hat = stage.verdict.reasons, None
     if isinstance(stage, Weighted):
         k_hat = stage.draws.k_hat
     elif isinstance(stage, Walking) and sample.chains is not None:
         rng = job.stream(Stream.CROSS_CHECK)
-        found, k_hat = cross_check(density, sample.chains, stage.proposal, rng)
-        reasons = (*reasons, *found)
-    thinned = sample.z[:, :, draws.thinned]
-    chosen = thinned.reshape(math.prod(thinned.shape[:3]), len(parameters))
-    usable = job.usable
-    log_r = np.log(draws.range_m[..., usable]).reshape(len(chosen), int(usable.sum()))
-    if sample.drawn:
-        reasons = (*reasons, *prior_conflicts(density, sample.flat, log_r))
-        fit = predictive_check(drawn.job, density, chosen, drawn.rng)
-        judged = _judged(drawn.job, density, sample.flat, chosen, log_r)
-        if isinstance(density, DiscrepantDensity):
-            larger = larger_discrepancy(density, chosen, log_r)
-            fit, judged = judge_fit(fit, larger), judge_scale(judged, larger)
-    else:
-        fit, judged = _UNCHECKED, _unknown_yet(parameters.names)
-    reasons = (*_out_of_time(job, checkpoint, wall_s), *reasons)
-    folds = near_fold(drawn.job, density, chosen, log_r)
-    return Posterior(
-        Checkpoint(stage, drawn.calls).method,
-        job.seed,
-        Verdict(not reasons, reasons),
-        _parameters(density, sample),
-        mode_summary(density, stage, sample),
-        range_summary(draws, folds, None if sample.weighted is None else sample.weighted.ess),
+        doubts, k_hat = cross_check(density, sample.chains, stage.proposal, rng)
+        reasons = (*reasons, *doubts)
+    fit, judged = predictive_check(job, density, chosen, drawn.rng), _judged(job, density, whole)
+    if whole.larger is not None:
+        fit = judge_fit(fit, whole.larger)
+    conflicts = prior_conflicts(density, sample.flat, log_r)
+    fit, judged = contradicted(fit, judged, conflicts)
+    reasons = (*reasons, *_unfinished(density, chosen, job.stream(Stream.INTEGRALS)))
+    folds = near_fold(job, density, chosen, log_r)
+    ess = None if sample.weighted is None else sample.weighted.ess
+    return Findings(
+        reasons,
+        k_hat,
+        _parameters(density, sample, whole),
+        range_summary(drawn.draws, folds, ess, _of_all_frames(job, whole.budget.of_log_r)),
         judged,
         fit,
-        _left_out(job.scene, checkpoint.selection),
-        Runtime(wall_s, cpu_s, drawn.calls, k_hat),
-        draws,
-        selection_summary(job.scene, checkpoint.selection),
     )

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.estimates import Status, TechniqueResult
+from inference.estimates import SdParts, Status, TechniqueResult
 from inference.realtime.net import COMMON_REASONS, SATURATED
 
 __all__ = [
@@ -52,18 +52,21 @@ class Candidates:
     ----------
     roots : ndarray, shape (n, m)
         Ranges [m], nan-padded, in any order.
-    sd : ndarray, shape (n, m)
-        First-order standard deviations [m].
+    noise : ndarray, shape (n, m)
+        First-order standard deviations by noise [m].
     near : ndarray of bool, shape (n, m)
-        Whether noise reaches the fold beside the root, so that ``sd`` does not hold.
+        Whether noise reaches the fold beside the root, so that ``noise`` does not hold.
     near_frame : ndarray of bool, shape (n,)
         Whether noise reaches any fold, with or without a root.
+    model : ndarray, shape (n, m), optional
+        First-order standard deviations by errors of the model [m]; None where it is exact.
     """
 
     roots: Array
-    sd: Array
+    noise: Array
     near: Flags
     near_frame: Flags
+    model: Array | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -120,14 +123,19 @@ def assemble(
         width = max(int(count.max(initial=0)), 1)
         roots = np.where(keep, candidates.roots, np.nan)
         linear = keep & ~candidates.near
-        sd = np.where(linear & np.isfinite(candidates.sd), candidates.sd, np.nan)
+        noise = np.where(linear & np.isfinite(candidates.noise), candidates.noise, np.nan)
         # readings are rounded, however little noise they have
-        sd = np.maximum(sd, np.finfo(float).eps * candidates.roots)
+        noise = np.maximum(noise, np.finfo(float).eps * candidates.roots)
+        model = np.zeros((1, 1)) if candidates.model is None else candidates.model
+        sd = noise if candidates.model is None else np.hypot(noise, model)
+        sd = np.where(np.isfinite(sd), sd, np.nan)
         drowned = (linear & np.isnan(sd)).any(axis=1)
+        model = np.broadcast_to(model, sd.shape)
         if roots.shape[1] > 1:
             order = np.argsort(roots, axis=1, kind="stable")[:, :width]
-            roots = np.take_along_axis(roots, order, axis=1)
-            sd = np.take_along_axis(sd, order, axis=1)
+            roots, sd, noise, model = (
+                np.take_along_axis(columns, order, axis=1) for columns in (roots, sd, noise, model)
+            )
     status = np.where(
         count == 1, Status.UNIQUE, np.where(count > 1, Status.AMBIGUOUS, Status.NONE)
     ).astype(np.uint8)
@@ -150,6 +158,7 @@ def assemble(
         status=status,
         roots_m=roots,
         roots_sd_m=sd,
+        sd_parts_m=SdParts(noise, np.broadcast_to(0.0, sd.shape), model),
         root_count=count.astype(np.intp),
         near_fold=near,
         reason=reason,

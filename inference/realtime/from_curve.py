@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from inference.known import Known
 from inference.realtime.assemble import NOISE_BAND, Candidates
+from inference.realtime.model_error import model_error_of, point_error, sd_of_roots
 from inference.realtime.solving.curves.curve import Curve, CurveParameters
 from inference.realtime.solving.invert import invert
 from inference.realtime.solving.monotone_intervals import monotone_intervals
@@ -86,11 +87,16 @@ def candidates_of(
         for i in range(0, top.size, step)
     ]
     roots, slopes, gaps, nearest = parts[0] if len(parts) == 1 else _joined(parts)
+    error = model_error_of(task)
+    model = None
+    if error.flux > 0 or error.range_m > 0:
+        model = unit * sd_of_roots(curve.kind, p, roots, slopes, point_error(task, unit))
     with np.errstate(all="ignore"):
         slopes = slopes / unit
         candidates = Candidates(
             roots=roots * unit,
-            sd=sd[:, None] / np.abs(slopes),
+            noise=sd[:, None] / np.abs(slopes),
+            model=model,
             near=gaps < NOISE_BAND * sd[:, None],
             near_frame=nearest < NOISE_BAND * sd,
         )

@@ -76,7 +76,7 @@ def run_filter(
         if not math.isnan(surprise):
             own = min(surprise, rules.most_surprise) / model.table.channels
             numbers[RUNNING] += (1.0 - rules.memory) * (own - numbers[RUNNING])
-        report(out, rows, i, of, rules.unique_above)
+        report(out, rows, i, of, rules)
         out[i, OUTLIER], out[i, SURPRISE] = outlier, numbers[RUNNING]
         if kinds[i] == SATURATED or kinds[i] == EMPTY_SATURATED:
             out[i, STATUS] = _SATURATED

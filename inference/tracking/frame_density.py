@@ -17,6 +17,7 @@ from inference.tracking.readings_table import (
     noise_root,
     nuisance_at,
     nuisance_count,
+    nuisance_root,
     object_at,
 )
 from inference.tracking.roots import UNIT, Root, add_factor, add_root
@@ -25,6 +26,8 @@ from simulator.compiled import compiled
 __all__ = ["Added", "Position", "Prior", "Rate", "TrackedFrame", "expected_at", "log_density"]
 
 Array = NDArray[np.float64]
+
+_WITHOUT_CROSSTALK = 2  # own states of a hypothesis that does not learn it
 
 
 class TrackedFrame(NamedTuple):
@@ -110,6 +113,8 @@ def _add_at(root: Root, u: float, gain: float, added: Added, table: ReadingsTabl
     i, t = cell_of(u, table)
     spread = added.spread
     own = spread.shape[1] - nuisance_count(table)
+    if own == _WITHOUT_CROSSTALK:
+        return add_root(root, nuisance_root(u, gain, table))
     for j in range(spread.shape[1]):
         f1, f2 = spread[FIRST, j], spread[SECOND, j]
         if j >= own:

@@ -36,6 +36,7 @@ class Rules(NamedTuple):
     most_surprise: float  # surprise at which a single frame is cut
     # weight, given that an object is there, above which one range is the answer
     unique_above: float
+    from_scene: int  # nuisance parameters, the first, that are of the scene; others are the model's
 
 
 class Motion(NamedTuple):

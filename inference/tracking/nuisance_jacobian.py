@@ -5,14 +5,14 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.tracking.model_error import model_changes
 from inference.tracking.nuisance import Nuisance
-from inference.tracking.tabulate import OBJECT, Knots, empty_readings, means_over
-from simulator.discrepancy import matern
+from inference.tracking.tabulate import Knots, empty_readings, means_over
+from simulator.model_error import ModelError
 from simulator.parameters import Terms
-from simulator.scene import Scene
 from simulator.sensor import Sensor
 
-__all__ = ["NuisanceJacobian", "crosstalk_root", "discrepancy_shapes", "nuisance_jacobian"]
+__all__ = ["NuisanceJacobian", "crosstalk_root", "nuisance_jacobian"]
 
 Array = NDArray[np.float64]
 
@@ -25,10 +25,16 @@ class NuisanceJacobian:
 
     along: Array  # (knots, 2 p): of the readings along the range, in units of the noise
     empty: Array  # (2, p): of those of an empty scene
+    from_scene: int  # how many, the first, are of the scene; the others are errors of the model
 
 
 def nuisance_jacobian(
-    sensor: Sensor, scene: Scene, known: Nuisance, knots: Knots, scale: Array, with_crosstalk: bool
+    sensor: Sensor,
+    error: ModelError,
+    known: Nuisance,
+    knots: Knots,
+    scale: Array,
+    with_crosstalk: bool,
 ) -> NuisanceJacobian:
     """Return what each uncertain direction does to the readings, a standard deviation along it.
 
@@ -36,8 +42,10 @@ def nuisance_jacobian(
 
     Parameters
     ----------
-    sensor, scene : Sensor, Scene
-        The scene; a discrepancy adds its shapes.
+    sensor : Sensor
+        The sensor.
+    error : ModelError
+        Errors of the model, which add their shapes.
     known : Nuisance
         Centre and directions of what is uncertain.
     knots : Knots
@@ -65,13 +73,14 @@ def nuisance_jacobian(
         if max(np.abs(change).max(), np.abs(bare).max()) > _FELT:
             along.append(change)
             empty.append(bare)
-    if scene.discrepancy is not None:
-        for shape in discrepancy_shapes(knots.positions, scene.discrepancy):
-            along.append(knots.means[:, OBJECT] * shape[:, None])
+    from_scene = len(along)
+    for change in model_changes(sensor, error, knots, scale):
+        if np.abs(change).max() > _FELT:
+            along.append(change)
             empty.append(np.zeros(2))
     if not along:
-        return NuisanceJacobian(np.zeros((knots.positions.size, 0)), np.zeros((2, 0)))
-    return NuisanceJacobian(np.concatenate(along, axis=1), np.stack(empty, axis=1))
+        return NuisanceJacobian(np.zeros((knots.positions.size, 0)), np.zeros((2, 0)), 0)
+    return NuisanceJacobian(np.concatenate(along, axis=1), np.stack(empty, axis=1), from_scene)
 
 
 def crosstalk_root(known: Nuisance, scale: Array) -> Array:
@@ -93,28 +102,3 @@ def _crosstalk_change(plus: Terms, minus: Terms) -> Array:
     if plus.crosstalk is None or minus.crosstalk is None:
         return np.zeros(2)
     return np.asarray(0.5 * (plus.crosstalk[0] - minus.crosstalk[0]))
-
-
-def discrepancy_shapes(positions: Array, sd: float) -> Array:
-    """Return the principal shapes of a smooth relative error of the object's flux.
-
-    Its covariance is `simulator.discrepancy.matern`. The shapes hold all but a thousandth of its
-    variance.
-
-    Parameters
-    ----------
-    positions : ndarray, shape (n,)
-        u = log r.
-    sd : float
-        Standard deviation of the error.
-
-    Returns
-    -------
-    ndarray, shape (k, n)
-    """
-    nodes = np.linspace(positions[0], positions[-1], 200)
-    values, vectors = np.linalg.eigh(matern(nodes[:, None] - nodes))
-    values, vectors = values[::-1], vectors[:, ::-1]
-    kept = int(np.searchsorted(np.cumsum(values), 0.999 * values.sum())) + 1
-    shapes = sd * np.sqrt(values[:kept]) * vectors[:, :kept]
-    return np.array([np.interp(positions, nodes, shape) for shape in shapes.T])

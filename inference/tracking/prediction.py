@@ -31,6 +31,7 @@ __all__ = ["born_prior", "predict", "prior_of"]
 
 Array = NDArray[np.float64]
 
+_LOST = 1.0  # e-folds of the range that an object may have moved
 _LOG_2PI = math.log(2.0 * math.pi)
 
 
@@ -56,6 +57,11 @@ def predict(seconds: float, of: Hypotheses, rules: Rules, work: Array) -> None:
     learns = learns_crosstalk(of)
     born = weight[0] * chance.arrived + numbers[PENDING] * (1.0 - chance.left)
     empty = weight[0] * (1.0 - chance.arrived)
+    # an object that may be anywhere by now is one that has just come, but for the crosstalk: the
+    # common part of their errors is straight only as far as the curve is
+    reach = motion.carry * rules.rate_sd
+    noise = motion.noise.r11
+    lost = learns and reach * reach + noise * noise > _LOST * _LOST
     for j in range(1, int(numbers[COUNT]) + 1):
         left = weight[j] * chance.left
         empty += left
@@ -63,10 +69,17 @@ def predict(seconds: float, of: Hypotheses, rules: Rules, work: Array) -> None:
             merge(of, 0, j, left / empty, CROSSTALK1, work)
         born += weight[j] * chance.replaced
         weight[j] *= chance.stayed
+        if lost:
+            if weight[j] > 1e-9 * (empty + born):
+                merge(of, 0, j, weight[j] / (empty + born + weight[j]), CROSSTALK1, work)
+            born += weight[j]
+            continue
         along = motion.carry * x[j, V]
         move(of, j, motion, work)
         if learns:
             x[j, ANCHOR] += certainty(of, j) * along
+    if lost:
+        numbers[COUNT] = 0.0
     weight[0] = empty + numbers[PENDING] * chance.left
     numbers[PENDING] = born
     if learns:

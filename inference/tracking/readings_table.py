@@ -26,14 +26,16 @@ __all__ = [
     "noise_root",
     "nuisance_at",
     "nuisance_count",
+    "nuisance_root",
     "object_at",
 ]
 
 Array = NDArray[np.float64]
 
 FIRST, SECOND = range(2)  # the two readings
-# columns of a table: means and slopes, the object's part of both, log prior, nuisance Jacobian
-MEAN, SIGNAL, LOG_PRIOR, NUISANCE = 0, 4, 8, 9
+# columns of a table: means and slopes, the object's part of both, log prior, root of the covariance
+# by nuisance parameters, nuisance Jacobian
+MEAN, SIGNAL, LOG_PRIOR, SPREAD, NUISANCE = 0, 4, 8, 9, 12
 
 
 class ReadingsNoise(NamedTuple):
@@ -49,9 +51,10 @@ class ReadingsNoise(NamedTuple):
 class ReadingsTable(NamedTuple):
     """What a frame's readings are expected to be, as a function of u = log r."""
 
-    # (knots, 9 + 2 p): mean readings in units of the read noise and their derivatives along u times
-    # ``step``, the object's part of both, log prior density of u, and the change of either reading
-    # with each of p independent standard normal nuisance parameters. By rate the means are factors
+    # (knots, 12 + 2 p): mean readings in units of the read noise, their derivatives along u times
+    # ``step``, the object's part of both, log prior density of u, lower triangular root of
+    # the covariance that p independent standard normal nuisance parameters add to the readings, and
+    # the change of either reading with each of them. By rate the means are factors
     # of du/dt
     knots: Array
     # first knot and spacing of u
@@ -119,6 +122,17 @@ def nuisance_at(i: int, t: float, j: int, table: ReadingsTable) -> tuple[float, 
     p = table.knots
     k = NUISANCE + 2 * j
     return p[i, k] + t * (p[i + 1, k] - p[i, k]), p[i, k + 1] + t * (p[i + 1, k + 1] - p[i, k + 1])
+
+
+@compiled
+def nuisance_root(u: float, gain: float, table: ReadingsTable) -> Root:
+    """Return the root of the covariance that all nuisance parameters add to the readings."""
+    i, t = cell_of(u, table)
+    p = table.knots
+    r11 = p[i, SPREAD] + t * (p[i + 1, SPREAD] - p[i, SPREAD])
+    r21 = p[i, SPREAD + 1] + t * (p[i + 1, SPREAD + 1] - p[i, SPREAD + 1])
+    r22 = p[i, SPREAD + 2] + t * (p[i + 1, SPREAD + 2] - p[i, SPREAD + 2])
+    return Root(gain * r11, gain * r21, gain * r22)
 
 
 @compiled

@@ -16,6 +16,7 @@ from inference.tracking.hypotheses import (
     V,
     learns_crosstalk,
 )
+from inference.tracking.motion import Rules
 from simulator.compiled import compiled
 
 __all__ = [
@@ -23,14 +24,15 @@ __all__ = [
     "CROSSTALK",
     "HYPOTHESES",
     "HYPOTHESIS_COLUMNS",
+    "MODEL_SD",
     "OUTLIER",
     "POSITION",
     "PRESENT",
     "RATE",
     "RATE_SD",
     "REPORT_COLUMNS",
+    "SCENE_SD",
     "SD",
-    "STATIC_SD",
     "STATUS",
     "SURPRISE",
     "WEIGHT",
@@ -41,37 +43,42 @@ Array = NDArray[np.float64]
 
 # columns of a report
 STATUS, PRESENT, OUTLIER, SURPRISE, HYPOTHESES, BEST = range(6)
-CROSSTALK, REPORT_COLUMNS = 11, 15
-# columns of a hypothesis, and of the best range: u, its sd, the part of it that is from nuisance
-# parameters, rate, its sd, weight (of the best range given that an object is there)
-POSITION, SD, STATIC_SD, RATE, RATE_SD, WEIGHT, HYPOTHESIS_COLUMNS = range(7)
+CROSSTALK, REPORT_COLUMNS = 12, 16
+# columns of a hypothesis, and of the best range: u, its sd, the parts of it that all frames share
+# because the scene and because the model may be wrong, rate, its sd, weight (of the best range
+# given that an object is there)
+POSITION, SD, SCENE_SD, MODEL_SD, RATE, RATE_SD, WEIGHT, HYPOTHESIS_COLUMNS = range(8)
 _UNIQUE, _AMBIGUOUS, _NONE = int(Status.UNIQUE), int(Status.AMBIGUOUS), int(Status.NONE)
 
 
 @compiled
-def _describe(row: Array, of: Hypotheses, j: int) -> None:
+def _describe(row: Array, of: Hypotheses, j: int, from_scene: int) -> None:
     """Fill one row of the hypotheses."""
     x, X = of.x, of.X
-    own, common, rate = 0.0, 0.0, 0.0
+    own, scene, model, rate = 0.0, 0.0, 0.0, 0.0
     n = X.shape[1]
     for k in range(X.shape[-1]):
         square = X[j, U, k] * X[j, U, k]
-        if k >= n:
-            common += square
+        if k >= n + from_scene:
+            model += square
+        elif k >= n:
+            scene += square
         own += square
         rate += X[j, V, k] * X[j, V, k]
-    row[POSITION], row[SD], row[STATIC_SD] = x[j, U], math.sqrt(own), math.sqrt(common)
+    row[POSITION], row[SD] = x[j, U], math.sqrt(own)
+    row[SCENE_SD], row[MODEL_SD] = math.sqrt(scene), math.sqrt(model)
     row[RATE], row[RATE_SD], row[WEIGHT] = x[j, V], math.sqrt(rate), of.weight[j]
 
 
 @compiled
 def _pool(out: Array, rows: Array, i: int, first: int, last: int, total: float) -> None:
     """Fill the mean and standard deviations of a group of hypotheses."""
-    u, static, rate = 0.0, 0.0, 0.0
+    u, scene, model, rate = 0.0, 0.0, 0.0, 0.0
     for j in range(first, last):
         share = rows[i, j, WEIGHT] / total
         u += share * (rows[i, j, POSITION] - rows[i, first, POSITION])
-        static += share * rows[i, j, STATIC_SD]
+        scene += share * rows[i, j, SCENE_SD]
+        model += share * rows[i, j, MODEL_SD]
         rate += share * rows[i, j, RATE]
     u += rows[i, first, POSITION]
     square, rate_square = 0.0, 0.0
@@ -80,7 +87,7 @@ def _pool(out: Array, rows: Array, i: int, first: int, last: int, total: float) 
         square += share * (rows[i, j, SD] ** 2 + (rows[i, j, POSITION] - u) ** 2)
         rate_square += share * (rows[i, j, RATE_SD] ** 2 + (rows[i, j, RATE] - rate) ** 2)
     out[i, BEST + POSITION], out[i, BEST + SD] = u, math.sqrt(square)
-    out[i, BEST + STATIC_SD] = static
+    out[i, BEST + SCENE_SD], out[i, BEST + MODEL_SD] = scene, model
     out[i, BEST + RATE], out[i, BEST + RATE_SD] = rate, math.sqrt(rate_square)
 
 
@@ -104,7 +111,7 @@ def _describe_crosstalk(out: Array, i: int, of: Hypotheses) -> None:
 
 
 @compiled
-def _sort_in(rows: Array, of: Hypotheses, count: int) -> None:
+def _sort_in(rows: Array, of: Hypotheses, count: int, from_scene: int) -> None:
     """Fill rows by ascending range, by insertion."""
     for j in range(1, count + 1):
         at = j - 1
@@ -112,12 +119,12 @@ def _sort_in(rows: Array, of: Hypotheses, count: int) -> None:
             for k in range(HYPOTHESIS_COLUMNS):
                 rows[at, k] = rows[at - 1, k]
             at -= 1
-        _describe(rows[at], of, j)
+        _describe(rows[at], of, j, from_scene)
 
 
 @borrowed
 @compiled
-def report(out: Array, rows: Array, i: int, of: Hypotheses, unique_above: float) -> None:
+def report(out: Array, rows: Array, i: int, of: Hypotheses, rules: Rules) -> None:
     """Describe the state after frame i.
 
     Parameters
@@ -132,12 +139,12 @@ def report(out: Array, rows: Array, i: int, of: Hypotheses, unique_above: float)
         The frame.
     of : Hypotheses
         The state.
-    unique_above : float
-        As in `Rules`.
+    rules : Rules
+        From what weight on a range is unique, and which nuisance parameters are the scene's.
     """
     count, weight = int(of.numbers[COUNT]), of.weight
     out[i, PRESENT], out[i, HYPOTHESES], out[i, STATUS] = 1.0 - weight[0], count, _NONE
-    _sort_in(rows[i], of, count)
+    _sort_in(rows[i], of, count, rules.from_scene)
     if learns_crosstalk(of):
         _describe_crosstalk(out, i, of)
     if weight[0] > 0.5 or count == 0:
@@ -155,5 +162,5 @@ def report(out: Array, rows: Array, i: int, of: Hypotheses, unique_above: float)
             heaviest, best_begin, best_end = group, begin, j + 1
     _pool(out, rows, i, best_begin, best_end, heaviest)
     out[i, BEST + WEIGHT] = heaviest / (1.0 - weight[0])
-    unique = heaviest > unique_above * (1.0 - weight[0])
+    unique = heaviest > rules.unique_above * (1.0 - weight[0])
     out[i, STATUS] = _UNIQUE if unique else _AMBIGUOUS

@@ -2,9 +2,11 @@
 
 import math
 
+import numpy as np
 from scipy import stats
 
 from inference.tracking.motion import Rules
+from inference.tracking.nuisance_jacobian import NuisanceJacobian
 from inference.tracking.observed import Observed
 from inference.tracking.settings import TrackingSettings
 
@@ -13,9 +15,12 @@ __all__ = ["rules_of", "surprise_limit"]
 _BREADTH = 10.0  # of an outlier's law, in units of the noise: wider than what noise explains
 _SAME = 0.05  # nats per weight: two hypotheses merge long before any of their intervals shows it
 _SURPRISE_TAIL = 1e-4  # probability beyond which a single frame's surprise is cut
+_SHARED = 0.3  # standard deviations of a reading by which errors that frames share are felt
 
 
-def rules_of(settings: TrackingSettings, observed: Observed, at_rest: bool) -> Rules:
+def rules_of(
+    settings: TrackingSettings, observed: Observed, at_rest: bool, shared: NuisanceJacobian
+) -> Rules:
     """Return the kernels' rules.
 
     Parameters
@@ -26,8 +31,13 @@ def rules_of(settings: TrackingSettings, observed: Observed, at_rest: bool) -> R
         What is read, and its units.
     at_rest : bool
         Whether the object is known not to move.
+    shared : NuisanceJacobian
+        What all frames err in common.
     """
     scale1, scale2 = observed.scale.tolist()
+    tail = _SURPRISE_TAIL
+    if _is_felt(shared):
+        tail = min(tail, 0.1 * settings.false_alarm)
     drift1, drift2 = settings.crosstalk_drift or (0.0, 0.0)
     return Rules(
         leave=1.0 / settings.visit_s,
@@ -41,15 +51,24 @@ def rules_of(settings: TrackingSettings, observed: Observed, at_rest: bool) -> R
         log_negligible=math.log(settings.negligible),
         same=_SAME,
         memory=1.0 - 1.0 / settings.window,
-        most_surprise=float(stats.chi2.isf(_SURPRISE_TAIL, observed.channels)),
+        most_surprise=float(stats.chi2.isf(tail, observed.channels)),
         unique_above=settings.unique_above,
+        from_scene=shared.from_scene,
     )
 
 
-def surprise_limit(settings: TrackingSettings, rules: Rules, channels: int) -> float:
+def _is_felt(shared: NuisanceJacobian) -> bool:
+    return bool(np.abs(shared.along).max(initial=0.0) > _SHARED)
+
+
+def surprise_limit(
+    settings: TrackingSettings, rules: Rules, channels: int, shared: NuisanceJacobian
+) -> float:
     """Return the running surprise above which the model does not fit.
 
-    An exponential mean of chi-squares has the first two moments of a gamma law.
+    An exponential mean of chi-squares has the first two moments of a gamma law. Where frames err in
+    common, one that surprises may be followed by others of the same surprise: the mean is then as
+    wide as that of a single frame.
 
     Parameters
     ----------
@@ -59,6 +78,10 @@ def surprise_limit(settings: TrackingSettings, rules: Rules, channels: int) -> f
         With the memory of the mean.
     channels : int
         Readings of a frame that are used.
+    shared : NuisanceJacobian
+        What all frames err in common.
     """
+    if _is_felt(shared):
+        return float(stats.chi2.isf(settings.false_alarm, channels)) / channels
     freedom = 0.5 * channels * (1.0 + rules.memory) / (1.0 - rules.memory)
     return float(stats.gamma.isf(settings.false_alarm, freedom, scale=1.0 / freedom))

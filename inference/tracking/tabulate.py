@@ -26,7 +26,10 @@ from simulator.parameters import Terms
 from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = [
+    "MEAN",
     "OBJECT",
+    "OBJECT_SLOPE",
+    "SLOPE",
     "Knots",
     "empty_readings",
     "knots_of",
@@ -242,7 +245,9 @@ def table_of(knots: Knots, nuisance: Array, crosstalk: Array, observed: Observed
     along = knots.means * np.repeat([1.0, knots.step, 1.0, knots.step], 2)
     crosstalk1, crosstalk2 = crosstalk.tolist()
     return ReadingsTable(
-        knots=np.ascontiguousarray(np.column_stack([along, knots.log_prior, nuisance])),
+        knots=np.ascontiguousarray(
+            np.column_stack([along, knots.log_prior, _spread_roots(nuisance), nuisance])
+        ),
         start=float(knots.positions[0]),
         step=knots.step,
         end=float(knots.positions[-1]),
@@ -252,6 +257,19 @@ def table_of(knots: Knots, nuisance: Array, crosstalk: Array, observed: Observed
         noise=observed.noise,
         channels=observed.channels,
     )
+
+
+def _spread_roots(nuisance: Array) -> Array:
+    """Return r11, r21, r22 of the root of the nuisance parameters' covariance at every knot."""
+    count, columns = nuisance.shape
+    if columns == 0:
+        return np.zeros((count, 3))
+    # two rows of nothing, so that there are never fewer directions than readings
+    changes = np.zeros((count, columns // 2 + 2, 2))
+    changes[:, :-2] = nuisance.reshape(count, -1, 2)
+    upper = np.asarray(np.linalg.qr(changes, mode="r"))
+    first = np.where(upper[:, 0, 0] < 0, -1.0, 1.0)
+    return np.column_stack([np.abs(upper[:, 0, 0]), first * upper[:, 0, 1], np.abs(upper[:, 1, 1])])
 
 
 def places_of(knots: Knots, empty: Array, observed: Observed, rate_sd: float) -> Places:

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.estimates import Status
+from inference.estimates import SdParts, Status
 from inference.posterior.answer.posterior import Posterior
 from inference.tracking.filter import EMPTY, EMPTY_SATURATED, SATURATED, run_filter
 from inference.tracking.hypotheses import TIME, copied
@@ -14,14 +14,15 @@ from inference.tracking.report import (
     CROSSTALK,
     HYPOTHESES,
     HYPOTHESIS_COLUMNS,
+    MODEL_SD,
     OUTLIER,
     POSITION,
     PRESENT,
     RATE,
     RATE_SD,
     REPORT_COLUMNS,
+    SCENE_SD,
     SD,
-    STATIC_SD,
     STATUS,
     SURPRISE,
     WEIGHT,
@@ -53,8 +54,9 @@ class Track:
         Probability that an object is there.
     best_m, best_sd_m : ndarray, shape (n,)
         The heaviest range and its standard deviation [m]; nan where no object is there.
-    static_sd_m : ndarray, shape (n,)
-        The part of it that all frames share, because the scene is not known exactly [m].
+    sd_parts_m : SdParts
+        Its parts, each of shape (n,): by noise and motion, by what the scene knows only to some
+        extent, by errors of the model. The latter two are shared by all frames.
     rate_m_s, rate_sd_m_s : ndarray, shape (n,)
         dr/dt and its standard deviation [m/s].
     weight : ndarray, shape (n,)
@@ -75,7 +77,7 @@ class Track:
     present: Array
     best_m: Array
     best_sd_m: Array
-    static_sd_m: Array
+    sd_parts_m: SdParts
     rate_m_s: Array
     rate_sd_m_s: Array
     weight: Array
@@ -227,12 +229,18 @@ def _track(model: Tracker, out: Array, rows: Array) -> Track:
         crosstalk = out[:, CROSSTALK : CROSSTALK + 2] * model.observed.units
         crosstalk_sd = out[:, CROSSTALK + 2 : CROSSTALK + 4] * model.observed.units
     range_m, ranges = np.exp(out[:, BEST + POSITION]), np.exp(rows[:, :, POSITION])
+    sd, scene, error = (out[:, BEST + column] for column in (SD, SCENE_SD, MODEL_SD))
+    added = model.added(out[:, BEST + POSITION])
     return Track(
         status=out[:, STATUS].astype(np.uint8),
         present=out[:, PRESENT].copy(),
         best_m=range_m,
-        best_sd_m=range_m * out[:, BEST + SD],
-        static_sd_m=range_m * out[:, BEST + STATIC_SD],
+        best_sd_m=range_m * np.hypot(sd, added),
+        sd_parts_m=SdParts(
+            range_m * np.sqrt(np.maximum(sd**2 - scene**2 - error**2, 0.0)),
+            range_m * scene,
+            range_m * np.hypot(error, added),
+        ),
         rate_m_s=range_m * out[:, BEST + RATE],
         rate_sd_m_s=range_m * out[:, BEST + RATE_SD],
         weight=out[:, BEST + WEIGHT].copy(),
@@ -240,7 +248,7 @@ def _track(model: Tracker, out: Array, rows: Array) -> Track:
         surprise=out[:, SURPRISE].copy(),
         misfit=out[:, SURPRISE] > model.limit,
         hypotheses_m=ranges,
-        hypotheses_sd_m=ranges * rows[:, :, SD],
+        hypotheses_sd_m=ranges * np.hypot(rows[:, :, SD], model.added(rows[:, :, POSITION])),
         hypotheses_weight=rows[:, :, WEIGHT].copy(),
         crosstalk=crosstalk,
         crosstalk_sd=crosstalk_sd,

@@ -13,6 +13,7 @@ from inference.frame.arguments import prior_of
 from inference.posterior.answer.posterior import Posterior
 from inference.tracking.first_state import first_state
 from inference.tracking.hypotheses import Hypotheses, learns_crosstalk
+from inference.tracking.model_error import sd_by_derivatives
 from inference.tracking.motion import Rules
 from inference.tracking.nuisance import nuisance_of
 from inference.tracking.nuisance_jacobian import crosstalk_root, nuisance_jacobian
@@ -25,7 +26,9 @@ from inference.tracking.state import TrackState
 from inference.tracking.tabulate import empty_readings, knots_of, places_of, table_of
 from inference.tracking.weighing import Model
 from simulator.errors import InvalidInputError, RefusedError
+from simulator.model_error import ModelError
 from simulator.parameters import Terms, parameters_of
+from simulator.range_prior import RangePrior
 from simulator.scene import Reference, Scene, Stroke
 from simulator.sensor import PulsedSensor, Sensor
 
@@ -52,6 +55,9 @@ class Tracker:
         Running surprise above which the model does not fit.
     first : TrackState
         The state before any frame.
+    added_sd : ndarray, shape (knots,), optional
+        Standard deviation of log r by errors of the model that the filter does not carry along, at
+        the knots of its table.
     """
 
     sensor: Sensor
@@ -60,6 +66,15 @@ class Tracker:
     model: Model
     limit: float
     first: TrackState
+    added_sd: Array | None = None
+
+    def added(self, positions: Array) -> Array:
+        """Return that standard deviation at given log r; 0 where the filter carries everything."""
+        if self.added_sd is None:
+            return np.zeros_like(positions)
+        table = self.model.table
+        knots = np.linspace(table.start, table.end, self.added_sd.size)
+        return np.interp(positions, knots, self.added_sd)
 
     @property
     def learns_crosstalk(self) -> bool:
@@ -121,16 +136,23 @@ def tracker(
             "derivatives can be tracked only with a known scene; state its values as numbers, or "
             "track the readings"
         )
-    knots = knots_of(sensor, known.centre, _law(scene, known.centre), observed, settings.rate_sd)
-    jacobian = nuisance_jacobian(sensor, scene, known, knots, observed.scale, not learns)
+    law = _law(parameters.range_prior, known.centre)
+    knots = knots_of(sensor, known.centre, law, observed, settings.rate_sd)
+    # what derivatives owe to errors of the model is added to what the filter says
+    erring = scene.model_error
+    carried = ModelError(0.0, 0.0, integrated=False)
+    if not observed.by_rate:
+        fixed = not any(name.startswith("object.") for name in parameters.names)
+        carried = erring.beside_numbers() if fixed else erring
+    jacobian = nuisance_jacobian(sensor, carried, known, knots, observed.scale, not learns)
     crosstalk = np.zeros(2)
     if known.centre.crosstalk is not None and not observed.by_rate:
         crosstalk = known.centre.crosstalk[0] * observed.scale
     table = table_of(knots, jacobian.along, np.zeros(2) if learns else crosstalk, observed)
     empty = empty_readings(sensor, known.centre, observed.by_rate) * observed.scale
     places = places_of(knots, np.column_stack([empty, jacobian.empty]), observed, settings.rate_sd)
-    rules = rules_of(settings, observed, scene.motion == "static")
-    limit = surprise_limit(settings, rules, observed.channels)
+    rules = rules_of(settings, observed, scene.motion == "static", jacobian)
+    limit = surprise_limit(settings, rules, observed.channels, jacobian)
     first = first_state(
         scene,
         settings,
@@ -140,7 +162,9 @@ def tracker(
         observed.scale,
     )
     first = dataclasses.replace(first, signature=_signature(table, places, rules, first.hypotheses))
-    return Tracker(sensor, settings, observed, Model(table, places, rules), limit, first)
+    model = Model(table, places, rules)
+    added = sd_by_derivatives(sensor, erring, known.centre, knots, observed)
+    return Tracker(sensor, settings, observed, model, limit, first, added)
 
 
 def _check(sensor: Sensor, scene: Scene, settings: TrackingSettings) -> None:
@@ -161,17 +185,12 @@ def _check(sensor: Sensor, scene: Scene, settings: TrackingSettings) -> None:
         )
     if settings.observables == "derivatives" and sensor.noise.derivative is None:
         raise InvalidInputError.at("/sensor/noise/derivative", "is missing: derivatives are read")
-    if settings.observables == "derivatives" and scene.discrepancy is not None:
-        raise RefusedError(
-            "derivatives can be tracked only with a known scene; leave discrepancy out, or track "
-            "the readings"
-        )
 
 
-def _law(scene: Scene, centre: Terms) -> Any:
-    """Return the law of ranges; of one with unknowns of its own the support alone."""
+def _law(stated: RangePrior, centre: Terms) -> Any:
+    """Return the law of ranges: log-uniform on its support where none tells how they are spread."""
     law = centre.ranges.copy()
-    if isinstance(scene.range_m, Stroke | Reference):
+    if isinstance(stated, Stroke | Reference):
         low, high = law[0, 6], law[0, 7]
         law[0] = [-math.log(math.log(high / low)), -1.0, 0.0, 0.0, 0.0, 0.0, low, high]
     return prior_of(law[0])

@@ -271,7 +271,9 @@ def weigh_frame(
         found = _of_new(frame, of, model, room, found)
         best = log_mass_of(candidates, old, found, best)
         pending = math.exp(empty.odd_born - best)
+    before = best
     found, best = _of_outliers(frame, of, model, room, found, best)
+    pending *= math.exp(before - best)
     kept = _keep(frame, of, model, room, found, best, empty)
     for j in range(found):
         # objects too light to be followed one by one: only that there may be one is remembered

@@ -14,7 +14,7 @@ import pydantic
 import pydantic_core
 from numpy.typing import NDArray
 
-from inference.estimates import Estimates, Status, TechniqueResult
+from inference.estimates import Estimates, SdParts, Status, TechniqueResult
 
 __all__ = [
     "EstimatesResponse",
@@ -27,19 +27,30 @@ __all__ = [
 Array = NDArray[np.float64]
 
 
+class ErrorBudget(pydantic.BaseModel):
+    """Parts of a standard deviation; the sum of their squares is its square."""
+
+    noise: float | None
+    scene: float | None
+    model: float | None
+
+
 class FrameEstimate(pydantic.BaseModel):
-    """One technique's answer for one frame."""
+    """One technique's answer for one frame; standard deviations are the whole."""
 
     status: Literal["unique", "ambiguous", "none", "saturated"]
     range_m: float | None
     sd_m: float | None
     roots_m: list[float]
     roots_sd_m: list[float | None]
+    sd_parts_m: ErrorBudget | None = None
     near_fold: bool
     reason: str | None = None
     range_bounds_m: tuple[float, float] | None = None
     power_law: float | None = None
+    power_law_sd: float | None = None
     zeta: float | None = None
+    zeta_sd: float | None = None
 
 
 class FittedParameter(pydantic.BaseModel):
@@ -94,11 +105,13 @@ class EstimatesResponse(pydantic.BaseModel):
     chosen: str | None
     results: list[TechniqueEstimates]
     left_out: list[LeftOutTechnique]
+    assumptions: list[str]
 
 
 # frames that are encoded in one go: their texts stay in the processor's cache, and between two goes
 # other threads get the interpreter
 _BLOCK = 8192
+_OF_MOTION = ("power_law", "power_law_sd", "zeta", "zeta_sd")
 
 
 def encode_estimates(estimates: Estimates) -> bytes:
@@ -119,7 +132,8 @@ def encode_estimates(estimates: Estimates) -> bytes:
     for number, result in enumerate(estimates.results):
         parts.append(", " if number else "")
         parts += _technique(result)
-    parts.append(f'], "left_out": {json.dumps(left_out)}}}')
+    parts.append(f'], "left_out": {json.dumps(left_out)}')
+    parts.append(f', "assumptions": {json.dumps(estimates.assumptions)}}}')
     # every part is ASCII: json.dumps escapes, numbers are
     return b"".join(part.encode("ascii") for part in parts)
 
@@ -144,6 +158,8 @@ def _rows(result: TechniqueResult, start: int, stop: int) -> TechniqueResult:
         for field in dataclasses.fields(result)
         if isinstance(value := getattr(result, field.name), np.ndarray)
     }
+    if result.sd_parts_m is not None:
+        arrays["sd_parts_m"] = SdParts(*(part[start:stop] for part in result.sd_parts_m))
     return dataclasses.replace(result, **arrays)
 
 
@@ -157,10 +173,10 @@ def _texts(column: Array) -> list[str]:
 
 def _kinds(result: TechniqueResult) -> Iterator[tuple[int, NDArray[np.intp]]]:
     """Yield, for each kind of frame, one of its frames and the indices of all."""
-    near = result.near_fold.astype(np.int64)
+    near = result.near_fold.astype(np.int64) * 2 + np.isfinite(result.roots_sd_m[:, 0])
     code = result.status.astype(np.int64)
     code = code * len(result.reasons) + result.reason
-    code = (code * (result.roots_m.shape[1] + 1) + result.root_count) * 2 + near
+    code = (code * (result.roots_m.shape[1] + 1) + result.root_count) * 4 + near
     if result.range_bounds_m is not None:
         code = code * 2 + np.isfinite(result.range_bounds_m).all(axis=1)
     order = np.argsort(code, kind="stable")
@@ -175,15 +191,15 @@ def _frames(result: TechniqueResult) -> Sequence[str]:
     frames = np.empty(n, dtype=object)
     if n == 0:
         return []
-    extra: list[tuple[str, Array]] = []
-    if result.power_law is not None:
-        extra.append(("power_law", result.power_law))
-    if result.zeta is not None:
-        extra.append(("zeta", result.zeta))
+    named = ((name, getattr(result, name)) for name in _OF_MOTION)
+    extra: list[tuple[str, Array]] = [(name, x) for name, x in named if x is not None]
     for first, index in _kinds(result):
         count = int(result.root_count[first])
         columns = [result.roots_m[index, k] for k in range(count)]
         columns += [result.roots_sd_m[index, k] for k in range(count)]
+        if _has_parts(result, first):
+            assert result.sd_parts_m is not None  # noqa: S101  # what `_has_parts` says
+            columns += [part[index, 0] for part in result.sd_parts_m]
         columns += [values[index] for _, values in extra]
         if result.range_bounds_m is not None and np.isfinite(result.range_bounds_m[first]).all():
             columns += [result.range_bounds_m[index, k] for k in (0, 1)]
@@ -194,6 +210,13 @@ def _frames(result: TechniqueResult) -> Sequence[str]:
         else:
             frames[index] = template.format()
     return frames.tolist()
+
+
+def _has_parts(result: TechniqueResult, frame: int) -> bool:
+    """Whether a frame has one standard deviation whose parts are known."""
+    unique = result.status[frame] == Status.UNIQUE and result.root_count[frame] == 1
+    known = bool(unique and np.isfinite(result.roots_sd_m[frame, 0]))
+    return known and result.sd_parts_m is not None
 
 
 def _template(result: TechniqueResult, first: int, count: int, extra: Sequence[str]) -> str:
@@ -212,6 +235,10 @@ def _template(result: TechniqueResult, first: int, count: int, extra: Sequence[s
     if reason:
         members["reason"] = json.dumps(reason).replace("{", "{{").replace("}", "}}")
     position = 2 * count
+    if _has_parts(result, first):
+        parts = (f'"{name}": {{{position + i}}}' for i, name in enumerate(SdParts._fields))
+        members["sd_parts_m"] = "{{" + ", ".join(parts) + "}}"
+        position += len(SdParts._fields)
     for name in extra:
         members[name] = f"{{{position}}}"
         position += 1

@@ -5,6 +5,7 @@ from typing import Any, Literal
 import pydantic
 
 from inference.identifiability.status import Identifiability
+from inference.posterior.answer.error_parts import ParameterErrorParts
 from inference.posterior.answer.posterior import (
     Fit,
     FitCheck,
@@ -14,20 +15,26 @@ from inference.posterior.answer.posterior import (
 )
 from inference.posterior.selection.selection import CandidateSummary
 from service.answers.shape import Shape, model_of
-from service.job_store import JobRecord, Status
+from service.store.record import JobRecord, Status
 
 __all__ = ["SHAPES", "PosteriorBrief", "PosteriorPage", "PosteriorResponse", "brief", "full"]
 
+_CHECKS = Literal["total", "worst_frame", "neighbours", "wander", "flux_error"]
+
 SHAPES: dict[type, Shape] = {
-    # mean and sd are nan where there are several modes, which have their own
-    ParameterSummary: Shape(missing=frozenset({"mean", "sd", "ess_bulk", "ess_tail", "mcse_mean"})),
+    # mean and sd are nan where there are several modes, which have their own; all where nothing
+    # was drawn
+    ParameterSummary: Shape(
+        missing=frozenset({"mean", "sd", "q05", "q50", "q95", "ess_bulk", "ess_tail", "mcse_mean"})
+    ),
+    ParameterErrorParts: Shape(missing=frozenset({"noise", "scene", "model"})),
     Identifiability: Shape(
         types={
             "status": Literal["identified", "weak", "not_identified"],
             "contraction": float | None,
         }
     ),
-    FitCheck: Shape(types={"name": Literal["total", "worst_frame", "neighbours", "wander"]}),
+    FitCheck: Shape(types={"name": _CHECKS}),
     Fit: Shape(missing=frozenset({"p_value", "chi_square", "degrees_of_freedom"})),
     CandidateSummary: Shape(
         missing=frozenset(
@@ -46,8 +53,9 @@ SHAPES: dict[type, Shape] = {
 
 
 class _Progress(pydantic.BaseModel):
+    phase: Literal["queued", "compiling", "starting", "tempering", "sampling", "summarising"]
     steps: int
-    target: int
+    target: int | None
     ess: float | None
     rhat: float | None
     eta_s: float | None
@@ -60,7 +68,7 @@ class PosteriorBrief(pydantic.BaseModel):
     status: Status
     method: str
     seed: int
-    progress: _Progress | None
+    progress: _Progress
 
 
 class PosteriorPage(pydantic.BaseModel):

@@ -6,11 +6,12 @@ import json
 import os
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from inference.posterior.settings import SamplerSettings
-    from service.job_store import JobRecord
+    from service.store.record import JobRecord
     from simulator.frames import Frames
     from simulator.scene import Scene
     from simulator.sensor import Sensor
@@ -28,7 +29,9 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
         _run,
         brief="sample the posterior of the ranges and of all unknowns",
         description="Sample the posterior and print it as JSON; progress goes to standard error. "
-        "A row of a file that cannot be read counts as a saturated frame: it has no range.",
+        "A row of a file that cannot be read counts as a saturated frame: it has no range. A "
+        "posterior that has not converged is printed all the same, and the exit code is 3; where "
+        "`drawn` is false, nothing was drawn in the time allowed and there are no intervals.",
         examples="""
             hybridtof infer frames.csv --scene scene.json > posterior.json
             hybridtof infer frames.csv --scene scene.json --seed 7 --max-seconds 60 --draws draws.nc
@@ -65,10 +68,20 @@ def _run(args: argparse.Namespace) -> int:
     if draws is not None:
         args.draws.write_bytes(draws)
     write_result(json.dumps(full(record), allow_nan=False).encode())
-    if record.problem is None:
+    if record.problem is not None:
+        for error in record.problem["errors"]:
+            at = f"{args.scene}#{error['pointer']}: {error['detail']}"
+            sys.stderr.write(f"hybridtof: error: {at}\n")
+        if record.problem["errors"]:
+            return 2
+        sys.stderr.write(f"hybridtof: error: {record.problem['detail']}\n")
+        return 3 if record.problem["status"] < 500 else 4
+    verdict: dict[str, Any] = {} if record.result is None else record.result["verdict"]
+    if verdict.get("converged"):
         return 0
-    sys.stderr.write(f"hybridtof: error: {record.problem['detail']}\n")
-    return 3 if record.problem["status"] < 500 else 4
+    reasons = "; ".join(verdict.get("reasons", ()))
+    sys.stderr.write(f"hybridtof: not converged: {reasons}\n")
+    return 3
 
 
 def _format_of(path: Path) -> str:
@@ -93,30 +106,34 @@ async def _infer(
 ) -> tuple["JobRecord", bytes | None]:
     """Run one job of the service, without the service."""
     from inference.posterior import fold
-    from service.job_store import MemoryJobStore
     from service.jobs import Jobs
     from service.process_pool import ProcessPool
+    from service.store.sql_store import Retention, SqlJobStore
 
-    jobs = Jobs(fold, MemoryJobStore(1), ProcessPool(os.cpu_count() or 1), running=1)
-    await jobs.start()
-    try:
-        record = await jobs.submit(*system, settings)
-        seen = None
-        while not await jobs.wait(record.id, timeout_s=0.5):
-            progress = (await jobs.get(record.id)).progress
-            if progress is not None and progress != seen:
-                note(args, _described(progress))
-                seen = progress
-        record = await jobs.get(record.id)
-        if form is None or record.problem is not None:
-            return record, None
-        return record, await jobs.draws(record.id, form)
-    finally:
-        await jobs.close()
+    with TemporaryDirectory(prefix="hybridtof-") as folder:
+        store = SqlJobStore(f"sqlite:///{folder}/jobs.sqlite", Retention(jobs=1))
+        jobs = Jobs(fold, store, ProcessPool(os.cpu_count() or 1), running=1)
+        await jobs.start()
+        try:
+            record = await jobs.submit(*system, settings)
+            async for now in jobs.follow(record.id, record.revision):
+                note(args, _described(now.progress))
+                record = now
+            if form is None or record.result is None:
+                return record, None
+            if not record.result["drawn"]:
+                note(args, f"{args.draws} is not written: nothing was drawn")
+                return record, None
+            return record, await jobs.draws(record.id, form)
+        finally:
+            await jobs.close()
 
 
 def _described(progress: dict[str, Any]) -> str:
-    parts = [f"{progress['steps']} of about {progress['target']} steps"]
+    parts = [str(progress["phase"])]
+    if progress["steps"]:
+        about = "" if progress["target"] is None else f" of about {progress['target']}"
+        parts.append(f"{progress['steps']}{about} steps")
     for name, unit in (("ess", ""), ("rhat", ""), ("eta_s", " s")):
         if progress[name] is not None:
             parts.append(f"{name.removesuffix('_s')} {progress[name]:.4g}{unit}")

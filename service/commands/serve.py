@@ -15,8 +15,10 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
         "serve",
         _run,
         brief="serve over HTTP until SIGTERM",
-        description="Serve over HTTP. Environment variables HYBRIDTOF_WORKERS, HYBRIDTOF_THREADS, "
-        "HYBRIDTOF_MAX_BODY_BYTES, HYBRIDTOF_MAX_JOBS and HYBRIDTOF_SHUTDOWN_S are optional.",
+        description="Serve over HTTP. Posteriors are kept in an SQLite file in the user's state "
+        "folder, or where HYBRIDTOF_DATABASE says. Other environment variables are optional: "
+        "HYBRIDTOF_WORKERS, HYBRIDTOF_THREADS, HYBRIDTOF_MAX_BODY_BYTES, HYBRIDTOF_MAX_JOBS, "
+        "HYBRIDTOF_MAX_DRAWS_BYTES, HYBRIDTOF_KEEP_DAYS, HYBRIDTOF_SHUTDOWN_S.",
         examples="""
             hybridtof serve
             hybridtof serve --port 8080

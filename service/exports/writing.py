@@ -1,6 +1,6 @@
 """Draws made again from what is stored, and written."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from inference.posterior.answer.draws import Draws
@@ -17,11 +17,11 @@ C = TypeVar("C", bound=StoredCheckpoint)
 
 def write_draws(
     job_from: Callable[[bytes], J],
-    checkpoint_from: Callable[[bytes], C],
+    checkpoint_from: Callable[..., C],
     draw: Callable[[J, C], tuple[Job, Draws]],
     media_type: str,
     job: bytes,
-    checkpoint: bytes,
+    pieces: Sequence[bytes],
 ) -> bytes:
     """Draw again what a checkpoint stands for, and write it: runs in a worker.
 
@@ -31,13 +31,13 @@ def write_draws(
         ``Job.from_bytes``, ``Checkpoint.from_bytes`` and ``draw`` of the computation.
     media_type : str
         Of one of `EXPORTS`.
-    job, checkpoint : bytes
+    job, pieces : bytes, sequence of bytes
         As stored.
 
     Returns
     -------
     bytes
     """
-    at = checkpoint_from(checkpoint)
+    at = checkpoint_from(*pieces)
     sampled, draws = draw(job_from(job), at)
     return export_by(media_type).write(describe_draws(sampled, at.method, draws))

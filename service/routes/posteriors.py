@@ -2,11 +2,14 @@
 
 import hashlib
 import re
+from collections.abc import AsyncIterable, AsyncIterator
 from typing import Annotated
 
 import anyio.to_thread
 from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.responses import JSONResponse, Response
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+from starlette.exceptions import HTTPException
 
 from service.answers.posteriors import PosteriorPage, PosteriorResponse, brief, full
 from service.bodies import BodyOf
@@ -17,6 +20,7 @@ from service.exports.negotiation import accepted_export
 from service.problems import problem_responses
 from service.requests import PosteriorRequest
 from service.shared import shared_of
+from service.store.record import FINISHED, JobRecord
 
 __all__ = ["router"]
 
@@ -82,6 +86,40 @@ async def page(
 async def get(request: Request, job_id: str) -> Response:
     """Return a posterior as it stands."""
     return JSONResponse(full(await shared_of(request).jobs.get(job_id)))
+
+
+async def _followed(
+    request: Request,
+    job_id: str,
+    last_event_id: Annotated[str | None, Header(description="of the last event seen")] = None,
+) -> AsyncIterator[JobRecord]:
+    """Refuse before the stream begins, where there is nothing to follow."""
+    known = last_event_id or ""
+    after = int(known) if re.fullmatch(r"[0-9]{1,9}", known) else 0
+    jobs = shared_of(request).jobs
+    record = await jobs.get(job_id)
+    if record.status in FINISHED and record.revision <= after:
+        raise HTTPException(204)  # so that a browser asks no more
+    return jobs.follow(job_id, after)
+
+
+@router.get(
+    "/{job_id}/events",
+    response_class=EventSourceResponse,
+    responses={
+        204: {"description": "It has ended, and that event was seen"},
+        **problem_responses(404),
+    },
+)
+async def events(
+    changes: Annotated[AsyncIterator[JobRecord], Depends(_followed)],
+) -> AsyncIterable[ServerSentEvent]:
+    """Tell how a posterior stands at every change, until it has ended.
+
+    ``Last-Event-ID`` goes on behind an event; changes in quick succession may be told as one.
+    """
+    async for record in changes:
+        yield ServerSentEvent(data=brief(record), id=str(record.revision))
 
 
 @router.get(

@@ -5,6 +5,7 @@ immunities and obstacle allow. A technique that serves none of them needs a scen
 """
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ VAGUE = {"prior": "normal", "mean": 0.0, "sd": 0.05}
 BRIGHTNESS = {"prior": "lognormal", "median": 0.02, "sigma": 1.0}
 READ = 1e-6  # the plate at 1 m reads 7e-3
 SPEED = 1.0
+_WAVES = 50  # of a smooth error: the kurtosis of its slope is 3.5, of a normal 3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,6 +55,9 @@ class Setting:
     unknown : tuple of str
         Which of `TERMS` are in the readings without being known; of a background it is enough that
         it is there.
+    errors : (float, float), optional
+        Stated standard deviations of the model's errors, of the flux and of the effective distance
+        [m]; left out the model is exact.
     """
 
     name: str
@@ -61,11 +66,13 @@ class Setting:
     shadow: dict[str, float] | None = None
     discrepancy: bool = False
     unknown: tuple[str, ...] = ()
+    errors: tuple[float, float] = (0.0, 0.0)
 
     @property
     def scene(self) -> Scene:
         """The scene as it is stated."""
-        return parse_scene(self.stated)
+        flux, range_m = self.errors
+        return parse_scene(self.stated | {"discrepancy": {"flux": flux, "range_m": range_m}})
 
     def with_term(self, term: str) -> "Setting":
         """Return the same statement on readings that contain a term more."""
@@ -148,19 +155,6 @@ MENU = (
         shadow=SHADOW,
         unknown=("crosstalk", "background"),
     ),
-    Setting(
-        "a known wall behind an object that errs",
-        {"background": WALL | {"shadow": SHADOW}, "discrepancy": 0.05},
-        shadow=SHADOW,
-        discrepancy=True,
-        unknown=("background", "discrepancy"),
-    ),
-    Setting(
-        "an object that errs",
-        {"object": OBJECT, "discrepancy": 0.05},
-        discrepancy=True,
-        unknown=("discrepancy",),
-    ),
 )
 
 
@@ -180,12 +174,47 @@ def sensor_of(kind: str, quiet: float = 1.0, full_scale: float | None = None) ->
     return parse_sensor(document)
 
 
-def _signal(sensor: Sensor, setting: Setting, r: Any) -> Any:
+@dataclasses.dataclass(frozen=True, eq=False)
+class SmoothErrors:
+    """A Gaussian process along log r for each frame, with Matern 5/2 correlation of length 1.
+
+    A sum of waves whose frequencies are drawn from its spectrum, which is Student's t with five
+    degrees of freedom (Rahimi and Recht 2007).
+
+    Attributes
+    ----------
+    frequency, cosine, sine : ndarray, shape (waves, n)
+        Frequencies, and normal amplitudes.
+    """
+
+    frequency: Array
+    cosine: Array
+    sine: Array
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, sd: float, n: int) -> "SmoothErrors":
+        """Draw a process for each of n frames."""
+        size = sd / math.sqrt(_WAVES)
+        frequency = rng.standard_t(5.0, (_WAVES, n))
+        return cls(frequency, *(size * rng.standard_normal((2, _WAVES, n))))
+
+    def __call__(self, r: Any) -> Any:
+        turn = self.frequency * np.log(r)
+        return np.sum(self.cosine * np.cos(turn) + self.sine * np.sin(turn), axis=0)
+
+
+Errors = tuple[SmoothErrors, SmoothErrors]
+
+
+def _signal(sensor: Sensor, setting: Setting, r: Any, errors: Errors | None = None) -> Any:
     """Return the object's readings, shape (2, n); r may be complex."""
     flux = C0 * C2 / (r**2 * (r**2 + C1 * r + C0))
     if setting.discrepancy:
         flux = flux * np.exp(0.1 * np.sin(3.0 * np.log(r) + 1.0))
-    return flux * _carrier(sensor, r)
+    if errors is None:
+        return flux * _carrier(sensor, r)
+    of_flux, of_range = errors
+    return flux * np.exp(of_flux(r)) * _carrier(sensor, r + of_range(r))
 
 
 def _carrier(sensor: Sensor, r: Any) -> Any:
@@ -195,9 +224,9 @@ def _carrier(sensor: Sensor, r: Any) -> Any:
     return np.stack([np.cos(sensor.wave_number * r), np.sin(sensor.wave_number * r)])
 
 
-def _mean(sensor: Sensor, setting: Setting, r: Any) -> Any:
+def _mean(sensor: Sensor, setting: Setting, r: Any, errors: Errors | None) -> Any:
     """Return mean readings, shape (2, n); r may be complex."""
-    mean = _signal(sensor, setting, r)
+    mean = _signal(sensor, setting, r, errors)
     if setting.crosstalk:
         mean = mean + np.array(CROSSTALK)[:, None]
     if setting.shadow is not None:
@@ -219,10 +248,15 @@ def frames_of(sensor: Sensor, setting: Setting, range_m: Array, rng: np.random.G
     range_m : ndarray, shape (n,)
         True ranges [m].
     rng : numpy.random.Generator
-        Source of the noise.
+        Source of the noise, and of the errors of the model that the setting states.
     """
     n = range_m.size
-    mean, signal = _mean(sensor, setting, range_m), _signal(sensor, setting, range_m)
+    errors = None
+    if any(setting.errors):
+        of_flux, of_range = (SmoothErrors.drawn(rng, sd, n) for sd in setting.errors)
+        errors = (of_flux, of_range)
+    mean = _mean(sensor, setting, range_m, errors)
+    signal = _signal(sensor, setting, range_m, errors)
     noise = sensor.noise
     read = np.array(noise.read)[:, None]
     shot = noise.shot * np.abs(mean)
@@ -233,7 +267,7 @@ def frames_of(sensor: Sensor, setting: Setting, range_m: Array, rng: np.random.G
     readings += noise.relative * signal * rng.standard_normal(n)
     # exactly: an imaginary step of which the square is nothing
     step = 1e-100
-    slope = _mean(sensor, setting, range_m + 1j * step).imag / step
+    slope = _mean(sensor, setting, range_m + 1j * step, errors).imag / step
     assert noise.derivative is not None
     rates = SPEED * slope + np.array(noise.derivative)[:, None] * rng.standard_normal((2, n))
     times = (range_m - range_m[0]) / SPEED

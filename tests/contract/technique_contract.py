@@ -5,6 +5,7 @@ serves by its own word (needs, immunities, obstacle), and looks at its answers. 
 the false-alarm rates are those of a new seed.
 """
 
+import dataclasses
 import math
 
 import numpy as np
@@ -27,6 +28,7 @@ __all__ = [
     "fields_are_those_of_the_contract",
     "frames_that_cannot_be_used_are_said_to_be",
     "immunities_are_those_declared",
+    "model_errors_are_right",
     "of_single_frames",
     "settings_of",
 ]
@@ -40,6 +42,7 @@ _QUIET = 1e-3  # of the noise
 _SINGLE, _MANY = 200, 24  # frames of a set
 _TRIALS, _SETS = 4000, 40  # frames, and sets of frames, whose scatter is compared with their sd
 _MONTE_CARLO = 2  # scenes of a fit over many frames in which this is done: a set is a whole fit
+_ERRORS = (1e-4, 1e-5)  # of flux and effective distance [m]: small enough to be linear
 _ALARM = 1e-6  # of one comparison of scatter and sd
 
 
@@ -147,6 +150,32 @@ def errors_are_right(technique: Technique, kind: str) -> None:
             assert low < square < high, (technique.name, setting.name, low, square, high)
 
 
+def model_errors_are_right(technique: Technique, kind: str) -> None:
+    """Check the model's part of standard deviations against random smooth errors of the model.
+
+    Readings nearly without noise: of 2000 frames, each with errors of its own, each is within one
+    sd with probability 0.683 (which the errors' own kurtosis shifts by 0.02 at most), as in
+    `errors_are_right`; the squares of the parts sum to the whole's.
+    """
+    sensor = sensor_of(kind, _QUIET)
+    for setting in settings_of(technique, kind):
+        erring = dataclasses.replace(setting, errors=_ERRORS)
+        truth = np.tile(span(8), _TRIALS // 16)
+        frames = frames_of(sensor, erring, truth, np.random.default_rng(6))
+        result = _solve(technique, sensor, erring, frames)
+        if result.range_bounds_m is not None:
+            continue
+        assert result.sd_parts_m is not None
+        filled = np.isfinite(result.roots_sd_m)
+        squares = sum(part[filled] ** 2 for part in result.sd_parts_m)
+        np.testing.assert_allclose(squares, result.roots_sd_m[filled] ** 2, rtol=1e-12)
+        misses = _misses(result, truth)
+        misses = misses[~np.isnan(misses)]
+        assert misses.size > 0.35 * _TRIALS
+        share, low, high = float(np.mean(misses < 1.0)), *_binomial_band(misses.size)
+        assert low < share < high, (technique.name, setting.name, low, share, high)
+
+
 def _binomial_band(n: int) -> tuple[float, float]:
     """Return where the share of n misses below one sd lies but for the false-alarm rate."""
     share = math.erf(math.sqrt(0.5))
@@ -167,6 +196,14 @@ def immunities_are_those_declared(technique: Technique, kind: str) -> None:
     sensor = sensor_of(kind, _QUIET)
     for term in TERMS:
         shown = [setting for setting in settings if term in setting.unknown]
+        if term == "discrepancy" and term in technique.immune_to:
+            # an error of which the scene says that there is none
+            for setting in settings:
+                spoiled = setting.with_term(term)
+                truth, frames = _frames(technique, sensor, spoiled, 3)
+                misses = _misses(_solve(technique, sensor, spoiled, frames), truth)
+                assert np.nanmax(misses) < _RIGHT, f"{technique.name}: {spoiled.name}"
+            continue
         if term in technique.immune_to:
             assert shown, f"{technique.name} declares {term} and serves no scene that has it"
             continue

@@ -19,7 +19,8 @@ from simulator.priors import (
     RangeForm,
     UniformDistribution,
 )
-from simulator.scene import check_scene, parse_scene
+from simulator.scene import parse_scene
+from simulator.scene_checks import check_scene
 from simulator.sensor import Sensor, parse_sensor
 from simulator.validated import Validated
 

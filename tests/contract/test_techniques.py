@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from inference.estimates import TechniqueResult
+from inference.estimates import SdParts, TechniqueResult
 from inference.technique import Task, Technique
 from inference.techniques import ALL_TECHNIQUES
 from tests.contract.scenes import TERMS
@@ -18,6 +18,7 @@ from tests.contract.technique_contract import (
     errors_are_right,
     frames_that_cannot_be_used_are_said_to_be,
     immunities_are_those_declared,
+    model_errors_are_right,
     of_single_frames,
     settings_of,
 )
@@ -47,12 +48,21 @@ def doubled_range(result: TechniqueResult) -> TechniqueResult:
     return dataclasses.replace(result, roots_m=2.0 * result.roots_m, range_bounds_m=bounds)
 
 
+def scaled_sd(result: TechniqueResult, factor: float) -> TechniqueResult:
+    parts = result.sd_parts_m
+    return dataclasses.replace(
+        result,
+        roots_sd_m=factor * result.roots_sd_m,
+        sd_parts_m=None if parts is None else SdParts(*(factor * part for part in parts)),
+    )
+
+
 def doubled_sd(result: TechniqueResult) -> TechniqueResult:
-    return dataclasses.replace(result, roots_sd_m=2.0 * result.roots_sd_m)
+    return scaled_sd(result, 2.0)
 
 
 def halved_sd(result: TechniqueResult) -> TechniqueResult:
-    return dataclasses.replace(result, roots_sd_m=0.5 * result.roots_sd_m)
+    return scaled_sd(result, 0.5)
 
 
 @pytest.mark.parametrize(("technique", "kind"), EVERY)
@@ -63,6 +73,20 @@ def test_answers(technique: Technique, kind: str) -> None:
 @pytest.mark.parametrize(("technique", "kind"), SINGLE)
 def test_errors_of_single_frames(technique: Technique, kind: str) -> None:
     errors_are_right(technique, kind)
+
+
+@pytest.mark.parametrize(("technique", "kind"), SINGLE)
+def test_errors_of_the_model(technique: Technique, kind: str) -> None:
+    model_errors_are_right(technique, kind)
+
+
+@pytest.mark.parametrize("change", [doubled_sd, halved_sd])
+@pytest.mark.parametrize(("technique", "kind"), SINGLE)
+def test_a_factor_of_two_in_the_model_part_is_noticed(
+    technique: Technique, kind: str, change: Callable[[TechniqueResult], TechniqueResult]
+) -> None:
+    with pytest.raises(AssertionError):
+        model_errors_are_right(changed(technique, change), kind)
 
 
 @pytest.mark.slow

@@ -102,13 +102,22 @@ def reference(case: Case, points: int = 20001) -> float:
             options={"xatol": 1e-15},
         )
         better = -found.fun > values[k]
-        tops.append((found.x, -found.fun) if better else (grid[k], values[k]))
+        u, value = (found.x, -found.fun) if better else (grid[k], values[k])
+        # Brent's method knows u to the root of a rounding: once more, from that end on
+        near = (max(a - u, -1e-7), min(b - u, 1e-7))
+        finer: Any = optimize.minimize_scalar(
+            lambda t, u=u: -float(log_density(case, np.array([u + t]))[0]),
+            bounds=near,
+            method="bounded",
+            options={"xatol": 1e-17},
+        )
+        tops.append((u + finer.x, -finer.fun) if -finer.fun > value else (u, value))
     best = max(value for _, value in tops)
-    near = [u for u, value in tops if value > best - 60]
+    high_tops = [u for u, value in tops if value > best - 60]
     # valleys need not be exact: they only divide the interval
-    cuts = [low, *[0.5 * (a + b) for a, b in itertools.pairwise(near)], high]
+    cuts = [low, *[0.5 * (a + b) for a, b in itertools.pairwise(high_tops)], high]
     pieces = []
-    for u, a, b in zip(near, cuts[:-1], cuts[1:], strict=True):
+    for u, a, b in zip(high_tops, cuts[:-1], cuts[1:], strict=True):
         for end in (a, b):
             if end == u:
                 continue

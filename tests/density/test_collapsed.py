@@ -14,8 +14,6 @@ from simulator.scene import parse_scene
 from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor, parse_sensor
 from tests.posterior.scenes import KINDS, OBJECT, UNKNOWN_CROSSTALK, data, example, sensor_of
 
-pytestmark = pytest.mark.xdist_group("kernels")  # compile each kernel once, in one process
-
 NOTHING = np.empty((1, 0))
 BACKGROUND: dict[str, Any] = {
     "strength": 0.03,

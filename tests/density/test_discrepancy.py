@@ -106,7 +106,7 @@ def test_a_vanishing_error_leaves_the_plain_density(kind: str) -> None:
 
 @pytest.mark.parametrize("scale", [1e-12, 1e12])
 def test_units_do_not_matter(scale: float) -> None:
-    sensor = sensor_of("pulsed", 300.0, shot=1e-6, relative=0.01)
+    sensor = sensor_of("sine_wave", 300.0, shot=1e-6, relative=0.01)
     noise = {
         "read": [scale * x for x in sensor.noise.read],
         "shot": scale * 1e-6,
@@ -114,8 +114,13 @@ def test_units_do_not_matter(scale: float) -> None:
     }
     other = sensor.model_copy(update={"gain": scale, "noise": sensor.noise.model_validate(noise)})
     frames = data(sensor, {"crosstalk": CROSSTALK, "discrepancy": 0.05}, 6).frames
-    scene = {"object": OBJECT, "crosstalk": CROSSTALK, "range_m": SPAN}
-    scaled = {**scene, "crosstalk": [scale * x for x in CROSSTALK]}
+    wall = {"strength": 0.03, "distance_m": 4.0, "shadow": {"c0": 0.06, "c1": 0.01}}
+    scene = {"object": OBJECT, "crosstalk": CROSSTALK, "background": wall}
+    scaled = {
+        **scene,
+        "crosstalk": [scale * x for x in CROSSTALK],
+        "background": {**wall, "strength": scale * 0.03},
+    }
     found = density_of(other, scaled, Frames(scale * frames.readings), 0.05)(NOTHING)[0]
     wanted = density_of(sensor, scene, frames, 0.05)(NOTHING)[0]
     assert found == pytest.approx(wanted - 12 * math.log(scale), abs=1e-5)
@@ -143,7 +148,7 @@ def test_an_empty_frame_counts_as_without_discrepancy(kind: str) -> None:
 
 
 def test_far_from_the_data_the_density_stays_finite_and_never_nan() -> None:
-    sensor = sensor_of("sine_wave")
+    sensor = sensor_of("sine_wave", shot=1e-6, relative=0.01)
     scene = {
         "crosstalk": UNKNOWN_CROSSTALK,
         "background": {
@@ -166,6 +171,7 @@ def test_where_nothing_fits_laplace_takes_over_without_a_step() -> None:
     sensor = sensor_of("pulsed", 1000.0)
     scene = {
         "object": {**OBJECT, "c2": {"prior": "lognormal", "median": OBJECT["c2"], "sigma": 0.3}},
+        "crosstalk": [0.0, 0.0],
         "range_m": SPAN,
     }
     frames = data(sensor, {}, 10, span=(0.4, 1.2)).frames

@@ -8,8 +8,6 @@ from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
 from tests.density.reference import FEW_TERMS, Case, random_case, reference
 
-pytestmark = pytest.mark.xdist_group("kernels")  # compile each kernel once, in one process
-
 NAT = 1e-3  # what a frame may be wrong by
 
 

@@ -15,8 +15,6 @@ from simulator.scene import parse_scene
 from tests.density.reference import FEW_TERMS, log_density, random_case
 from tests.posterior.scenes import KINDS, UNKNOWN_CROSSTALK, data, sensor_of
 
-pytestmark = pytest.mark.xdist_group("kernels")  # compile each kernel once, in one process
-
 Array = NDArray[np.float64]
 
 TRUTH: dict[str, Any] = {

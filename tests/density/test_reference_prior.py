@@ -10,6 +10,7 @@ from scipy import integrate, stats
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.density.discrepant import with_discrepancy
+from inference.frame.range_prior import LEAST_INFORMATION
 from inference.posterior.answer.ranges import draw_ranges
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
@@ -61,7 +62,7 @@ def readings_at(sensor: Sensor, u: float, scene: dict[str, Any]) -> tuple[Array,
 
 
 def log_densities(sensor: Sensor, scene: dict[str, Any], reading: Array, u: Array) -> Array:
-    """One frame's log density, plus that of the root of one plus its information."""
+    """One frame's log density, plus that of the root of one plus a 25th of its information."""
     noise, pulsed, out = sensor.noise, isinstance(sensor, PulsedSensor), np.empty(u.size)
     for k, at in enumerate(u):
         mean, own = readings_at(sensor, at, scene)
@@ -78,7 +79,7 @@ def log_densities(sensor: Sensor, scene: dict[str, Any], reading: Array, u: Arra
         matrix = np.array([[v1, c], [c, v2]])
         e, information = reading - mean, slope @ np.linalg.solve(matrix, slope)
         out[k] = -0.5 * (e @ np.linalg.solve(matrix, e) + math.log(np.linalg.det(matrix)))
-        out[k] += 0.5 * math.log1p(information) - math.log(2 * math.pi)
+        out[k] += 0.5 * math.log1p(information / LEAST_INFORMATION) - math.log(2 * math.pi)
     return out
 
 
@@ -125,7 +126,7 @@ def test_only_the_distance_from_the_curve_counts(kind: str) -> None:
     found = clean.frame_log_likelihoods(NOTHING)[0]
     read = sensor.noise.read
     # on the line: 1 / (2 pi s1 s2), times sqrt(2 pi) of the integral along it, less its chi-square
-    top = -0.5 * math.log(2 * math.pi) - math.log(read[0] * read[1])
+    top = -0.5 * math.log(2 * math.pi * LEAST_INFORMATION) - math.log(read[0] * read[1])
     assert (found < top + 1e-4).all()
     # six chi-squares of one degree: beyond 40 once in 1e6 runs
     assert -2 * (found - top).sum() < 40.0
@@ -165,7 +166,7 @@ def test_with_a_flux_error_and_little_noise() -> None:
     covariance_of_path = matern_path_covariance(np.log(r), 0.05) + np.diag(blur)
     path = stats.multivariate_normal(np.zeros(7), covariance_of_path).logpdf(delta)
     resolution = np.hypot((1 - slope) * w1 / read[0], slope * w2 / read[1])
-    wanted = path + np.log(resolution).sum() - np.log(w1 * w2).sum()
+    wanted = path + np.log(resolution / math.sqrt(LEAST_INFORMATION)).sum() - np.log(w1 * w2).sum()
     found = with_discrepancy(density_of(sensor, scene, frames), 0.05)(NOTHING)[0]
     # the slope of the error, of the order of 0.05 times sqrt(5/3), changes the resolution by its
     # share of the whole slope in each frame, and frames share it; without the prior's resolution

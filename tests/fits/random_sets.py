@@ -155,7 +155,7 @@ def outcome_of(one: RandomSet) -> Outcome:
     reference = maximum_from(problem, truth)
     _, there = residuals_and_information(problem, reference.x, reference.positions)
     if there.rank == len(problem):
-        wider, _ = inflation(problem, reference, there)
+        wider, _, _ = inflation(problem, reference, there)
         own = float(np.median(there.sd_of(there.response[problem.present])))
         shared = max(shared, wider * own)
     found = estimate(one.sensor, one.scene, frames, ["joint_fit"])

@@ -13,8 +13,6 @@ from inference.fits.likelihood.triangle import damped_step, reduce_columns, solv
 from simulator.scene import parse_scene
 from tests.fits.scenes import OBJECT, VAGUE, WALL, data, path, sensor_of
 
-pytestmark = pytest.mark.xdist_group("fits")  # compile each kernel once
-
 EVERYTHING: dict[str, Any] = {
     "crosstalk": [VAGUE, VAGUE],
     "background": {

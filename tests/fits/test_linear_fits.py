@@ -30,8 +30,6 @@ from tests.fits.scenes import (
     values_of,
 )
 
-pytestmark = pytest.mark.xdist_group("fits")  # compile each kernel once
-
 Array = NDArray[np.float64]
 PRIOR = {"prior": "lognormal", "median": 0.02, "sigma": 1.0}
 

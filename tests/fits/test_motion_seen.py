@@ -11,8 +11,6 @@ from inference.fits.likelihood.problem import fit_problem
 from simulator.scene import parse_scene
 from tests.fits.scenes import OBJECT, SIGNAL_AT_1M, data, path, sensor_of, values_of
 
-pytestmark = pytest.mark.xdist_group("fits")  # compile each kernel once
-
 SHAPES = [((0.7, 0.7), 1.0), ((0.69, 0.71), 2.0), ((0.3, 1.5), math.inf)]
 
 

@@ -5,8 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from inference.estimate import estimate
-from inference.fits.answer.determined import LIMIT
 from inference.fits.answer.inflation import inflation
 from inference.fits.answer.ranges import WITHIN, Answer, frame_ranges
 from inference.fits.answer.report import describe
@@ -16,8 +14,6 @@ from inference.fits.likelihood.maximum import maximum_from
 from inference.fits.likelihood.multistart import find_maxima
 from inference.fits.likelihood.problem import fit_problem
 from tests.fits.random_sets import CLASSES, outcome_of, random_set
-
-pytestmark = pytest.mark.xdist_group("fits")
 
 
 @pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
@@ -42,28 +38,17 @@ def test_it_does_so_with_everything_unknown(seed: int) -> None:
     assert np.median(np.abs(outcome.misses)) < 3.3
 
 
-def test_what_is_open_with_everything_unknown_is_refused() -> None:
-    """Two sets of which the truth leaves the ranges open by half of the limit and more."""
-    outcomes = [outcome_of(random_set("everything", "pulsed", seed)) for seed in (0, 1)]
-    assert all(outcome.refused for outcome in outcomes)
-    assert all(outcome.right for outcome in outcomes)
+@pytest.mark.parametrize(("name", "seed"), [("everything", 1), ("free shadow", 52)])
+def test_what_is_nearly_open_is_answered_with_its_honest_width(name: str, seed: int) -> None:
+    """The truth leaves the ranges of these sets open by a tenth and more of their size.
 
-
-def test_values_that_fit_nearly_as_well_and_leave_the_ranges_open_are_a_reason_to_refuse() -> None:
-    """The best optimum of this set is sure of ranges that are a quarter too large."""
-    one = random_set("free shadow", "pulsed", 52)
-    problem = fit_problem(one.sensor, one.scene, one.simulation.frames)
-    best, other = find_maxima(problem)[:2]
-    _, there = residuals_and_information(problem, best.x, best.positions)
-    sure = np.median(there.sd_of(there.response[problem.present]))
-    truth = np.log(one.simulation.range_m)
-    assert sure < LIMIT / 5
-    assert np.mean(best.positions - truth) > 10 * sure
-    assert other.deviance - best.deviance < WITHIN
-    assert abs(np.mean(other.positions - truth)) < 0.01
-    found = estimate(one.sensor, one.scene, one.simulation.frames, ["joint_fit"])
-    reason = next(item.reason for item in found.left_out if item.name == "joint_fit")
-    assert "explain the frames nearly as well" in reason
+    The best optimum of the second is sure of ranges that are a quarter too large.
+    """
+    outcome = outcome_of(random_set(name, "pulsed", seed))
+    assert not outcome.refused
+    assert outcome.right
+    assert outcome.shared > 0.1
+    assert np.mean(np.abs(outcome.misses) < 2.0) > 0.9
 
 
 def test_widened_intervals_reach_as_far_as_a_profile_walked_in_small_steps() -> None:
@@ -72,7 +57,7 @@ def test_widened_intervals_reach_as_far_as_a_profile_walked_in_small_steps() -> 
     problem = fit_problem(one.sensor, one.scene, one.simulation.frames)
     top = find_maxima(problem)[0]
     _, there = residuals_and_information(problem, top.x, top.positions)
-    wider, better = inflation(problem, top, there)
+    wider, _, better = inflation(problem, top, there)
     assert better is None
     spread = float(np.median(there.sd_of(there.response[problem.present])))
     j, x = problem.names.index("object.c0"), top.x

@@ -15,8 +15,6 @@ from simulator.sensor import parse_sensor
 from simulator.trajectories import SampledTrajectory
 from tests.fits.scenes import KINDS, data
 
-pytestmark = pytest.mark.xdist_group("fits")  # compile each kernel once
-
 BOX = {"c0": 0.1, "c1": 0.0, "c2": 0.1}
 SENSOR = parse_sensor({**KINDS["pulsed"], "noise": {"read": [3e-3, 3e-3]}})
 

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from inference.identifiability.after_data import _is_still, statuses_of_draws
 from inference.identifiability.status import Identifiability
+from inference.identifiability.statuses import Spread
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import parse_scene
 from tests.posterior.scenes import UNKNOWN_CROSSTALK, sensor_of
@@ -18,8 +19,14 @@ def parameters() -> Parameters:
     return parameters_of(SENSOR, parse_scene({"crosstalk": UNKNOWN_CROSSTALK}))
 
 
+def spread_of(z: Array, log_r: Array) -> Spread:
+    present = np.isfinite(log_r[0])
+    scale = float(log_r[:, present].mean(axis=1).std()) if present.any() else np.nan
+    return Spread(z.std(axis=0), scale)
+
+
 def judged(z: Array, log_r: Array) -> dict[str, Identifiability]:
-    rows = statuses_of_draws(SENSOR, parameters(), z, z, log_r)
+    rows = statuses_of_draws(SENSOR, parameters(), spread_of(z, log_r), z, log_r)
     assert [row.parameter for row in rows] == [*parameters().names, "range_m"]
     return {row.parameter: row for row in rows}
 
@@ -78,7 +85,7 @@ def test_what_the_law_of_the_ranges_tells_is_not_identified_by_the_data(law: str
     rng = np.random.default_rng(6)
     z = 1e-4 * rng.standard_normal((500, 5))
     log_r = np.log(np.linspace(0.5, 1.0, 20)) + 1e-4 * rng.standard_normal((500, 20))
-    for row in statuses_of_draws(weak, made, z, z, log_r):
+    for row in statuses_of_draws(weak, made, spread_of(z, log_r), z, log_r):
         if law == "reference":
             assert row.status == "identified"
             continue
@@ -114,7 +121,8 @@ def test_frames_without_object_and_nothing_unknown() -> None:
     assert "no frame holds an object" in rows["range_m"].reason
     known = parameters_of(SENSOR, parse_scene({"object": {"c0": 0.08, "c1": 0.0, "c2": 0.1}}))
     z = np.empty((100, 0))
-    (row,) = statuses_of_draws(SENSOR, known, z, z, 1e-3 * rng.standard_normal((100, 4)))
+    log_r = 1e-3 * rng.standard_normal((100, 4))
+    (row,) = statuses_of_draws(SENSOR, known, spread_of(z, log_r), z, log_r)
     assert (row.parameter, row.status) == ("range_m", "identified")
 
 
@@ -137,7 +145,8 @@ def test_a_scale_left_open_by_crosstalk_and_discrepancy_is_not_identified(
     log_r = np.log(np.linspace(0.2, 0.4, 20)) + 1e-4 * rng.standard_normal((500, 20)) + scale
 
     def row(discrepancy: float | None) -> Identifiability:
-        return statuses_of_draws(SENSOR, made, z, z, log_r, discrepancy=discrepancy)[-1]
+        spread = spread_of(z, log_r)
+        return statuses_of_draws(SENSOR, made, spread, z, log_r, discrepancy=discrepancy)[-1]
 
     found = row(0.072)
     assert found.status == status

@@ -256,7 +256,7 @@ def test_importance_sampling_is_bounded_whatever_is_asked_for(
 
 
 def test_draws_of_a_job_that_was_stopped_before_its_terms_were_decided() -> None:
-    """They are those of the answer: all terms kept, the starting points."""
+    """They are those of the answer: all terms kept, and none drawn yet."""
     sensor, _, frames = example("pulsed", crosstalk=True, frames=8)
     scene = parse_scene({"crosstalk": {"values": UNKNOWN_CROSSTALK, "optional": True}})
     job = fold.prepare(sensor, scene, frames, QUICK)

@@ -23,7 +23,7 @@ from tests.posterior.scenes import OBJECT, UNKNOWN_CROSSTALK, data, example, sen
 def test_one_unknown_agrees_with_quadrature(kind: str, snr: float) -> None:
     sensor = sensor_of(kind, snr)
     frames = data(sensor, frames=8).frames
-    scene = parse_scene({"object": {"c0": OBJECT["c0"], "c1": OBJECT["c1"]}})
+    scene = parse_scene({"object": {"c0": OBJECT["c0"], "c1": OBJECT["c1"]}, "discrepancy": 0})
     posterior = infer(sensor, scene, frames, SamplerSettings(seed=2))
     assert posterior.verdict.converged
     density = collapsed_density(sensor, scene, frames)
@@ -61,6 +61,7 @@ def test_the_shape_is_the_contract_s() -> None:
     assert set(document) == {
         "method",
         "seed",
+        "drawn",
         "verdict",
         "parameters",
         "modes",
@@ -81,6 +82,7 @@ def test_the_shape_is_the_contract_s() -> None:
     assert set(document["parameters"]["object.c0"]) == {
         "mean",
         "sd",
+        "sd_parts",
         "q05",
         "q50",
         "q95",
@@ -96,6 +98,11 @@ def test_the_shape_is_the_contract_s() -> None:
         "q95",
         "mean",
         "sd",
+        "sd_parts",
+        "mcse_mean",
+        "mcse_q05",
+        "mcse_q50",
+        "mcse_q95",
         "near_fold",
         "modes",
     }
@@ -107,7 +114,7 @@ def test_the_shape_is_the_contract_s() -> None:
     assert joint["parameters"].keys() == document["parameters"].keys()
     assert joint["weight"] == 1.0
     assert set(document["runtime"]) == {"wall_s", "cpu_s", "likelihood_calls", "k_hat"}
-    assert [row["term"] for row in document["left_out"]] == ["background", "discrepancy"]
+    assert [row["term"] for row in document["left_out"]] == ["background"]
 
 
 def _scaled(factor: float) -> Posterior:

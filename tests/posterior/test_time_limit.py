@@ -3,8 +3,9 @@
 import asyncio
 import itertools
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, TypeVar
 
 import pytest
 
@@ -12,11 +13,12 @@ import inference.posterior.infer
 import service.job_runner
 from inference.posterior import fold
 from inference.posterior.settings import SamplerSettings
-from service.job_store import MemoryJobStore
 from service.jobs import Jobs
+from service.store.sql_store import Retention, SqlJobStore
 from simulator.scene import parse_scene
 from tests.posterior.scenes import UNKNOWN_CROSSTALK, data, example, sensor_of
 
+R = TypeVar("R")
 OUT_OF_TIME = "stopped at the time limit of {} s"
 
 
@@ -28,27 +30,42 @@ class _Clock:
         self.perf_counter: Callable[[], float] = seconds
         self.monotonic: Callable[[], float] = seconds
         self.process_time: Callable[[], float] = lambda: 0.0
+        self.thread_time: Callable[[], float] = lambda: 0.0
 
 
-async def _by_jobs(request: Any, settings: SamplerSettings) -> dict[str, Any]:
-    jobs = Jobs(fold, MemoryJobStore(1), ThreadPoolExecutor(2), running=1)
+class _Threads(ThreadPoolExecutor):
+    """Workers whose clock can be replaced."""
+
+    def submit_within(self, _: float, fn: Callable[..., R], /, *args: Any) -> Future[R]:
+        return self.submit(fn, *args)
+
+    def compiling(self, _: Future[Any]) -> bool:
+        return False
+
+    def abandon(self, future: Future[Any]) -> None:
+        future.cancel()
+
+
+async def _by_jobs(path: Path, request: Any, settings: SamplerSettings) -> dict[str, Any]:
+    store = SqlJobStore(f"sqlite:///{path}/jobs.sqlite", Retention(1))
+    jobs = Jobs(fold, store, _Threads(2), running=1)
     await jobs.start()
     try:
         sensor, scene, frames = request
         record = await jobs.submit(sensor, scene, frames, settings)
-        assert await jobs.wait(record.id)
-        result = (await jobs.get(record.id)).result
+        async for now in jobs.follow(record.id):
+            record = now
     finally:
         await jobs.close()
-    assert result is not None
-    return result
+    assert record.result is not None
+    return record.result
 
 
 # one reading at the beginning, one after the start and one after every chunk
 @pytest.mark.parametrize("max_seconds", [1.0, 2.5, 1000.0])
 @pytest.mark.parametrize("optional", [False, True])
 def test_the_same_answer_from_a_call_and_from_the_service(
-    max_seconds: float, optional: bool, monkeypatch: pytest.MonkeyPatch
+    max_seconds: float, optional: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     crosstalk = {"values": UNKNOWN_CROSSTALK, "optional": True} if optional else UNKNOWN_CROSSTALK
     sensor = sensor_of("pulsed")
@@ -59,7 +76,7 @@ def test_the_same_answer_from_a_call_and_from_the_service(
     monkeypatch.setattr(inference.posterior.infer, "time", _Clock())
     called = inference.posterior.infer.infer(*request, settings).to_json()
     monkeypatch.setattr(service.job_runner, "time", _Clock())
-    served = asyncio.run(_by_jobs(request, settings))
+    served = asyncio.run(_by_jobs(tmp_path, request, settings))
     assert called.pop("runtime")["wall_s"] == served.pop("runtime")["wall_s"]
     assert called == served
     stopped = OUT_OF_TIME.format(f"{max_seconds:g}") in called["verdict"]["reasons"]

@@ -69,7 +69,11 @@ def request(case: Case, m1: float, m2: float) -> tuple[Sensor, Scene, Frames]:
             "frequency_hz": case.timing,
             "phase_offset_rad": case.offset,
         }
-    scene: dict[str, object] = {"object": {"c0": case.c0, "c1": case.c1, "c2": case.c2}}
+    # the reference filters roots as if the model were exact
+    scene: dict[str, object] = {
+        "object": {"c0": case.c0, "c1": case.c1, "c2": case.c2},
+        "discrepancy": 0,
+    }
     if case.has_background:
         scene["background"] = {
             "strength": case.strength,

@@ -3,6 +3,7 @@
 import importlib
 import itertools
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import mpmath as mp
@@ -35,12 +36,23 @@ P = CurveParameters(
 EVERY = pytest.mark.parametrize("curve", CURVES, ids=[curve.name for curve in CURVES])
 
 
-def plain(kind: int, u: mp.mpf) -> mp.mpf:
-    """Write the curve as its definition, derivatives by mpmath."""
+NO_ERRORS = (0.0, 0.0, 0.0, 0.0)
+
+
+def plain(kind: int, u: mp.mpf, errors: Sequence[mp.mpf] = NO_ERRORS) -> mp.mpf:
+    """Write the curve as its definition, derivatives by mpmath.
+
+    The errors are those of the flux and of the effective distance, each with its slope along log r.
+    """
     c0, c1, far, k, c0s, c1s, contrast = (mp.mpf(x) for x in P)
+    flux, flux_slope, late, late_slope = (mp.mpf(x) for x in errors)
 
     def phi(r: mp.mpf) -> mp.mpf:
-        return c0 / (r**2 * (r**2 + c1 * r + c0))
+        exact = c0 / (r**2 * (r**2 + c1 * r + c0))
+        return exact * mp.exp(flux + flux_slope * mp.log(r / u))
+
+    def seen(r: mp.mpf) -> mp.mpf:
+        return r + late + late_slope * mp.log(r / u)
 
     def back(r: mp.mpf) -> mp.mpf:
         if kind in (differential_ratio.KIND, differential_phase.KIND):
@@ -51,17 +63,17 @@ def plain(kind: int, u: mp.mpf) -> mp.mpf:
         case intensity.KIND:
             return phi(u)
         case intensity_w1.KIND:
-            return u * phi(u)
+            return seen(u) * phi(u)
         case cancelling_ratio.KIND:
-            return (1 - u / far) * phi(u)
+            return (1 - seen(u) / far) * phi(u)
         case cancelling_quadrature.KIND:
-            return mp.sin(k * (far - u)) * phi(u)
+            return mp.sin(k * (far - seen(u))) * phi(u)
         case differential_ratio.KIND | both_ratio.KIND:
-            top = mp.diff(lambda r: r * phi(r) + far * back(r), u)
+            top = mp.diff(lambda r: seen(r) * phi(r) + far * back(r), u)
             return top / mp.diff(lambda r: phi(r) + back(r), u)
         case differential_phase.KIND | both_phase.KIND:
-            real = mp.diff(lambda r: phi(r) * mp.cos(k * r) + back(r) * mp.cos(k * far), u)
-            imag = mp.diff(lambda r: phi(r) * mp.sin(k * r) + back(r) * mp.sin(k * far), u)
+            real = mp.diff(lambda r: phi(r) * mp.cos(k * seen(r)) + back(r) * mp.cos(k * far), u)
+            imag = mp.diff(lambda r: phi(r) * mp.sin(k * seen(r)) + back(r) * mp.sin(k * far), u)
             return mp.atan2(imag, real)
         case _:
             raise AssertionError(f"write the definition of curve {kind} here")
@@ -82,6 +94,20 @@ def test_values_and_slopes(curve: Curve, u: float) -> None:
 
 
 @EVERY
+@pytest.mark.parametrize("u", [0.31, 1.3, 3.1])
+def test_responses_to_errors_of_the_model(curve: Curve, u: float) -> None:
+    with mp.workdps(50):
+        step = mp.mpf(10) ** -12
+        for place, ours in enumerate(dispatch.response(curve.kind, u, P)):
+            ends = [
+                plain(curve.kind, mp.mpf(u), [sign * step if i == place else 0 for i in range(4)])
+                for sign in (1, -1)
+            ]
+            slope = float((ends[0] - ends[1]) / (2 * step))
+            assert ours == pytest.approx(slope, rel=1e-10, abs=1e-12)
+
+
+@EVERY
 @pytest.mark.parametrize("u", [1e-3, 0.31, 0.77, 1.3, 3.1])
 def test_a_curve_is_dispatched_to_its_own_file(curve: Curve, u: float) -> None:
     """No case forgotten, which would give nan, and none that gives another curve's formula."""
@@ -95,6 +121,7 @@ def test_a_curve_is_dispatched_to_its_own_file(curve: Curve, u: float) -> None:
         "guess": (target, 1.0),
         "residual": (u, 1.1 * target, 1.0),
         "power_law": (u,),
+        "response": (u,),
     }
     if curve.poles is not None or isinstance(curve.turns, Search):
         calls["direction"] = (u,)
@@ -148,6 +175,7 @@ def test_a_number_without_a_case_gives_nan() -> None:
     assert math.isnan(dispatch.guess(kind, 1.0, 1.0, P))
     assert math.isnan(dispatch.residual(kind, 1.0, 1.0, 1.0, P))
     assert math.isnan(dispatch.turning(kind, 1.0, P))
+    assert np.isnan(dispatch.response(kind, 1.0, P)).all()
     assert np.isnan(dispatch.power_law(kind, 1.0, P)).all()
     assert np.isnan(dispatch.direction(kind, 1.0, P)).all()
 

@@ -1,6 +1,7 @@
 """Windows of differences, motion's power law, and the answers that need no object."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -56,7 +57,7 @@ def test_crosstalk_of_any_size_cancels(sensor: Sensor) -> None:
     np.testing.assert_allclose(result.range_m, r, rtol=5e-4)
 
 
-def test_uneven_times_and_both_ends_are_second_order() -> None:
+def test_uneven_times_and_both_ends_are_fourth_order() -> None:
     sensor = pulsed(1e-15)
     errors = []
     for n in (200, 400):
@@ -66,8 +67,8 @@ def test_uneven_times_and_both_ends_are_second_order() -> None:
         rate = derivatives_of(sensor, None, Frames(readings(sensor, r), time_s=t), 0)
         slope = -C0 * C2 * (4 * r**2 + 3 * C1 * r + 2 * C0) / (r**3 * (r**2 + C1 * r + C0) ** 2)
         errors.append(np.abs(rate.second / slope - 1).max())
-    assert errors[0] < 0.01
-    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15)
+    assert errors[0] < 1e-4
+    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.3)
 
 
 def test_noise_widens_the_window_and_motion_narrows_it() -> None:
@@ -75,39 +76,67 @@ def test_noise_widens_the_window_and_motion_narrows_it() -> None:
     r = 0.4 + 0.8 * t
     rng = np.random.default_rng(5)
     spread = []
-    for noise in (1e-12, 1e-5, 1e-4):
+    for noise in (1e-15, 1e-5, 1e-4):
         sensor = pulsed(noise)
         data = readings(sensor, r) + noise * rng.standard_normal((t.size, 2))
         rate = derivatives_of(sensor, None, Frames(data, time_s=t), 0)
-        # sd of a difference over 2 m steps is noise sqrt(2) / (2 m h), and what is stated is that
-        # of a window at most half as wide as the one that is used
-        width = noise * math.sqrt(2) / np.sqrt(rate.var2[50:250]) / (2 * (t[1] - t[0]))
+        # of five readings m steps of h apart the noise is sqrt(0.9) / (m h)
+        width = noise * math.sqrt(0.9) / np.sqrt(rate.var1[50:250]) / (t[1] - t[0])
         spread.append(float(np.median(width)))
-    assert spread[0] == pytest.approx(1.0)
-    assert spread[0] < min(spread[1:])
+    # where nothing but the bias counts it is all that is stated
+    assert spread[0] < 1.0 < 4.0 < min(spread[1:])
 
 
-def test_intervals_cover_what_windows_wide_enough_for_the_noise_bend() -> None:
-    """100 frames over 0.2-1.5 m, ten runs: 88 % of 95 % intervals hold; 64 % if noise alone counts.
+PATHS = {
+    "even": (np.linspace(0.2, 1.5, 100), np.linspace(0.0, 10.0, 100)),
+    "few": (np.linspace(0.2, 1.5, 30), np.linspace(0.0, 10.0, 30)),
+    "logarithmic": (np.geomspace(0.15, 1.2, 24), np.arange(24.0)),
+    "back": (0.6 + 0.3 * np.sin(np.linspace(0.0, 9.0, 200)), np.linspace(0.0, 10.0, 200)),
+}
 
-    Frames of a run share windows, some five of them: 200 independent ones, of which fewer than
-    78 % hold once in 1e4 runs of this test.
+
+@pytest.mark.parametrize("noise", [1e-10, 1e-8, 1e-6, 8e-5])
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("kind", [pulsed, sine])
+def test_intervals_hold_the_truth_at_any_noise(
+    kind: Callable[[float], Sensor], path: str, noise: float
+) -> None:
+    """Three runs: two standard deviations hold 88 % at least, of ranges, power law and zeta.
+
+    Of ranges at noises 1e-10 to 8e-5 they hold 88 to 100 % in runs of six; where bias outweighs
+    noise it is overstated, and all are held. Frames of a run share windows, five of them: of 72
+    frames at least, 15 independent ones, of which fewer than 60 % hold once in 300 runs at a true
+    share of 88 %. Beside frames where an object turns back nothing is ever 6 sd off but by
+    derivatives that vanish.
     """
-    r, t = np.linspace(0.2, 1.5, 100), np.linspace(0, 10, 100)
-    unknown = [{"prior": "normal", "mean": 0.0, "sd": 0.01}] * 2
-    scene = parse_scene({"object": {"c0": C0, "c1": C1, "c2": C2}, "crosstalk": unknown})
-    held, far = [], []
-    for seed in range(10):
+    r, t = PATHS[path]
+    b = -2 - r * (2 * r + C1) / (r**2 + C1 * r + C0)
+    sensor = kind(noise)
+    scene = parse_scene({"object": OBJECT, "crosstalk": UNKNOWN, "discrepancy": 0})
+    bare = parse_scene({"object": OBJECT, "discrepancy": 0})
+    held: list[Array] = []
+    for seed in range(3):
         rng = np.random.default_rng(seed)
-        sensor = pulsed(8e-5)
-        data = readings(sensor, r) + [0.001, 0.002] + 8e-5 * rng.standard_normal((t.size, 2))
-        (found,) = estimate(sensor, scene, Frames(data, time_s=t), ["differential"]).results
-        z = (found.range_m - r) / found.sd_m
-        held += (np.abs(z[np.isfinite(z)]) < 1.96).tolist()
-        far += (np.abs(z[np.isfinite(z)]) > 4.0).tolist()
-    assert len(held) > 700
-    assert np.mean(held) > 0.78
-    assert np.mean(far) < 0.04
+        data = readings(sensor, r) + noise * rng.standard_normal((t.size, 2))
+        shifted = Frames(data + np.array([0.001, 0.002]), time_s=t)
+        (found,) = estimate(sensor, scene, shifted, ["differential"]).results
+        (law,) = estimate(sensor, bare, Frames(data, time_s=t), ["differential"]).results
+        assert law.zeta is not None
+        assert law.zeta_sd is not None
+        misses = [(found.range_m - r) / found.sd_m, (law.zeta - 1 - 1 / b) / law.zeta_sd]
+        held.append(np.array([np.mean(np.abs(z[np.isfinite(z)]) < 2.0) for z in misses]))
+        assert np.isfinite(misses).mean() > 0.7
+    assert (np.mean(held, axis=0) > 0.8).all()
+
+
+def test_log_spaced_frames_at_next_to_no_noise() -> None:
+    """The range 0.150 m was once read as 0.1555 (0.1551 to 0.1558)."""
+    r, t = PATHS["logarithmic"]
+    sensor = pulsed(1e-9)
+    scene = parse_scene({"object": OBJECT, "crosstalk": UNKNOWN, "discrepancy": 0})
+    (found,) = estimate(sensor, scene, Frames(readings(sensor, r), time_s=t)).results
+    assert (np.abs(found.range_m - r) < 2 * found.sd_m).all()
+    assert (found.sd_m < 2e-3 * r)[:-1].all()
 
 
 def test_a_change_that_drowns_in_noise_tells_no_range() -> None:
@@ -140,11 +169,26 @@ def test_sd_is_that_of_the_scatter() -> None:
     ]
     result = estimate(
         sensor,
-        parse_scene({"object": OBJECT}),
+        parse_scene({"object": OBJECT, "discrepancy": 0}),
         Frames(np.ones((n, 2)), derivatives=rates),
         ["differential"],
     ).results[0]
     assert np.std(result.range_m) == pytest.approx(np.median(result.sd_m), rel=0.08)
+
+
+@pytest.mark.parametrize("speed", [1.0, -1.0])
+def test_a_small_phase_keeps_its_relative_precision(speed: float) -> None:
+    """Of a phase k r of 1e-9, at a range far below sqrt(c0), where k r doubles back to k r / 2."""
+    noise = {"read": [1e-9, 1e-9], "derivative": [1e-30, 1e-30]}
+    sensor = parse_sensor({"kind": "sine_wave", "frequency_hz": 5e6, "noise": noise})
+    assert isinstance(sensor, SineWaveSensor)
+    r = 1e-9 / sensor.wave_number
+    # d (r^-2 e^jkr) over r^-3: the light is a square law so near
+    rates = speed * np.array([[-2.0, -2e-9 + 1e-9]])
+    scene = parse_scene({"object": OBJECT | {"c1": 0.0}, "discrepancy": 0})
+    frames = Frames(np.ones((1, 2)), derivatives=rates)
+    (found,) = estimate(sensor, scene, frames, ["differential"]).results
+    assert found.roots_m[0, 0] == pytest.approx(r, rel=1e-12)
 
 
 def test_tangential_motion_gives_the_range_itself() -> None:
@@ -242,8 +286,11 @@ def test_a_changing_gain_spoils_unknown_crosstalk_only() -> None:
     np.testing.assert_allclose(result.range_m, r, rtol=5e-3)
     unknown = parse_scene({"object": OBJECT, "crosstalk": UNKNOWN})
     result = estimate(sensor, unknown, frames).results[0]
+    # frames of one gain after the other, with ends of their own
+    np.testing.assert_allclose(result.range_m, r, rtol=5e-3)
+    gain[50] = 3.0
+    frames = Frames(gain[:, None] * readings(sensor, r) + np.array([0.5, 0.7]), t, gain=gain)
+    result = estimate(sensor, unknown, frames).results[0]
     spoiled = np.flatnonzero(result.status == Status.NONE)
-    assert spoiled.tolist() == [49, 50]
-    assert "gain changes" in result.reasons[result.reason[49]]
-    seen = result.status == Status.UNIQUE
-    np.testing.assert_allclose(result.range_m[seen], r[seen], rtol=5e-3)
+    assert spoiled.tolist() == [50]
+    assert "gain changes" in result.reasons[result.reason[50]]

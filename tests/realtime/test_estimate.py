@@ -17,6 +17,7 @@ from inference.realtime.techniques.conventional import conventional_range
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.errors import InvalidInputError
 from simulator.frames import Frames
+from simulator.model_error import RANGE_ERROR_SD
 from simulator.scene import parse_scene
 from simulator.sensor import Sensor, parse_sensor
 
@@ -133,6 +134,14 @@ def test_an_impossible_scene_is_named() -> None:
         all_roots("background_cancelling", PULSED, parse_scene({}), frame(0.1, 2.0))
 
 
+def test_an_own_shadow_is_said_to_be_an_assumption() -> None:
+    scene = {"object": OBJECT, "background": FAR}
+    for shadow, said in (("object", True), ({"c0": 0.05, "c1": 0.0}, False), ({}, False)):
+        document = scene | {"background": FAR | {"shadow": shadow}}
+        found = estimate(PULSED, parse_scene(document), frame(0.1, 2.0))
+        assert any("own" in text for text in found.assumptions) == said
+
+
 def test_known_crosstalk_and_gain_are_taken_off_first() -> None:
     scene = parse_scene({"object": OBJECT, "crosstalk": [0.5, -0.25]})
     for technique in ("conventional", "intensity"):
@@ -152,7 +161,11 @@ def test_statuses_of_a_pulse() -> None:
     ).results[0]
     assert result.status.tolist() == [0, 2, 2, 2, 2, 3, 2]
     assert result.range_m[0] == pytest.approx(r0 / 2)
-    assert result.sd_m[0] == pytest.approx(r0 * 1e-6 * math.sqrt(1.25))
+    assert result.sd_parts_m is not None
+    noise, model = r0 * 1e-6 * math.sqrt(1.25), RANGE_ERROR_SD
+    parts = [float(part[0, 0]) for part in result.sd_parts_m]
+    assert parts == pytest.approx([noise, 0.0, model])
+    assert result.sd_m[0] == pytest.approx(math.hypot(noise, model))
     words = ["", "w2 is not", "w2 is not", "contact", "beyond r0", "full scale", "no object"]
     for i, word in enumerate(words):
         assert word in reason_of(result, i)
@@ -198,8 +211,8 @@ def test_sd_of_single_frames_is_that_of_the_scatter(kind: str) -> None:
     """20000 frames: the scatter's sd is known to 0.5 %, tested at 5 sigma (false alarm 6e-7)."""
     noise = {"read": [1e-6, 2e-6], "shot": 1e-9, "relative": 1e-5}
     sensor = sensor_of(kind, noise=noise)
-    scene = parse_scene({"object": OBJECT, "background": FAR})
-    bare = parse_scene({"object": OBJECT})
+    scene = parse_scene({"object": OBJECT, "background": FAR, "discrepancy": 0})
+    bare = parse_scene({"object": OBJECT, "discrepancy": 0})
     r = 0.9
     rng = np.random.default_rng(3)
     names = ["conventional", "intensity", "intensity_w1"]

@@ -7,17 +7,20 @@ import signal
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from inference.posterior.progress import Phase, Progress
 from inference.posterior.settings import SamplerSettings
 from simulator.errors import RefusedError
-from simulator.frames import Frames
-from simulator.scene import Scene
-from simulator.sensor import Sensor
-from tests.service import drawn
 
+if TYPE_CHECKING:  # a worker imports this, and is to be there soon
+    from simulator.frames import Frames
+    from simulator.scene import Scene
+    from simulator.sensor import Sensor
+
+FORMAT = "sums"
 CHUNKS = 6
 STEPS = 10
 
@@ -26,8 +29,9 @@ STEPS = 10
 class Job:
     settings: SamplerSettings
     # directives of a test: {"sleep": seconds a piece, "hold": path of a mark without which no chunk
-    # but the first is computed, "die": path of a mark, "fail": message, "outlive": path of a mark
-    # that a piece leaves if it is still computed when its parent has been gone for long}
+    # but the first is computed, "die": path of a mark, "signal": which, "fail": message,
+    # "outlive": path of a mark that a piece leaves if it is still computed when its parent has been
+    # gone for long}
     orders: dict[str, Any]
 
     def to_bytes(self) -> bytes:
@@ -52,10 +56,20 @@ class Checkpoint:
         np.savez(out, chunk=self.chunk, sums=np.asarray(self.sums))
         return out.getvalue()
 
+    def addition(self, _: "Checkpoint") -> bytes | None:
+        """What comes behind an earlier one: a piece a chunk, written anew after every third."""
+        return None if self.chunk % 3 == 0 else self.to_bytes()
+
     @staticmethod
-    def from_bytes(raw: bytes) -> "Checkpoint":
-        with np.load(io.BytesIO(raw)) as stored:
-            return Checkpoint(int(stored["chunk"]), tuple(stored["sums"].tolist()))
+    def from_bytes(*pieces: bytes) -> "Checkpoint":
+        read = []
+        for raw in pieces:
+            with np.load(io.BytesIO(raw)) as stored:
+                read.append(Checkpoint(int(stored["chunk"]), tuple(stored["sums"].tolist())))
+        # no piece is lost, doubled or out of order
+        assert [at.chunk for at in read] == list(range(read[0].chunk, read[-1].chunk + 1))
+        assert read[0].chunk % 3 == 0
+        return read[-1]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,15 +79,6 @@ class Task:
     ensemble: int
     sum: float
     orders: dict[str, Any]
-
-
-@dataclasses.dataclass(frozen=True)
-class Progress:
-    steps: int
-    target: int
-    ess: float | None
-    rhat: float | None
-    finished: bool
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,11 +98,14 @@ def order(**orders: Any) -> None:
     _ORDERS.update(orders)
 
 
-def prepare(_: Sensor, scene: Scene, __: Frames, settings: SamplerSettings) -> Job:
-    if scene.discrepancy is not None:
+def prepare(_: "Sensor", scene: "Scene", __: "Frames", settings: SamplerSettings) -> Job:
+    if scene.stated_flux_error is not None:
         raise RefusedError("a discrepancy is not known here; leave it out")
     seed = 1 if settings.seed is None else settings.seed
-    return Job(settings.model_copy(update={"seed": seed}), dict(_ORDERS))
+    from inference.posterior.answer.posterior import RANGE_COLUMNS
+
+    orders = _ORDERS | {"columns": tuple(RANGE_COLUMNS)}
+    return Job(settings.model_copy(update={"seed": seed}), orders)
 
 
 def start(job: Job) -> Checkpoint:
@@ -128,7 +136,7 @@ def run(task: Task) -> float:
         deaths = len(mark.read_text()) if mark.exists() else 0
         if deaths < task.orders["deaths"]:
             mark.write_text("x" * (deaths + 1))
-            os.kill(os.getpid(), signal.SIGKILL)
+            os.kill(os.getpid(), task.orders.get("signal", signal.SIGKILL))
     rng = np.random.default_rng([task.seed, task.chunk, task.ensemble])
     return task.sum + float(rng.standard_normal())
 
@@ -152,7 +160,8 @@ def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[float]) -> Checkpoi
 def progress(_: Job, checkpoint: Checkpoint) -> Progress:
     done = checkpoint.chunk
     rhat = 1.0 + 1.0 / done if done else None
-    return Progress(done * STEPS, CHUNKS * STEPS, 10.0 * done, rhat, done == CHUNKS)
+    phase: Phase = "summarising" if done == CHUNKS else "sampling"
+    return Progress(phase, done * STEPS, CHUNKS * STEPS, 10.0 * done, rhat, done == CHUNKS)
 
 
 def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> Posterior:
@@ -170,15 +179,14 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
         {
             "method": job.settings.method,
             "seed": job.settings.seed,
+            "drawn": True,
             "verdict": {
                 "converged": finished,
                 "reasons": [] if finished else [reason],
             },
             "parameters": {"object.c0": summary},
             "modes": [],
-            "range_m": {
-                key: [] for key in ("q05", "q50", "q95", "mean", "sd", "near_fold", "modes")
-            },
+            "range_m": {key: [] for key in (*job.orders["columns"], "near_fold", "modes")},
             "identifiability": [],
             "fit": {
                 "p_value": 0.5,
@@ -196,4 +204,6 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
 
 
 def draw(_: Job, checkpoint: Checkpoint) -> tuple[Any, Any]:
+    from tests.service import drawn
+
     return drawn.job(), drawn.draws(checkpoint.chunk)

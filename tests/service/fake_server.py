@@ -1,6 +1,7 @@
 """A server whose posteriors are `fake_fold`; arguments: its orders as JSON, largest body."""
 
 import json
+import os
 import sys
 
 import uvicorn
@@ -12,5 +13,7 @@ from tests.service import fake_fold
 # guarded: the workers import their parent's main module
 if __name__ == "__main__":
     fake_fold.order(**json.loads(sys.argv[1]))
-    app = create_app(ServiceSettings(workers=2, max_body_bytes=int(sys.argv[2])), fake_fold)
+    environment = ServiceSettings.from_environment(os.environ)
+    settings = environment.model_copy(update={"workers": 2, "max_body_bytes": int(sys.argv[2])})
+    app = create_app(settings, fake_fold)
     uvicorn.run(app, port=0, timeout_graceful_shutdown=2)

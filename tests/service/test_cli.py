@@ -197,3 +197,14 @@ def test_settings_of_serve(
     code, _, err = run(capsys, "serve")
     assert code == 2
     assert "/HYBRIDTOF_WORKERS: " in err
+
+
+@pytest.mark.parametrize("url", ["mysql://host/name", "sqlite:////proc/none/jobs.sqlite"])
+def test_a_service_without_a_store_does_not_start(
+    url: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("HYBRIDTOF_DATABASE", url)
+    assert main(["serve", "--port", "0"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("hybridtof: error: /HYBRIDTOF_DATABASE: ")
+    assert err.count("\n") == 1

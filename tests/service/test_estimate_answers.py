@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inference.estimates import Estimates, LeftOut, Status, TechniqueResult
+from inference.estimates import Estimates, LeftOut, SdParts, Status, TechniqueResult
 from service.answers.estimates import encode_estimates
 
 REASONS = ("", 'a "quoted" {brace} reason', "beyond the background: é")
@@ -31,12 +31,14 @@ def slow(result: TechniqueResult) -> list[dict[str, Any]]:
             "roots_sd_m": [number(x) for x in result.roots_sd_m[n, :count]],
             "near_fold": bool(result.near_fold[n]),
         }
+        if frame["sd_m"] is not None and result.sd_parts_m is not None:
+            parts = zip(SdParts._fields, result.sd_parts_m, strict=True)
+            frame["sd_parts_m"] = {name: number(part[n, 0]) for name, part in parts}
         if result.reason[n]:
             frame["reason"] = result.reasons[result.reason[n]]
-        if result.power_law is not None:
-            frame["power_law"] = number(result.power_law[n])
-        if result.zeta is not None:
-            frame["zeta"] = number(result.zeta[n])
+        for name in ("power_law", "power_law_sd", "zeta", "zeta_sd"):
+            if getattr(result, name) is not None:
+                frame[name] = number(getattr(result, name)[n])
         if result.range_bounds_m is not None:
             low, high = (number(x) for x in result.range_bounds_m[n])
             frame["range_bounds_m"] = None if low is None else [low, high]
@@ -58,6 +60,7 @@ def results(draw: st.DrawFn) -> TechniqueResult:
     bounds = 10.0 ** rng.uniform(-3, 3, (n, 2))
     bounds[rng.random(n) < 0.4] = np.nan
     sees_motion = draw(st.booleans())
+    parts = SdParts(0.8 * sds, np.broadcast_to(0.0, sds.shape), 0.6 * sds)
     return TechniqueResult(
         technique="conventional",
         status=status,
@@ -69,7 +72,10 @@ def results(draw: st.DrawFn) -> TechniqueResult:
         reasons=REASONS,
         range_bounds_m=bounds if draw(st.booleans()) else None,
         power_law=np.where(rng.random(n) < 0.5, np.nan, -2.0) if sees_motion else None,
+        power_law_sd=rng.random(n) if sees_motion else None,
         zeta=rng.random(n) if sees_motion else None,
+        zeta_sd=np.full(n, np.nan) if sees_motion else None,
+        sd_parts_m=parts if draw(st.booleans()) else None,
         runtime_s=1e-5,
     )
 
@@ -88,7 +94,7 @@ def test_same_as_one_dictionary_a_frame(result: TechniqueResult) -> None:
 
 def test_no_result() -> None:
     body = json.loads(encode_estimates(Estimates(None, (), ())))
-    assert body == {"chosen": None, "results": [], "left_out": []}
+    assert body == {"chosen": None, "results": [], "left_out": [], "assumptions": []}
 
 
 def test_parameters_hold_no_nan() -> None:

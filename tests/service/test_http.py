@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -323,6 +324,35 @@ async def test_cancel(
     assert response.status_code == 202
     (tmp_path / "mark").touch()
     assert (await ended(client, location))["status"] == "cancelled"
+
+
+def read_events(text: str) -> list[tuple[int, Any]]:
+    """Ids and data of server-sent events."""
+    found = re.findall(r"^data: (.*)\nid: (\d+)$", text, re.MULTILINE)
+    return [(int(number), json.loads(data)) for data, number in found]
+
+
+async def test_events(client: httpx.AsyncClient, request_body: dict[str, Any]) -> None:
+    location = (await client.post("/v1/posteriors", json=request_body)).headers["location"]
+    response = await client.get(location + "/events")  # it ends with the posterior
+    assert response.headers["content-type"].startswith("text/event-stream")
+    told = read_events(response.text)
+    assert told
+    numbers = [number for number, _ in told]
+    assert numbers == sorted(set(numbers))
+    last = (await client.get(location)).json()
+    assert told[-1][1] == {name: last[name] for name in told[-1][1]}
+    assert (last["status"], last["progress"]["phase"]) == ("done", "summarising")
+    for _, data in told[:-1]:
+        assert data["progress"]["eta_s"] != 0.0  # it had not ended
+    # behind the last but one there is one more; behind the last, nothing to wait for
+    seen = {"Last-Event-ID": str(numbers[-1] - 1)}
+    again = await client.get(location + "/events", headers=seen)
+    assert read_events(again.text) == told[-1:]
+    seen = {"Last-Event-ID": str(numbers[-1])}
+    ended = await client.get(location + "/events", headers=seen)
+    assert (ended.status_code, ended.content) == (204, b"")
+    assert_problem(await client.get("/v1/posteriors/none/events"), 404)
 
 
 async def test_draws(

@@ -3,18 +3,19 @@
 import asyncio
 import os
 import signal
+import sqlite3
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from inference.posterior.settings import SamplerSettings
-from service.errors import BusyError, IdempotencyError, NotFoundError
-from service.job_store import JobRecord, MemoryJobStore
+from service.errors import BusyError, IdempotencyError, NotFoundError, StoreError
 from service.jobs import Jobs
 from service.process_pool import ProcessPool
+from service.store.record import QUEUED, JobRecord
+from service.store.sql_store import Retention, SqlJobStore
 from simulator.frames import Frames, frames_from_columns
 from simulator.scene import Scene
 from simulator.sensor import Sensor, parse_sensor
@@ -33,10 +34,10 @@ def system() -> tuple[Sensor, Scene, Frames]:
 
 @asynccontextmanager
 async def running(
-    store: MemoryJobStore | None = None, workers: int = 2, running: int = 2
+    store: SqlJobStore, workers: int = 2, running: int = 2
 ) -> AsyncIterator[tuple[FakeJobs, ProcessPool]]:
-    pool = ProcessPool(workers)
-    jobs = Jobs(fake_fold, store or MemoryJobStore(100), pool, running)
+    pool = ProcessPool(workers, stall_s=1.0)
+    jobs = Jobs(fake_fold, store, pool, running, look_s=0.05)
     await jobs.start()
     try:
         yield jobs, pool
@@ -44,8 +45,14 @@ async def running(
         await jobs.close()
 
 
+@pytest.fixture
+def store(tmp_path: Path) -> SqlJobStore:
+    return SqlJobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(100))
+
+
 async def ended(jobs: FakeJobs, job_id: str) -> JobRecord:
-    assert await jobs.wait(job_id)
+    async for _ in jobs.follow(job_id):
+        pass
     return await jobs.get(job_id)
 
 
@@ -54,48 +61,55 @@ def mean_of(record: JobRecord) -> float:
     return float(record.result["parameters"]["object.c0"]["mean"])
 
 
-async def undisturbed() -> float:
-    fake_fold.order()
-    async with running() as (jobs, _):
-        record = await jobs.submit(*system(), SETTINGS)
-        return mean_of(await ended(jobs, record.id))
+def undisturbed() -> float:
+    """The first sum of a job that nobody disturbs."""
+    job = fake_fold.Job(SETTINGS, {})
+    checkpoint = fake_fold.start(job)
+    while tasks := fake_fold.tasks(job, checkpoint, 0.0):
+        checkpoint = fake_fold.merge(job, checkpoint, [fake_fold.run(task) for task in tasks])
+    return checkpoint.sums[0]
 
 
 async def until(jobs: FakeJobs, job_id: str, steps: int) -> None:
-    while True:
-        progress = (await jobs.get(job_id)).progress
-        if progress is not None and progress["steps"] >= steps:
+    async for record in jobs.follow(job_id):
+        if record.progress["steps"] >= steps:
             return
-        await asyncio.sleep(0.005)
 
 
-async def test_done() -> None:
+async def test_done(store: SqlJobStore) -> None:
     fake_fold.order()
-    async with running() as (jobs, _):
+    async with running(store) as (jobs, _):
         record = await jobs.submit(*system(), SETTINGS)
         assert record.status == "queued"
         record = await ended(jobs, record.id)
     assert (record.status, record.problem, record.seed) == ("done", None, 5)
-    assert record.progress == {"steps": 60, "target": 60, "ess": 60.0, "rhat": 7 / 6, "eta_s": 0.0}
+    assert record.progress == {
+        "phase": "summarising",
+        "steps": 60,
+        "target": 60,
+        "ess": 60.0,
+        "rhat": 7 / 6,
+        "eta_s": 0.0,
+    }
     assert record.wall_s > 0
     assert record.result is not None
     assert record.result["verdict"] == {"converged": True, "reasons": []}
 
 
-async def test_death_changes_nothing(tmp_path: Path) -> None:
-    expected = await undisturbed()
+async def test_death_changes_nothing(tmp_path: Path, store: SqlJobStore) -> None:
+    expected = undisturbed()
     fake_fold.order(die=str(tmp_path / "mark"), deaths=1)
-    async with running() as (jobs, _):
+    async with running(store) as (jobs, _):
         record = await ended(jobs, (await jobs.submit(*system(), SETTINGS)).id)
     assert (tmp_path / "mark").read_text() == "x"
     assert record.status == "done"
     assert mean_of(record) == expected
 
 
-async def test_killed_from_outside_changes_nothing(tmp_path: Path) -> None:
-    expected = await undisturbed()
+async def test_killed_from_outside_changes_nothing(tmp_path: Path, store: SqlJobStore) -> None:
+    expected = undisturbed()
     fake_fold.order(hold=str(tmp_path / "mark"))
-    async with running() as (jobs, pool):
+    async with running(store) as (jobs, pool):
         job_id = (await jobs.submit(*system(), SETTINGS)).id
         await until(jobs, job_id, 10)
         for pid in pool.pids:
@@ -104,9 +118,9 @@ async def test_killed_from_outside_changes_nothing(tmp_path: Path) -> None:
         assert mean_of(await ended(jobs, job_id)) == expected
 
 
-async def test_chunk_that_always_kills_fails_alone(tmp_path: Path) -> None:
-    fake_fold.order(die=str(tmp_path / "mark"), deaths=100)
-    async with running() as (jobs, _):
+async def test_chunk_that_always_kills_fails_alone(tmp_path: Path, store: SqlJobStore) -> None:
+    fake_fold.order(die=str(tmp_path / "mark"), deaths=100, signal=int(signal.SIGSEGV))
+    async with running(store) as (jobs, _):
         bad = await jobs.submit(*system(), SETTINGS)
         fake_fold.order()
         good = await jobs.submit(*system(), SETTINGS)
@@ -114,22 +128,27 @@ async def test_chunk_that_always_kills_fails_alone(tmp_path: Path) -> None:
         record = await ended(jobs, bad.id)
     assert record.status == "failed"
     assert record.problem is not None
-    assert record.problem["status"] == 500
+    assert record.problem["type"].endswith("worker-died")
+    # what was drawn before is not lost
+    assert record.result is not None
+    assert record.result["verdict"]["converged"] is False
+    assert (tmp_path / "mark").read_text() == "xxx"
 
 
-async def test_failure_is_told(caplog: pytest.LogCaptureFixture) -> None:
+async def test_failure_is_told(caplog: pytest.LogCaptureFixture, store: SqlJobStore) -> None:
     fake_fold.order(fail="no luck")
-    async with running() as (jobs, _):
+    async with running(store) as (jobs, _):
         record = await ended(jobs, (await jobs.submit(*system(), SETTINGS)).id)
     assert record.status == "failed"
     assert record.problem is not None
     assert record.problem["type"].endswith("internal")
+    assert record.result is None
     assert "no luck" in caplog.text
 
 
-async def test_cancel_keeps_what_there_is(tmp_path: Path) -> None:
+async def test_cancel_keeps_what_there_is(tmp_path: Path, store: SqlJobStore) -> None:
     fake_fold.order(hold=str(tmp_path / "mark"))
-    async with running() as (jobs, _):
+    async with running(store) as (jobs, _):
         job_id = (await jobs.submit(*system(), SETTINGS)).id
         await until(jobs, job_id, 10)
         await jobs.cancel(job_id)
@@ -143,21 +162,21 @@ async def test_cancel_keeps_what_there_is(tmp_path: Path) -> None:
         assert await jobs.cancel(job_id) == record
 
 
-async def test_cancel_while_waiting_is_at_once(tmp_path: Path) -> None:
+async def test_cancel_while_waiting_is_at_once(tmp_path: Path, store: SqlJobStore) -> None:
     fake_fold.order(hold=str(tmp_path / "mark"))
-    async with running(running=1) as (jobs, _):
+    async with running(store, running=1) as (jobs, _):
         first = await jobs.submit(*system(), SETTINGS)
         second = await jobs.submit(*system(), SETTINGS)
         assert (await jobs.cancel(second.id)).status == "cancelled"
         (tmp_path / "mark").touch()
         assert (await ended(jobs, first.id)).status == "done"
         record = await jobs.get(second.id)
-    assert (record.status, record.result, record.progress) == ("cancelled", None, None)
+    assert (record.status, record.result, record.progress) == ("cancelled", None, QUEUED)
 
 
-async def test_time_limit() -> None:
+async def test_time_limit(store: SqlJobStore) -> None:
     fake_fold.order(sleep=0.1)
-    async with running() as (jobs, _):
+    async with running(store) as (jobs, _):
         limited = SETTINGS.model_copy(update={"max_seconds": 0.15})
         record = await ended(jobs, (await jobs.submit(*system(), limited)).id)
     assert record.status == "done"
@@ -167,9 +186,9 @@ async def test_time_limit() -> None:
     assert verdict["reasons"] == ["out of time"]
 
 
-async def test_deleted_while_running(tmp_path: Path) -> None:
+async def test_deleted_while_running(tmp_path: Path, store: SqlJobStore) -> None:
     fake_fold.order(hold=str(tmp_path / "mark"))
-    async with running() as (jobs, _):
+    async with running(store) as (jobs, _):
         job_id = (await jobs.submit(*system(), SETTINGS)).id
         await until(jobs, job_id, 10)
         await jobs.delete(job_id)
@@ -181,10 +200,9 @@ async def test_deleted_while_running(tmp_path: Path) -> None:
             await jobs.cancel(job_id)
 
 
-async def test_end_is_quick_and_another_process_takes_up(tmp_path: Path) -> None:
+async def test_end_is_quick_and_another_takes_up(tmp_path: Path, store: SqlJobStore) -> None:
     """What one instance leaves behind, another finishes to the same last bit."""
-    expected = await undisturbed()
-    store = MemoryJobStore(100)
+    expected = undisturbed()
     fake_fold.order(hold=str(tmp_path / "mark"))
     async with running(store, running=1) as (jobs, pool):
         first = await jobs.submit(*system(), SETTINGS)
@@ -192,10 +210,10 @@ async def test_end_is_quick_and_another_process_takes_up(tmp_path: Path) -> None
         await until(jobs, first.id, 10)
     assert not pool.pids
     (tmp_path / "mark").touch()
-    left = store.get(first.id)
+    left = store.drawn(first.id)
     assert left is not None
-    assert left.status == "running"
-    assert left.checkpoint is not None
+    assert left.record.status == "running"
+    assert left.pieces
     async with running(store) as (jobs, _):
         for job_id in (first.id, second.id):
             record = await ended(jobs, job_id)
@@ -203,9 +221,9 @@ async def test_end_is_quick_and_another_process_takes_up(tmp_path: Path) -> None
             assert mean_of(record) == expected
 
 
-async def test_idempotency() -> None:
+async def test_idempotency(store: SqlJobStore) -> None:
     fake_fold.order()
-    async with running() as (jobs, _):
+    async with running(store) as (jobs, _):
         one = await jobs.submit(*system(), SETTINGS, key="k", digest="d")
         two = await jobs.submit(*system(), SETTINGS, key="k", digest="d")
         assert one.id == two.id
@@ -218,7 +236,8 @@ async def test_idempotency() -> None:
 
 async def test_no_room(tmp_path: Path) -> None:
     fake_fold.order(hold=str(tmp_path / "mark"))
-    async with running(MemoryJobStore(2)) as (jobs, _):
+    small = SqlJobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(2))
+    async with running(small) as (jobs, _):
         first = await jobs.submit(*system(), SETTINGS)
         await jobs.submit(*system(), SETTINGS)
         with pytest.raises(BusyError):
@@ -232,17 +251,82 @@ async def test_no_room(tmp_path: Path) -> None:
         await jobs.submit(*system(), SETTINGS)
 
 
-def test_pages_are_stable() -> None:
-    store = MemoryJobStore(10)
+async def test_stopped_worker_is_replaced(tmp_path: Path, store: SqlJobStore) -> None:
+    """It takes no processor time: another process computes its chunk."""
+    expected = undisturbed()
+    fake_fold.order(hold=str(tmp_path / "mark"))
+    async with running(store) as (jobs, pool):
+        job_id = (await jobs.submit(*system(), SETTINGS)).id
+        await until(jobs, job_id, 10)
+        for pid in pool.pids:
+            os.kill(pid, signal.SIGSTOP)
+        (tmp_path / "mark").touch()
+        assert mean_of(await ended(jobs, job_id)) == expected
 
-    def add(name: str) -> JobRecord:
-        fields: dict[str, Any] = {"job": b"", "method": "emcee", "seed": 1}
-        return store.add(JobRecord(id=name, key=None, digest="", **fields))
 
-    for name in "abcde":
-        add(name)
-    first = store.page(None, 2)
-    add("f")
-    store.delete("d")
-    second = store.page(first[-1].sequence, 2)
-    assert [r.id for r in first + second] == ["e", "d", "c", "b"]
+async def test_cancel_while_a_worker_is_stopped(tmp_path: Path, store: SqlJobStore) -> None:
+    fake_fold.order(hold=str(tmp_path / "mark"))
+    async with running(store) as (jobs, pool):
+        job_id = (await jobs.submit(*system(), SETTINGS)).id
+        await until(jobs, job_id, 10)
+        for pid in pool.pids:
+            os.kill(pid, signal.SIGSTOP)
+        record = await jobs.cancel(job_id)
+        assert record.cancel_requested
+        record = await ended(jobs, job_id)  # although no chunk ever ends
+    assert record.status == "cancelled"
+    assert record.result is not None
+
+
+async def test_two_processes_share_a_store(tmp_path: Path, store: SqlJobStore) -> None:
+    """Jobs are shared out; each sees what the other has done, and what it has cancelled."""
+    expected = undisturbed()
+    fake_fold.order(hold=str(tmp_path / "mark"))
+    other = SqlJobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(100))
+    async with running(store, 1, 1) as (here, _), running(other, 1, 1) as (there, _):
+        ids = [(await here.submit(*system(), SETTINGS)).id for _ in range(3)]
+        for job_id in ids[:2]:  # both run although each process runs one at a time
+            await until(there, job_id, 10)
+        await there.cancel(ids[0])
+        assert (await ended(here, ids[0])).status == "cancelled"
+        (tmp_path / "mark").touch()
+        for job_id in ids[1:]:
+            assert mean_of(await ended(there, job_id)) == expected
+
+
+async def test_of_another_version_is_computed_anew(tmp_path: Path, store: SqlJobStore) -> None:
+    expected = undisturbed()
+    fake_fold.order(hold=str(tmp_path / "mark"))
+    async with running(store) as (jobs, _):
+        job_id = (await jobs.submit(*system(), SETTINGS)).id
+        await until(jobs, job_id, 10)
+    with sqlite3.connect(tmp_path / "jobs.sqlite") as file:
+        file.execute("UPDATE job SET format = 'older'")
+        file.execute("UPDATE checkpoint SET bytes = x'00'")
+    file.close()
+    (tmp_path / "mark").touch()
+    async with running(store) as (jobs, _):
+        assert mean_of(await ended(jobs, job_id)) == expected
+
+
+async def test_store_that_is_locked_for_a_while(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Nothing is accepted that would not be kept, and what was accepted goes on afterwards."""
+    expected = undisturbed()
+    fake_fold.order(hold=str(tmp_path / "mark"))
+    store = SqlJobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(100), busy_s=0.01)
+    async with running(store) as (jobs, _):
+        job_id = (await jobs.submit(*system(), SETTINGS)).id
+        await until(jobs, job_id, 10)
+        with sqlite3.connect(tmp_path / "jobs.sqlite", isolation_level=None) as file:
+            file.execute("BEGIN IMMEDIATE")
+            with pytest.raises(StoreError, match="cannot be written now: database is locked"):
+                await jobs.submit(*system(), SETTINGS)
+            (tmp_path / "mark").touch()
+            while "waits: " not in caplog.text:
+                await asyncio.sleep(0.01)
+            file.execute("ROLLBACK")
+        file.close()
+        assert mean_of(await ended(jobs, job_id)) == expected
+        assert len(await jobs.page(None, 10)) == 1

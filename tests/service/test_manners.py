@@ -263,12 +263,13 @@ def test_estimates_as_csv(capsys: pytest.CaptureFixture[str], tmp_path: Path, sc
     said = Said(capsys, "estimate", frames, "--scene", scene, *techniques, "--output", out)
     assert (said.code, said.out) == (0, "")
     header, *rows = out.read_text().splitlines()
-    assert header == "technique,frame,status,range_m,sd_m,roots_m,roots_sd_m,near_fold,reason"
+    named = "technique,frame,status,range_m,sd_m,roots_m,roots_sd_m,near_fold"
+    assert header == f"{named},sd_noise_m,sd_scene_m,sd_model_m,reason"
     results = json.loads(shown.out)["results"]
     for row, (result, index) in zip(
         rows, [(result, index) for result in results for index in range(3)], strict=True
     ):
-        cells = row.split(",", 8)
+        cells = row.split(",", 11)
         frame = result["frames"][index]
         assert cells[:3] == [result["technique"], str(index), frame["status"]]
         assert cells[3] == ("" if frame["range_m"] is None else repr(frame["range_m"]))
@@ -416,8 +417,8 @@ def test_track_is_the_tracker(
         ].tolist()
         assert line["latency_s"] > 0
         assert line.keys() == {
-            "sequence", "time_s", "status", "range_m", "sd_m", "hypotheses", "present", "outlier",
-            "rate_m_s", "misfit", "latency_s",
+            "sequence", "time_s", "status", "range_m", "sd_m", "sd_parts_m", "hypotheses",
+            "present", "outlier", "rate_m_s", "misfit", "latency_s",
         }  # fmt: skip
     assert found[-1]["status"] == "unique"
     # as NDJSON and as columns the same

@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from service import process_pool
 from service.errors import WorkerDiedError
 from service.process_pool import ProcessPool
+from service.process_watch import ended_by_itself
 from service.worker import THREAD_VARIABLES
 from simulator.errors import InvalidInputError
 
@@ -24,13 +26,18 @@ def _environment() -> dict[str, str | None]:
     return {name: os.environ.get(name) for name in THREAD_VARIABLES}
 
 
-def _die(path: str, times: int) -> int:
+def _die(path: str, times: int, by: int) -> int:
     mark = Path(path)
     deaths = len(mark.read_text()) if mark.exists() else 0
     if deaths < times:
         mark.write_text("x" * (deaths + 1))
-        os.kill(os.getpid(), signal.SIGKILL)
+        os.kill(os.getpid(), by)
     return deaths
+
+
+def _spin() -> None:
+    while True:
+        pass
 
 
 def _refuse() -> None:
@@ -52,15 +59,56 @@ def test_runs_on_other_processes_of_one_thread() -> None:
 def test_death_costs_one_task_its_time(tmp_path: Path) -> None:
     with ProcessPool(2) as pool:
         others = [pool.submit(_pid, i) for i in range(4)]
-        assert pool.submit(_die, str(tmp_path / "mark"), 2).result() == 2
+        assert pool.submit(_die, str(tmp_path / "mark"), 2, signal.SIGSEGV).result() == 2
         assert all(other.result() for other in others)
+
+
+def test_signals_from_outside_are_not_the_task_s_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert process_pool._DEATHS >= 20
+    monkeypatch.setattr(process_pool, "_LONGEST_PAUSE_S", 0.0)
+    with ProcessPool(1) as pool:
+        assert pool.submit(_die, str(tmp_path / "mark"), 5, signal.SIGKILL).result() == 5
+
+
+@pytest.mark.parametrize(("code", "own"), [(0, 1), (3, 1), (-11, 1), (-6, 1), (-9, 0), (-15, 0)])
+def test_whose_fault_an_end_is(code: int, own: int) -> None:
+    assert ended_by_itself(code) == bool(own)
 
 
 def test_task_that_always_kills_is_given_up() -> None:
     with ProcessPool(1) as pool:
-        with pytest.raises(WorkerDiedError):
+        with pytest.raises(WorkerDiedError, match="ended 3 processes, last: exit code 3"):
             pool.submit(_exit).result()
         assert pool.submit(_pid, 0).result()
+
+
+def test_task_that_takes_more_than_its_limit_is_given_up() -> None:
+    with ProcessPool(1) as pool:
+        with pytest.raises(WorkerDiedError, match="processor time"):
+            pool.submit_within(0.1, _spin).result()
+        assert pool.submit(_pid, 0).result()
+
+
+def test_stopped_process_is_replaced() -> None:
+    with ProcessPool(1, stall_s=1.0) as pool:
+        stopped = pool.submit(_pid, 0).result()
+        os.kill(stopped, signal.SIGSTOP)
+        assert pool.submit(_pid, 0).result() != stopped
+
+
+def test_abandoned_task_makes_room_at_once() -> None:
+    with ProcessPool(1) as pool:
+        running, waiting = pool.submit(time.sleep, 3600), pool.submit(time.sleep, 3600)
+        while not running.running() or not pool.pids:
+            time.sleep(0.01)
+        pool.abandon(waiting)
+        pool.abandon(running)
+        assert pool.submit(_pid, 0).result()
+        assert waiting.cancelled()
+        with pytest.raises(WorkerDiedError, match="given up"):
+            running.result()
 
 
 def test_exceptions_come_back() -> None:

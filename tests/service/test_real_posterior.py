@@ -4,6 +4,7 @@ import asyncio
 import io
 import os
 import signal
+from pathlib import Path
 from typing import Any
 
 import h5netcdf
@@ -15,11 +16,11 @@ from inference.posterior.settings import SamplerSettings
 from service.answers.posteriors import PosteriorResponse
 from service.answers.simulations import simulation_of
 from service.app import create_app
-from service.job_store import MemoryJobStore
 from service.jobs import Jobs
 from service.process_pool import ProcessPool
 from service.requests import PosteriorRequest, SimulationRequest
 from service.service_settings import ServiceSettings
+from service.store.sql_store import Retention, SqlJobStore
 from simulator.frames import frames_from_columns
 from simulator.validated import parse
 from tests.service.conftest import SENSOR
@@ -86,32 +87,31 @@ async def test_refusal_over_http() -> None:
     assert response.json()["type"] == "urn:hybridtof:problem:refused"
 
 
-async def posterior(kill_workers: bool) -> dict[str, Any]:
+async def posterior(path: Path, kill_workers: bool) -> dict[str, Any]:
     request = parse(PosteriorRequest, request_body())
     frames = frames_from_columns(request.sensor, request.frames)
     settings = SamplerSettings(seed=2, target_ess=10_000, max_seconds=86_400)
     pool = ProcessPool(2)
-    jobs = Jobs(fold, MemoryJobStore(1), pool, running=1)
+    store = SqlJobStore(f"sqlite:///{path}/{kill_workers}.sqlite", Retention(1))
+    jobs = Jobs(fold, store, pool, running=1)
     await jobs.start()
     try:
         record = await jobs.submit(request.sensor, request.scene, frames, settings)
-        killed = 0
-        while not await jobs.wait(record.id, timeout_s=0.05):
-            progress = (await jobs.get(record.id)).progress
-            if kill_workers and killed < 2 and progress is not None and progress["steps"] > 0:
-                dead = pool.pids[killed]
-                os.kill(dead, signal.SIGKILL)
+        killed, phases = 0, set()
+        async for now in jobs.follow(record.id):
+            record = now
+            phases.add(now.progress["phase"])
+            if kill_workers and killed < 2 and now.progress["steps"] > 0:
+                os.kill(pool.pids[0], signal.SIGKILL)
                 killed += 1
-                while dead in pool.pids and not await jobs.wait(record.id, timeout_s=0.01):
-                    pass
         assert killed == (2 if kill_workers else 0)
-        result = (await jobs.get(record.id)).result
     finally:
         await jobs.close()
-    assert result is not None
-    del result["runtime"]
-    return result
+    assert {"queued", "starting", "sampling", "summarising"} <= phases
+    assert record.result is not None
+    del record.result["runtime"]
+    return record.result
 
 
-async def test_killed_workers_change_nothing() -> None:
-    assert await posterior(kill_workers=True) == await posterior(kill_workers=False)
+async def test_killed_workers_change_nothing(tmp_path: Path) -> None:
+    assert await posterior(tmp_path, kill_workers=True) == await posterior(tmp_path, False)

@@ -41,7 +41,7 @@ SCENES: list[dict[str, Any]] = [
         "background": WALL | {"shadow": {"c0": 0.056, "c1": 0.013}},
         "range_m": LAWS["uniform"],
         "motion": "radial",
-        "discrepancy": 0.05,
+        "discrepancy": {"flux": 0.05, "range_m": 0.001},
     },
     *({"object": {"c0": law, "c1": law, "c2": law}, "range_m": law} for law in LAWS.values()),
     {"crosstalk": [LAWS["normal"], 0]},
@@ -49,6 +49,7 @@ SCENES: list[dict[str, Any]] = [
     {"background": WALL | {"shadow": "object", "optional": True}, "motion": "tangential"},
     {"background": {"strength": LAWS["lognormal"], "distance_m": LAWS["uniform"]}},
     {"background": WALL | {"shadow": {"c1": LAWS["halfnormal"]}}, "motion": "static"},
-    {"range_m": {"prior": "stroke", "low": 0.1, "high": 3.0}},
+    {"range_m": {"prior": "stroke", "low": 0.1, "high": 3.0}, "discrepancy": 0.05},
+    {"discrepancy": "default"},
     {"range_m": {"prior": "reference", "low": 0.1, "high": 3.0}},
 ]

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from simulator.errors import HybridTofError, InvalidInputError, Problem, RefusedError
 from simulator.frames import FrameColumns
-from simulator.scene import Background, ObjectTerm, Scene, Shadow, Stroke, check_scene, parse_scene
+from simulator.scene import Background, ObjectTerm, Scene, Shadow, Stroke, parse_scene
+from simulator.scene_checks import check_scene
 from simulator.sensor import parse_sensor
 from simulator.trajectories import RadialTrajectory, SampledTrajectory
 from simulator.validated import parse
@@ -207,8 +208,21 @@ def test_a_wrong_prior_wherever_it_stands(place: str, law: Any, pointer: str) ->
         ({"range_m": LAWS["uniform"] | {"low": -2.0, "high": -1.0}}, "/range_m"),
         ({"motion": None}, "/motion"),
         ({"motion": ["radial"]}, "/motion"),
-        ({"discrepancy": 0.0}, "/discrepancy"),
-        ({"discrepancy": LAWS["halfnormal"]}, "/discrepancy"),
+        ({"discrepancy": -0.1}, "/discrepancy"),
+        ({"discrepancy": math.inf}, "/discrepancy"),
+        ({"discrepancy": "measured"}, "/discrepancy"),
+        ({"discrepancy": {}}, "/discrepancy"),
+        ({"discrepancy": {"flux": -0.1}}, "/discrepancy/flux"),
+        ({"discrepancy": {"range_m": math.nan}}, "/discrepancy/range_m"),
+        ({"discrepancy": {"range_m": 15.0}}, "/discrepancy/range_m"),
+        (
+            {
+                "discrepancy": {"range_m": 0.8},
+                "range_m": {"prior": "reference", "low": 0.1, "high": 0.9},
+            },
+            "/discrepancy/range_m",
+        ),
+        ({"discrepancy": {"range": 0.001}}, "/discrepancy/range"),
     ],
     ids=str,
 )

@@ -12,6 +12,7 @@ import pytest
 import simulator.compiled
 
 ROOT = Path(simulator.compiled.__file__).resolve().parents[1]
+DECORATORS = set(simulator.compiled.__all__)
 MARK = "from simulator.compiled import compiled"
 KERNELS = sorted(
     path
@@ -134,6 +135,23 @@ def test_a_kernel_that_a_kernel_calls_gets_its_way_in_from_python_when_it_is_use
     assert len(called.overloads) == 1
 
 
+@simulator.compiled.compiled_for_both
+def thrice(x: float, times: int) -> float:
+    return 3.0 * x * times
+
+
+@simulator.compiled.compiled
+def nine_times(x: float) -> float:
+    return thrice(thrice(x, 0) + thrice(x, 1), 1)
+
+
+def test_numbers_written_in_a_call_are_no_types_and_both_sides_may_share_machine_code() -> None:
+    kernel: Any = thrice
+    assert nine_times(2.0) == 18.0
+    assert thrice(2.0, 1) == 6.0
+    assert len(kernel.overloads) == 1
+
+
 def half(x: float) -> float:
     return 0.5 * x
 
@@ -182,7 +200,7 @@ def test_kernels_use_nothing_that_the_digest_does_not_see(path: Path) -> None:
     for function in module.body:
         if not isinstance(function, ast.FunctionDef):
             continue
-        if not any(isinstance(d, ast.Name) and d.id == "compiled" for d in function.decorator_list):
+        if not any(isinstance(d, ast.Name) and d.id in DECORATORS for d in function.decorator_list):
             continue
         used = {
             node.id

@@ -1,14 +1,19 @@
 """The process of the model's error: its functions, and its size against the optical simulator."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from simulator.discrepancy import DISCREPANCY_SD, discrepancy_basis, matern
+from simulator.model_error import FITTED_SHARE, RANGE_ERROR_SD, ModelError
 from simulator.optics.misfit import model_misfit
-from simulator.scene import parse_scene
+from simulator.scene import Scene, parse_scene
+from simulator.sensor import PulsedSensor, parse_sensor
+from simulator.simulate import simulate
+from simulator.trajectories import SampledTrajectory
 
 Array = NDArray[np.float64]
 
@@ -60,6 +65,7 @@ def test_size_and_length_are_those_of_the_optical_simulators_misfit() -> None:
         [_left_by_a_fit(u, covariance, c0) for c0 in np.geomspace(0.005, 1.5, 12)], axis=0
     )
     measured = model_misfit()["all"]
+    assert measured.rms == pytest.approx(FITTED_SHARE * DISCREPANCY_SD, rel=0.02)
     assert math.sqrt(np.mean(np.diag(left))) == pytest.approx(measured.rms, rel=0.02)
     correlation = np.array([np.mean(np.diag(left, lag)) for lag in range(15)])
     lags = (u[1] - u[0]) * np.arange(15)
@@ -68,6 +74,52 @@ def test_size_and_length_are_those_of_the_optical_simulators_misfit() -> None:
     assert length == pytest.approx(measured.correlation_length, rel=0.2)
 
 
-def test_a_scene_may_ask_for_the_measured_size() -> None:
-    assert parse_scene({"discrepancy": "default"}).discrepancy == DISCREPANCY_SD
-    assert parse_scene({}).discrepancy is None
+@pytest.mark.parametrize(
+    ("scene", "meant"),
+    [
+        ({}, ModelError(DISCREPANCY_SD, RANGE_ERROR_SD, integrated=False)),
+        ({"discrepancy": "default"}, ModelError(DISCREPANCY_SD, RANGE_ERROR_SD, integrated=False)),
+        ({"discrepancy": 0}, ModelError(0.0, 0.0, integrated=False)),
+        ({"discrepancy": 0.05}, ModelError(0.05, 0.0, integrated=True)),
+        ({"discrepancy": {"range_m": 0.001}}, ModelError(0.0, 0.001, integrated=True)),
+        ({"discrepancy": {"flux": 0, "range_m": 0}}, ModelError(0.0, 0.0, integrated=False)),
+    ],
+    ids=str,
+)
+def test_what_a_scene_says_of_the_error_of_the_model(
+    scene: dict[str, Any], meant: ModelError
+) -> None:
+    parsed = parse_scene(scene)
+    assert parsed.model_error == meant
+    assert Scene.model_validate_json(parsed.model_dump_json()) == parsed
+
+
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+def test_the_stated_error_of_the_range_moves_the_time_of_flight_alone(kind: str) -> None:
+    """Readings of 100 scenes over eight lengths of the error: worth 800 independent ones."""
+    sensor = parse_sensor(
+        {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1e-15, 1e-15]}}
+        if kind == "pulsed"
+        else {"kind": "sine_wave", "frequency_hz": 5e6, "noise": {"read": [1e-15, 1e-15]}}
+    )
+    known = {"object": {"c0": 0.08, "c1": 0.0, "c2": 0.1}}
+    scene = parse_scene(known | {"discrepancy": {"range_m": 0.002}})
+    ranges = np.geomspace(0.004, 12.0, 33)
+    path = SampledTrajectory(range_m=ranges.tolist())
+    exact = simulate(sensor, parse_scene(known), path, 0).frames.readings
+    rng = np.random.default_rng(5)
+    read = np.array([simulate(sensor, scene, path, rng).frames.readings for _ in range(100)])
+    if isinstance(sensor, PulsedSensor):
+        strength, late = read[..., 1], sensor.r0 * read[..., 0] / read[..., 1]
+        whole = exact[:, 1]
+    else:
+        strength, late = np.hypot(*read.T).T, np.arctan2(*read.T[::-1]).T / sensor.wave_number
+        whole = np.hypot(*exact.T)
+    assert strength == pytest.approx(np.broadcast_to(whole, strength.shape), rel=1e-9)
+    error = late - ranges
+    # five standard errors: one false alarm in a million
+    assert error.std() == pytest.approx(0.002, rel=5 / math.sqrt(1600))
+    lag = math.log(ranges[1] / ranges[0])
+    together = float(matern(np.array(4 * lag)))
+    found = np.corrcoef(error[:, :-4].ravel(), error[:, 4:].ravel())[0, 1]
+    assert found == pytest.approx(together, abs=5 * (1 - together**2) / math.sqrt(800))

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simulator.errors import InvalidInputError, Problem
-from simulator.scene import Background, ObjectTerm, Scene, check_scene, parse_scene
+from simulator.scene import Background, ObjectTerm, Scene, parse_scene
+from simulator.scene_checks import check_scene
 from simulator.sensor import parse_sensor
 from tests.simulator.documents import LAWS, SCENES, SENSORS
 from tests.simulator.pointers import leads_somewhere

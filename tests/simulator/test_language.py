@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from simulator.errors import InvalidInputError, Problem
 from simulator.frames import frames_from_columns
 from simulator.parameters import parameters_of
-from simulator.scene import Scene, check_scene, parse_scene
+from simulator.scene import Scene, parse_scene
+from simulator.scene_checks import check_scene
 from simulator.sensor import parse_sensor
 
 NOISE = {"read": [1e-6, 1e-6]}

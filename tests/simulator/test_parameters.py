@@ -11,7 +11,7 @@ from scipy import integrate, stats
 
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.parameters import Parameters, parameters_of
-from simulator.scene import parse_scene
+from simulator.scene import Reference, parse_scene
 from simulator.sensor import Sensor, parse_sensor
 
 PULSED = parse_sensor({"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1, 1]}})
@@ -132,10 +132,14 @@ def test_default_priors_are_those_of_the_documents() -> None:
     ],
 )
 def test_default_prior_of_a_range(sensor: Sensor, low: float, high: float) -> None:
-    law = parameters_of(sensor, parse_scene({"object": KNOWN})).terms(np.zeros((1, 0))).ranges[0]
-    np.testing.assert_allclose(law[6:], [low, high], rtol=1e-14)
-    np.testing.assert_allclose(law[0], -math.log(math.log(high / low)), rtol=1e-12)
-    assert law[1:6].tolist() == [-1.0, 0.0, 0.0, 0.0, 0.0]
+    """The reference prior; of the one range of an object at rest, a log-uniform one."""
+    for motion, constant in (("radial", 0.0), ("static", -math.log(math.log(high / low)))):
+        parameters = parameters_of(sensor, parse_scene({"object": KNOWN, "motion": motion}))
+        assert isinstance(parameters.range_prior, Reference) == (motion == "radial")
+        law = parameters.terms(np.zeros((1, 0))).ranges[0]
+        np.testing.assert_allclose(law[6:], [low, high], rtol=1e-14)
+        np.testing.assert_allclose(law[0], constant, rtol=1e-12)
+        assert law[1:6].tolist() == [-1.0, 0.0, 0.0, 0.0, 0.0]
 
 
 def test_ranges_that_a_shadow_forbids_have_no_mass() -> None:
@@ -325,7 +329,9 @@ def test_a_scene_that_the_sensor_forbids_has_no_parameters() -> None:
 @pytest.mark.parametrize("distance", [1.5, {"prior": "lognormal", "median": 1.5, "sigma": 0.3}])
 def test_an_object_stands_before_its_background(distance: Any) -> None:
     """Behind it a dark object could lie anywhere, and nothing would contradict."""
-    scene = parse_scene({"background": {"strength": 0.02, "distance_m": distance}})
+    law = {"prior": "loguniform", "low": 0.02, "high": 20.0}
+    wall = {"strength": 0.02, "distance_m": distance}
+    scene = parse_scene({"background": wall, "range_m": law})
     parameters = parameters_of(PULSED, scene)
     terms = parameters.terms(np.random.default_rng(6).standard_normal((50, len(parameters))))
     assert terms.background is not None

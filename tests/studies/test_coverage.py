@@ -8,7 +8,8 @@ from benchmarks.coverage.intervals import COLUMNS, interval_row
 from benchmarks.coverage.recorded import CELLS
 from benchmarks.coverage.report import confidently_wrong, coverage, recorded_report, report
 from inference.posterior.settings import SamplerSettings
-from simulator.scene import check_scene, parse_scene
+from simulator.scene import parse_scene
+from simulator.scene_checks import check_scene
 from simulator.simulate import simulate
 from simulator.trajectories import RadialTrajectory
 from tests.posterior.scenes import OBJECT, sensor_of

@@ -36,7 +36,8 @@ def sensor_of(read: float, kind: str = "pulsed", **more: Any) -> Sensor:
 
 
 def scene_of(data: dict[str, Any], **more: Any) -> Scene:
-    return parse_scene({**data, **more})
+    """A scene whose model is exact unless something else is said."""
+    return parse_scene({"discrepancy": 0, **data, **more})
 
 
 def wander(

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import linalg, stats
 
-from inference.estimates import Status
+from inference.estimates import SdParts, Status
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import state_from_bytes, state_to_bytes
 from inference.tracking.track import Track, step, track
@@ -48,6 +48,8 @@ def same(one: Track, other: Track) -> None:
         left, right = getattr(one, field.name), getattr(other, field.name)
         if left is None or right is None:
             assert left is right
+        elif isinstance(left, SdParts):
+            np.testing.assert_array_equal(np.stack(left), np.stack(right))
         else:
             width = min(left.shape[1:], right.shape[1:])[:1]
             for values in (left, right):  # padding alone may differ
@@ -65,6 +67,9 @@ def joined(parts: list[Track]) -> Track:
         values = [getattr(part, field.name) for part in parts]
         if values[0] is None:
             columns[field.name] = None
+            continue
+        if isinstance(values[0], SdParts):
+            columns[field.name] = SdParts(*map(np.concatenate, zip(*values, strict=True)))
             continue
         if values[0].ndim == 2:
             width = max(value.shape[1] for value in values)

@@ -91,7 +91,7 @@ def unmodelled_error(scene: Scene) -> str | None:
         A stated discrepancy is one error for all frames, which noise of each frame cannot stand
         for: a fit without a term for it would be surer than it may be.
     """
-    if scene.discrepancy is None:
+    if scene.stated_flux_error is None:
         return None
     return "has no term for the scene's discrepancy; use a posterior"
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from inference.fits.answer.counts import ranges_needed
 from inference.fits.answer.motion_seen import numbers_shown
-from inference.fits.answer.ranges import WITHIN
+from inference.fits.answer.ranges import DECIDED, WITHIN
 from inference.fits.answer.report import describe
 from inference.fits.likelihood.arguments import CROSSTALK
 from inference.fits.likelihood.information import residuals_and_information
@@ -17,7 +17,14 @@ from inference.frame.sensitivity import Value
 from inference.identifiability.information import Information
 from simulator.errors import RefusedError, listed
 
-__all__ = ["LIMIT", "refuse_if_open", "refuse_if_undetermined"]
+__all__ = [
+    "LIMIT",
+    "noise_may_be_followed",
+    "off_the_top",
+    "refuse_if_noise_was_followed",
+    "refuse_if_open",
+    "refuse_if_undetermined",
+]
 
 _SEEN_WITHOUT_OBJECT = (*CROSSTALK, Value.STRENGTH, Value.DISTANCE)
 
@@ -26,7 +33,11 @@ _SHOWN = {
     2.0: "the object moves too little for this noise: all frames read along a straight line",
 }
 
-LIMIT = 0.1  # relative standard deviation of the ranges that the unknowns share out
+_WIDEST = 1.0  # variance of log r beyond which a frame tells nothing of its range
+_REMAINING = 1.0  # chi-square that a step may still gain: a standard deviation, and it widens all
+# relative standard deviation of the ranges that the unknowns share out: a factor of e. Intervals
+# are as wide as the likelihood, honest however wide they are; beyond it nothing is told
+LIMIT = 1.0
 
 
 def _other_frames(problem: FitProblem) -> str:
@@ -50,6 +61,27 @@ def _less_noise(problem: FitProblem) -> str:
     )
 
 
+def off_the_top(top: Maximum) -> float:
+    """Return how many standard deviations an end point of the search is off its optimum.
+
+    Parameters
+    ----------
+    top : Maximum
+        The best end point.
+
+    Raises
+    ------
+    RefusedError
+        Where the search ended so far below the top that what is left says nothing of it.
+    """
+    if not top.remaining <= _REMAINING:
+        raise RefusedError(
+            "the search stopped before the best values were reached (a step would still take "
+            f"{top.remaining:.2g} off chi-square); state a number as known, or use a posterior"
+        )
+    return math.sqrt(max(top.remaining, 0.0))
+
+
 def refuse_if_undetermined(problem: FitProblem, top: Maximum, facts: Information) -> None:
     """Refuse where frames tell fewer numbers than are unknown.
 
@@ -68,7 +100,10 @@ def refuse_if_undetermined(problem: FitProblem, top: Maximum, facts: Information
         Where the Jacobian has not full rank, or the readings do not show enough motion.
     """
     shown = numbers_shown(problem, top)
-    if facts.rank < len(problem):
+    present = problem.present & np.isfinite(top.positions)
+    # an unknown that no reading and no range depends on is nothing that the ranges need
+    told = np.isfinite(facts.sd_of(facts.response[present])).all()
+    if facts.rank < len(problem) and not told:
         weights = np.abs(facts.null_space).max(axis=1)
         names = [name for name, w in zip(problem.names, weights, strict=True) if w > 0.05]
         cause = _SHOWN.get(shown, "the frames do not tell them apart")
@@ -78,11 +113,55 @@ def refuse_if_undetermined(problem: FitProblem, top: Maximum, facts: Information
         )
     kind = "pulsed" if problem.instrument.wave is None else "sine_wave"
     needed = ranges_needed(kind, problem.names, not problem.present.all())
-    if shown < needed:
+    if shown == 1.0 and shown < needed:
         raise RefusedError(
             f"{listed(list(problem.names))} cannot be determined: {_SHOWN[shown]}, and that tells "
-            f"{shown:g} of the {needed} numbers that are missing; "
-            f"{_remedy(problem, needed - int(shown))}"
+            f"one of the {needed} numbers that are missing; {_remedy(problem, needed - 1)}"
+        )
+
+
+def _integrated(problem: FitProblem, point: Maximum) -> float:
+    """Return -2 log of the likelihood with every range integrated out, to first order."""
+    present = problem.present & np.isfinite(point.positions)
+    _, facts = residuals_and_information(problem, point.x, point.positions)
+    own = np.minimum(facts.own_variance[present], _WIDEST)
+    return point.deviance - float(np.log(own).sum())
+
+
+def noise_may_be_followed(problem: FitProblem, top: Maximum) -> bool:
+    """Tell whether the readings lie along a line within their noise, or at a point."""
+    return math.isfinite(numbers_shown(problem, top))
+
+
+def refuse_if_noise_was_followed(
+    problem: FitProblem, top: Maximum, points: Sequence[Maximum]
+) -> None:
+    """Refuse an optimum that is one only because every frame has a range of its own.
+
+    To be asked where `noise_may_be_followed`: where the readings lie along a line within their
+    noise, an object with a pole among the ranges lets each frame follow its own noise. It explains
+    them better than the truth does, and is sure of itself. With the ranges integrated out it is
+    worse than other values by far.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    top : Maximum
+        Its best optimum.
+    points : sequence of Maximum
+        Other values (`profile_scan`).
+
+    Raises
+    ------
+    RefusedError
+        Where other values are better by 3 standard deviations once the ranges are integrated out.
+    """
+    best = min((_integrated(problem, point) for point in points), default=math.inf)
+    if best < _integrated(problem, top) - DECIDED:
+        raise RefusedError(
+            f"{listed(list(problem.names))} cannot be determined: {_SHOWN[2.0]}, and the best "
+            f"values follow the noise of each frame; {_less_noise(problem)}"
         )
 
 

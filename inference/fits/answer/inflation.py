@@ -6,6 +6,7 @@ held at values farther and farther out, everything else is fitted anew, and the 
 far one standard deviation really reaches.
 """
 
+import dataclasses
 import math
 
 import numpy as np
@@ -66,7 +67,7 @@ def shift_of(problem: FitProblem, top: Maximum, facts: Information, other: Maxim
 
 def inflation(
     problem: FitProblem, top: Maximum, facts: Information
-) -> tuple[float, Maximum | None]:
+) -> tuple[float, list[Maximum], Maximum | None]:
     """Return by how much standard deviations of the ranges exceed those from curvature.
 
     Parameters
@@ -80,33 +81,37 @@ def inflation(
 
     Returns
     -------
-    (float, Maximum or None)
+    (float, list of Maximum, Maximum or None)
         At least 1, and 1 where the unknowns are fixed so well that curvature tells everything;
-        and a better optimum, if the walk met one.
+        points of the walk, optimal but for one unknown each; and a better optimum, if the walk met
+        one.
     """
+    points: list[Maximum] = []
     if len(problem) < 2 or not loosely_told(problem, facts):
-        return 1.0, None
+        return 1.0, points, None
     present = problem.present & np.isfinite(top.positions)
     mean = facts.response[present].mean(axis=0)
     along = facts.factor @ (facts.factor.T @ mean)
     spread = math.sqrt(max(float(mean @ along), 0.0))
     if not spread > 0.0:
-        return 1.0, None
+        return 1.0, points, None
     order = np.argsort(-np.abs(along) / facts.sd, kind="stable")
     widest = 1.0
     for j in order[:_HELD].tolist():
         for sign in (1.0, -1.0):
-            ratio, better = _walk(problem, top, facts, j, sign)
+            ratio, walked, better = _walk(problem, top, facts, j, sign)
             if better is not None:
-                return widest, better
+                return widest, points, better
             widest = max(widest, ratio / spread)
-    return widest, None
+            points += walked
+    return widest, points, None
 
 
 def _walk(
     problem: FitProblem, top: Maximum, facts: Information, j: int, sign: float
-) -> tuple[float, Maximum | None]:
+) -> tuple[float, list[Maximum], Maximum | None]:
     """Hold one unknown farther and farther out; the shift of the ranges a standard deviation."""
+    points: list[Maximum] = []
     present = problem.present & np.isfinite(top.positions)
     sd = float(facts.sd[j])
     # where the others go meanwhile, as far as curvature knows
@@ -123,18 +128,20 @@ def _walk(
         cost = found.deviance - top.deviance
         if cost < -BETTER:
             better = maximum_from(problem, unconditional(problem, smaller, found.x))
-            return widest, better if better.deviance < top.deviance else None
+            return widest, points, better if better.deviance < top.deviance else None
         shift = abs(float(np.mean(found.positions[present] - top.positions[present])))
+        whole = unconditional(problem, smaller, found.x)
+        points.append(dataclasses.replace(found, x=whole))
         if cost > _LEAST:
             widest = max(widest, shift / math.sqrt(cost))
         if shift > _FARTHEST or _ENOUGH <= cost < 2.0 * _ENOUGH:
             break
         if cost < _ENOUGH:
-            near, x = reach, unconditional(problem, smaller, found.x)
+            near, x = reach, whole
         else:
             far, halvings = reach, halvings + 1
         if halvings > _HALVINGS:
             break
         # at a wall of the deviance most of the way is covered just before it
         reach = 2.0 * near if math.isinf(far) else 0.5 * (near + far)
-    return widest, None
+    return widest, points, None

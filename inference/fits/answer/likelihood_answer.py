@@ -1,16 +1,23 @@
 """From optima of the likelihood of all frames to a result, or to a refusal."""
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.fits.answer.determined import refuse_if_open, refuse_if_undetermined
+from inference.fits.answer.determined import (
+    noise_may_be_followed,
+    off_the_top,
+    refuse_if_noise_was_followed,
+    refuse_if_open,
+    refuse_if_undetermined,
+)
 from inference.fits.answer.inflation import inflation, shift_of
 from inference.fits.answer.profile_scan import profile_scan
 from inference.fits.answer.ranges import DECIDED, WITHIN, Answer, frame_ranges
-from inference.fits.answer.report import describe, fit_report
+from inference.fits.answer.report import describe, fit_report, spoiled
 from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.maximum import Maximum, maximum_from
 from inference.fits.likelihood.problem import FitProblem, fit_problem
@@ -80,19 +87,27 @@ def likelihood_answer(
             "no values of the unknowns give the readings a likelihood that can be computed; check "
             "gain, noise and range_m"
         )
-    points: list[Maximum] = []
+    scanned: list[Maximum] = []
+    walked: list[Maximum] = []
     for walk in range(_WALKS + 1):
         top = optima[0]
         _, facts = residuals_and_information(problem, top.x, top.positions)
         refuse_if_undetermined(problem, top, facts)
-        wider, better = inflation(problem, top, facts)
+        wider, walked, better = inflation(problem, top, facts)
         if better is None:
-            points, better = profile_scan(problem, top, facts)
+            doubtful = noise_may_be_followed(problem, top)
+            scanned, better = profile_scan(problem, top, facts, always=doubtful)
         if better is None or walk == _WALKS:
             break
         # the old one lies in the same valley, on the way to this
         optima[0] = better
         optima = [one for one in optima if one.deviance >= better.deviance]
+    if noise_may_be_followed(problem, top):
+        if not scanned:  # a better optimum was met on every walk
+            scanned, _ = profile_scan(problem, top, facts, always=True)
+        refuse_if_noise_was_followed(problem, top, scanned)
+    wider = math.hypot(wider, off_the_top(top))
+    points = [one for one in scanned if one.deviance - top.deviance <= DECIDED]
     for point in points:
         reach = np.sqrt(max(point.deviance - top.deviance, WITHIN))
         wider = max(wider, shift_of(problem, top, facts, point) / reach)
@@ -103,12 +118,16 @@ def likelihood_answer(
         for k, one in enumerate(optima)
         if one.deviance - top.deviance <= DECIDED
     ]
-    other = [one for one in [*optima[1:], *points] if one.deviance - top.deviance <= DECIDED]
+    other = [one for one in optima[1:] if one.deviance - top.deviance <= DECIDED]
+    report = fit_report(problem, optima, facts, wider)
+    parameters = describe(problem, top, facts, wider, [*other, *points])
+    points += [one for one in walked if one.deviance - top.deviance <= DECIDED]
     return frame_ranges(
         name,
         problem,
         undecided,
         state,
-        describe(problem, top, facts, wider, other),
-        fit_report(problem, optima, facts, wider),
+        spoiled(parameters, report) if report["misfit"] else parameters,
+        report,
+        [(one.deviance - top.deviance, one.positions) for one in points],
     )

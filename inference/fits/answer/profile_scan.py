@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy import special
 
 from inference.fits.answer.inflation import BETTER, loosely_told
-from inference.fits.answer.ranges import DECIDED
 from inference.fits.likelihood.conditional_fit import conditional, unconditional
 from inference.fits.likelihood.maximum import Maximum, approach, maximum_from
 from inference.fits.likelihood.multistart import BREADTH
@@ -27,9 +26,9 @@ _STEPS = 50
 
 
 def profile_scan(
-    problem: FitProblem, top: Maximum, facts: Information
+    problem: FitProblem, top: Maximum, facts: Information, *, always: bool = False
 ) -> tuple[list[Maximum], Maximum | None]:
-    """Look for values far from the best optimum that are nearly as good.
+    """Fit with each unknown held at values far from the best optimum.
 
     Parameters
     ----------
@@ -39,15 +38,17 @@ def profile_scan(
         Its best optimum.
     facts : Information
         There, of full rank.
+    always : bool
+        Also where the unknowns seem to be told well.
 
     Returns
     -------
     (list of Maximum, Maximum or None)
-        Points of the whole problem, optimal but for one unknown each, that are not decided
-        against; and a better optimum, if one was met.
+        Points of the whole problem, optimal but for one unknown each; and a better optimum, if one
+        was met.
     """
     found: list[Maximum] = []
-    if len(problem) < 2 or not loosely_told(problem, facts):
+    if len(problem) < 2 or not (always or loosely_told(problem, facts)):
         return found, None
     for j in np.flatnonzero(problem.logarithms).tolist():
         for value in _spread_over_prior(problem, j):
@@ -56,7 +57,7 @@ def profile_scan(
             smaller, rest = conditional(problem, j, x)
             there = approach(smaller, rest, _STEPS)
             excess = there.deviance - top.deviance
-            if not excess <= DECIDED:
+            if not np.isfinite(excess):
                 continue
             whole = unconditional(problem, smaller, there.x)
             if excess < -BETTER:

@@ -33,8 +33,9 @@ _REASONS = (
     "more than one range explains the readings, and the fit over all frames does not decide",
     "no range explains the readings within six standard deviations",
     "the best range lies at the end of the ranges of the scene",
+    "the fit does not explain the frames (misfit): something is not as the scene states it",
 )
-_AMBIGUOUS, _UNEXPLAINED, _EDGE = range(len(COMMON_REASONS), len(_REASONS))
+_AMBIGUOUS, _UNEXPLAINED, _EDGE, _MISFIT = range(len(COMMON_REASONS), len(_REASONS))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -110,6 +111,15 @@ def _merged(u: Array, sd: Array, excess: Array) -> tuple[list[int], bool]:
     return kept, merged
 
 
+def _reaches(problem: FitProblem, best: Array, points: Sequence[tuple[float, Array]]) -> Array:
+    """Return how far each frame's log range moves to other values, per standard deviation, (n,)."""
+    reach = np.zeros(problem.frames.shape[0])
+    for excess, positions in points:
+        away = np.abs(positions - best) / math.sqrt(max(excess, WITHIN))
+        reach = np.fmax(reach, away)
+    return reach
+
+
 def frame_ranges(
     name: str,
     problem: FitProblem,
@@ -117,6 +127,7 @@ def frame_ranges(
     state: NDArray[np.uint8],
     parameters: Mapping[str, Any],
     fit: Mapping[str, Any],
+    points: Sequence[tuple[float, Array]] = (),
 ) -> TechniqueResult:
     """Build the result of a technique of many frames.
 
@@ -132,7 +143,12 @@ def frame_ranges(
         What rules frames out (`inference.realtime.net.rule_out`); the others without an object
         or saturated are, in order, those of the problem.
     parameters, fit : mapping
-        As in `TechniqueResult`.
+        As in `TechniqueResult`. A fit that says of itself that it misfits gives no ranges.
+    points : sequence of (float, ndarray of shape (n,))
+        Other values that are not decided against, none of them an optimum: their deviance above
+        the best and the log ranges there. Standard deviations of the best answer are widened until
+        such ranges lie as far out as their deviance says, or in the interval of 95 % if that
+        reaches them.
 
     Returns
     -------
@@ -141,6 +157,7 @@ def frame_ranges(
     """
     used = np.flatnonzero(state != SATURATED)
     u, sd, excess = _modes(problem, answers)
+    sd[:, 0] = np.fmax(sd[:, 0], _reaches(problem, u[:, 0], points))
     n = state.size
     kept: list[list[int]] = [[] for _ in range(n)]
     near = np.zeros(n, dtype=np.bool_)
@@ -151,6 +168,9 @@ def frame_ranges(
     single = np.count_nonzero(excess <= DECIDED, axis=1) <= 1
     for row, frame in enumerate(used):
         if reason[frame]:
+            continue
+        if fit.get("misfit"):
+            reason[frame] = _MISFIT
             continue
         if single[row]:
             kept[frame] = [int(np.argmin(excess[row]))]

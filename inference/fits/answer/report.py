@@ -16,7 +16,7 @@ from inference.identifiability.information import Information
 from inference.identifiability.status import is_positive, spread_of_fit, status_of
 from simulator.parameters import Parameters
 
-__all__ = ["FALSE_ALARM", "describe", "entries", "fit_report"]
+__all__ = ["FALSE_ALARM", "describe", "entries", "fit_report", "spoiled"]
 
 Array = NDArray[np.float64]
 
@@ -65,6 +65,33 @@ def describe(
             ratios = np.fmax(ratios, np.abs(np.log(there / values)) / reach)
     columns = zip(values.tolist(), sds.tolist(), ratios.tolist(), strict=True)
     return entries(problem.parameters, dict(zip(problem.names, columns, strict=True)))
+
+
+def spoiled(parameters: Mapping[str, Any], report: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a misfit leaves of a fit's parameters.
+
+    Parameters
+    ----------
+    parameters : mapping
+        From `describe`.
+    report : mapping
+        From `fit_report`: standard deviations grow with the root of chi-square over its degrees of
+        freedom.
+
+    Returns
+    -------
+    dict
+        As `entries`; nothing is identified by a model that does not explain the frames.
+    """
+    factor = math.sqrt(max(report["chi_square"] / max(report["degrees_of_freedom"], 1), 1.0))
+    return {
+        path: {
+            **entry,
+            "sd": None if entry["sd"] is None else factor * entry["sd"],
+            "status": "not_identified",
+        }
+        for path, entry in parameters.items()
+    }
 
 
 def entries(

@@ -9,7 +9,7 @@ from inference.frame.arguments import Instrument, Pair, Rows
 from inference.frame.blocks import Data
 from inference.frame.sensitivity import Value
 
-__all__ = ["CROSSTALK", "SLOTS", "Bounds", "Fit", "Layout", "Place"]
+__all__ = ["CROSSTALK", "SLOTS", "Bounds", "Fit", "Layout", "Place", "Static"]
 
 # kernels freeze what stands here into machine code, so that this file is hashed with them, as every
 # file is that holds the line `from simulator.compiled import compiled`
@@ -20,6 +20,26 @@ SLOTS = int(Value.LOG_RANGE)
 """Physical values that may be unknown, in the order of `Value`."""
 
 CROSSTALK = (Value.CROSSTALK_1, Value.CROSSTALK_2)
+
+
+class Static(NamedTuple):
+    """The light of the bare background as the coordinates of crosstalk have it.
+
+    Attributes
+    ----------
+    share : float
+        Of the background's readings that is added to crosstalk: the frames' gain factor, or 0
+        where the coordinates are crosstalk alone.
+    r0 : float
+        Of a pulse [m].
+    wave_number, phase : float
+        Of a sine wave [rad/m], [rad]; a wave number of 0 is a pulse.
+    """
+
+    share: float
+    r0: float
+    wave_number: float
+    phase: float
 
 
 class Layout(NamedTuple):
@@ -33,13 +53,16 @@ class Layout(NamedTuple):
     known : ndarray, shape (SLOTS,)
         Known numbers.
     least, largest : ndarray, shape (SLOTS,)
-        Bounds of the physical values.
+        Bounds of the physical values; of crosstalk, of its coordinates.
+    static : Static
+        What the coordinates of crosstalk have in them beside it.
     """
 
     coordinate: NDArray[np.int64]
     known: Array
     least: Array
     largest: Array
+    static: Static
 
 
 class Bounds(NamedTuple):

@@ -1,7 +1,11 @@
 """Coordinates in which a fit moves: logarithms of what is positive, the shape of the objects.
 
 Nothing depends on units in them: log c0, log(1 + c1 / (2 sqrt c0)), log c2, log of strength and
-distance of the background, the same two for the shadow; crosstalk as it is, in units of the noise.
+distance of the background, the same two for the shadow; crosstalk in units of the noise. Where a
+background stands behind it, crosstalk's coordinate is the *static light*: what an empty scene
+reads, crosstalk and bare background together. The frames tell that sum far better than its parts,
+and what a step leaves of the sum would be a curved valley in crosstalk and background; in the sum
+the valley is straight.
 """
 
 import math
@@ -9,9 +13,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.fits.likelihood.arguments import CROSSTALK, SLOTS, Bounds, Layout, Place
+from inference.fits.likelihood.arguments import CROSSTALK, SLOTS, Bounds, Layout, Place, Static
+from inference.frame.arguments import Pair
 from inference.frame.sensitivity import Value
-from simulator.compiled import compiled
+from simulator.compiled import compiled, compiled_for_both
 
 __all__ = ["KNOWN", "SAME", "SHAPES", "bounds_of", "chain", "move_inside", "physical"]
 
@@ -29,6 +34,24 @@ def _shape(c0: float, x: float) -> float:
 
 
 @compiled
+def _bare(distance: float, static: Static) -> Pair:
+    """Return the readings of a bare background of strength one."""
+    if static.wave_number > 0.0:
+        phase = static.wave_number * distance + static.phase
+        return math.cos(phase), math.sin(phase)
+    return min(distance / static.r0, 1.0), 1.0
+
+
+@compiled
+def _bare_slopes(distance: float, static: Static) -> Pair:
+    """Return the derivative of `_bare` along the distance."""
+    if static.wave_number > 0.0:
+        k, phase = static.wave_number, static.wave_number * distance + static.phase
+        return -k * math.sin(phase), k * math.cos(phase)
+    return (1.0 / static.r0 if distance < static.r0 else 0.0), 0.0
+
+
+@compiled_for_both
 def physical(values: Array, x: Array, layout: Layout) -> bool:
     """Fill the physical values; tell whether they are numbers.
 
@@ -53,13 +76,20 @@ def physical(values: Array, x: Array, layout: Layout) -> bool:
             values[k] = _shape(values[k - 1], x[j])
         else:
             values[k] = math.exp(x[j])
+    share = layout.static.share * values[Value.STRENGTH]
+    if share > 0.0:
+        bare = _bare(values[Value.DISTANCE], layout.static)
+        for side in range(2):
+            k = CROSSTALK[side]
+            if layout.coordinate[k] >= 0:
+                values[k] -= share * bare[side]
     good = values[Value.C0] > 0.0 and values[Value.C2] > 0.0
     for k in range(SLOTS):
         good = good and math.isfinite(values[k])
     return bool(good)
 
 
-@compiled
+@compiled_for_both
 def bounds_of(bounds: Bounds, values: Array, layout: Layout) -> None:
     """Fill the least and largest value of each coordinate.
 
@@ -103,7 +133,7 @@ def move_inside(place: Place, bounds: Bounds, layout: Layout) -> bool:
     return physical(place.values, x, layout)
 
 
-@compiled
+@compiled_for_both
 def chain(out: Array, values: Array, x: Array, layout: Layout, bounds: Bounds) -> None:
     """Fill the derivative of every physical value along every coordinate.
 
@@ -132,3 +162,13 @@ def chain(out: Array, values: Array, x: Array, layout: Layout, bounds: Bounds) -
                         out[k, i] += 0.5 * values[k] / values[k - 1] * out[k - 1, i]
             else:
                 out[k, j] = values[k]
+    static, strength, distance = layout.static, values[Value.STRENGTH], values[Value.DISTANCE]
+    if static.share > 0.0:
+        bare, slopes = _bare(distance, static), _bare_slopes(distance, static)
+        for side in range(2):
+            k = CROSSTALK[side]
+            if layout.coordinate[k] >= 0:
+                for i in range(out.shape[1]):
+                    change = bare[side] * out[Value.STRENGTH, i]
+                    change += strength * slopes[side] * out[Value.DISTANCE, i]
+                    out[k, i] -= static.share * change

@@ -13,6 +13,7 @@ from inference.frame.blocks import block_of
 from inference.frame.gaussian import log_top
 from inference.frame.log_density import log_density, slope_and_curvature
 from inference.frame.sensitivity import Value
+from simulator.assign import assign
 from simulator.compiled import compiled
 
 __all__ = ["POSITION", "TOP", "deviance", "nearest_range", "open_values"]
@@ -79,7 +80,7 @@ def nearest_range(values: Array, nearest: float, background: bool | None) -> flo
 @compiled
 def _put(row: Array | None, values: Array) -> None:
     if row is not None:
-        row[0, :] = values
+        assign(row[0], values)
 
 
 @compiled

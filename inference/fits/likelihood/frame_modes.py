@@ -11,6 +11,7 @@ from inference.frame.blocks import block_of, is_empty
 from inference.frame.modes import POSITION, TOP, find_modes, room_for_modes
 from inference.frame.range_prior import integration_bounds
 from inference.frame.table import tabulate
+from simulator.assign import assign
 from simulator.compiled import compiled
 
 __all__ = ["MOST", "frame_modes"]
@@ -27,7 +28,7 @@ def _keep(out: Array, position: float, deviance: float) -> None:
     for place in range(MOST):
         if deviance < out[place, DEVIANCE]:
             for later in range(MOST - 1, place, -1):
-                out[later] = out[later - 1]
+                assign(out[later], out[later - 1])
             out[place, POSITION], out[place, DEVIANCE] = position, deviance
             break
 

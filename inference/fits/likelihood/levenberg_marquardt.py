@@ -6,11 +6,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.fits.likelihood.acceleration import fill_bending
 from inference.fits.likelihood.arguments import CROSSTALK, Bounds, Fit, Place
 from inference.fits.likelihood.coordinates import move_inside
 from inference.fits.likelihood.deviance import deviance
 from inference.fits.likelihood.linearisation import fill_projected, rows_of
 from inference.fits.likelihood.triangle import damped_step, reduce_columns
+from simulator.assign import assign
 from simulator.compiled import compiled
 
 __all__ = ["Climbed", "levenberg_marquardt"]
@@ -23,6 +25,7 @@ _ENOUGH = 1e-4  # deviance that a whole Newton step would still gain
 # damping to begin with, its factors after a step that helps and one that does not, and the least
 _DAMPING, _EASED, _RAISED, _LEAST = 1e-3, 0.15, 6.0, 1e-14
 _FIRST = 1e-9  # damping to which a failing step raises it at least
+_BENT = 0.75  # of a step: an acceleration above it says that second order is not enough
 
 
 class Climbed(NamedTuple):
@@ -37,23 +40,40 @@ class _System(NamedTuple):
 
     Attributes
     ----------
-    matrix : ndarray, shape (rows, d + 1)
-        Projected rows.
+    projected, matrix : ndarray, shape (rows, d + 1)
+        Projected rows, and room in which they are reduced.
     triangle : ndarray, shape (d, d + 1)
         What a reduction leaves of them.
     scale : ndarray, shape (d,)
         Column norms; 0 of a coordinate that stays.
     """
 
+    projected: Array
     matrix: Array
     triangle: Array
     scale: Array
 
 
 @compiled
+def _reduce(system: _System) -> float:
+    """Reduce the projected rows; return what least squares takes off the square of the last."""
+    projected, matrix, triangle, _ = system
+    rows, d = matrix.shape[0], triangle.shape[0]
+    assign(matrix, projected)
+    reduce_columns(matrix, d)
+    triangle[:] = 0.0
+    taken = 0.0
+    for i in range(min(d, rows)):
+        for j in range(i, d + 1):
+            triangle[i, j] = matrix[i, j]
+        taken += matrix[i, d] ** 2
+    return taken
+
+
+@compiled
 def _linearise(system: _System, place: Place, bounds: Bounds, fit: Fit) -> float:
     """Fill bounds and system at a place; return the deviance that a whole step would gain."""
-    matrix, triangle, scale = system
+    matrix, scale = system.projected, system.scale
     rows, d = matrix.shape[0], scale.size
     fill_projected(matrix, place, bounds, fit)
     for j in range(d):
@@ -68,14 +88,41 @@ def _linearise(system: _System, place: Place, bounds: Bounds, fit: Fit) -> float
         if scale[j] == 0.0:
             for i in range(rows):
                 matrix[i, j] = 0.0
-    reduce_columns(matrix, d)
-    triangle[:] = 0.0
-    remaining = 0.0
-    for i in range(min(d, rows)):
-        for j in range(i, d + 1):
-            triangle[i, j] = matrix[i, j]
-        remaining += matrix[i, d] ** 2
-    return remaining
+    return _reduce(system)
+
+
+@compiled
+def _accelerate(
+    step: Array,
+    bent: _System,
+    system: _System,
+    damping: float,
+    place: Place,
+    bounds: Bounds,
+    fit: Fit,
+) -> None:
+    """Add half the acceleration of the path that a step begins, where it is small enough."""
+    d = step.size
+    assign(bent.projected, system.projected)
+    assign(bent.scale, system.scale)
+    if not fill_bending(bent.projected[:, d], step, place, bounds, fit):
+        return
+    _reduce(bent)
+    more = np.empty(d)
+    damped_step(more, bent.triangle, system.scale, damping)
+    size, change = 0.0, 0.0
+    for j in range(d):
+        size += (system.scale[j] * step[j]) ** 2
+        change += (system.scale[j] * more[j]) ** 2
+    if change <= _BENT * _BENT * size:
+        for j in range(d):
+            step[j] += 0.5 * more[j]
+
+
+@compiled
+def _room(rows: int, d: int) -> _System:
+    matrix = np.empty((rows, d + 1))
+    return _System(matrix, np.empty_like(matrix), np.empty((d, d + 1)), np.empty(d))
 
 
 @compiled
@@ -115,7 +162,7 @@ def levenberg_marquardt(place: Place, fit: Fit, steps: int) -> Climbed:
     d, rows = place.x.size, rows_of(place.best.shape[1], fit.instrument)
     bounds, step = Bounds(np.empty(d), np.empty(d)), np.empty(d)
     trial = Place(np.empty(d), np.empty_like(place.values), np.empty_like(place.best))
-    system = _System(np.empty((rows, d + 1)), np.empty((d, d + 1)), np.empty(d))
+    system, bent = _room(rows, d), _room(rows, d)
     value, remaining, damping = math.inf, math.inf, _DAMPING
     if move_inside(place, bounds, fit.layout):
         value = deviance(place, fit)
@@ -128,6 +175,7 @@ def levenberg_marquardt(place: Place, fit: Fit, steps: int) -> Climbed:
         reached = math.inf
         for _ in range(_TRIES):
             damped_step(step, system.triangle, system.scale, damping)
+            _accelerate(step, bent, system, damping, place, bounds, fit)
             reached = _step_to(trial, place.x, step, bounds, fit)
             if reached < value:
                 break
@@ -135,8 +183,8 @@ def levenberg_marquardt(place: Place, fit: Fit, steps: int) -> Climbed:
         if not reached < value:
             break
         value = reached
-        place.x[:] = trial.x
-        place.values[:] = trial.values
-        place.best[:] = trial.best
+        assign(place.x, trial.x)
+        assign(place.values, trial.values)
+        assign(place.best, trial.best)
         damping = max(damping * _EASED, _LEAST)
     return Climbed(value, remaining)

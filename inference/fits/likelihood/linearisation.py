@@ -20,7 +20,14 @@ from inference.frame.noise import NoiseParts, Triangle, noise_of, whitener
 from inference.frame.sensitivity import SLOPES, Value, fill_slopes
 from simulator.compiled import compiled
 
-__all__ = ["fill_projected", "rows_of", "whitened_slopes"]
+__all__ = [
+    "fill_projected",
+    "frame_rows",
+    "room_for_rows",
+    "rows_of",
+    "whitened_slopes",
+    "yielding_ranges",
+]
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -115,6 +122,35 @@ def _fill_frame(
 
 
 @compiled
+def room_for_rows() -> tuple[Array, Array]:
+    """Return room for the slopes and the whitened rows of a frame."""
+    return np.empty((SLOPES, 4)), np.zeros((_ALL, SLOPES))
+
+
+@compiled
+def frame_rows(rows: Array, slopes: Array, i: int, u: float, values: Array, fit: Fit) -> None:
+    """Fill the whitened rows of frame i at log range u along the physical values.
+
+    Parameters
+    ----------
+    rows, slopes : ndarray
+        From `room_for_rows`. Columns of the rows are those of `Value`, the residual in place of
+        readings.
+    i : int
+        The frame.
+    u : float
+        log r; nan without an object.
+    values : ndarray, shape (SLOTS,)
+        Physical values.
+    fit : Fit
+        The fit.
+    """
+    frames = fit.data.frames
+    frame = (frames[i, _FIRST], frames[i, _SECOND], frames[i, _GAIN])
+    _fill_frame(rows, slopes, frame, u, values, fit.gain, fit.background, fit.instrument)
+
+
+@compiled
 def _along_coordinates(out: Array, rows: Array, a: int, chained: Array) -> None:
     """Fill one whitened row along the coordinates from that along the physical values."""
     for j in range(chained.shape[1]):
@@ -125,7 +161,7 @@ def _along_coordinates(out: Array, rows: Array, a: int, chained: Array) -> None:
 
 
 @compiled
-def _inside(values: Array, fit: Fit) -> Pair:
+def yielding_ranges(values: Array, fit: Fit) -> Pair:
     """Return the log ranges between which a range can give way."""
     near = nearest_range(values, fit.support[0], fit.background)
     return math.log(near) + _EDGE, math.log(fit.support[1]) - _EDGE
@@ -151,7 +187,7 @@ def fill_projected(matrix: Array, place: Place, bounds: Bounds, fit: Fit) -> Non
     chained = np.empty((SLOTS, d))
     chain(chained, values, place.x, fit.layout, bounds)
     frames, gain, background, instrument = fit.data.frames, fit.gain, fit.background, fit.instrument
-    low, high = _inside(values, fit)
+    low, high = yielding_ranges(values, fit)
     n = frames.shape[0]
     m = matrix.shape[0] // n
     slopes, rows = np.empty((SLOPES, 4)), np.zeros((_ALL, SLOPES))
@@ -206,7 +242,7 @@ def whitened_slopes(
         The fit.
     """
     frames, gain, background, instrument = fit.data.frames, fit.gain, fit.background, fit.instrument
-    low, high = _inside(values, fit)
+    low, high = yielding_ranges(values, fit)
     slopes, rows = np.empty((SLOPES, 4)), np.zeros((_ALL, SLOPES))
     for i in range(positions.size):
         u = positions[i]

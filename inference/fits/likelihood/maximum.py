@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 MANY = 100  # steps of Levenberg-Marquardt that reach the top as a rule
 TOP = 1e-3  # deviance that may remain to be gained
+_TURNS = 4  # of Newton steps and climbs
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -63,9 +64,17 @@ def approach(problem: FitProblem, x: Array, steps: int) -> Maximum:
 
 
 def followed(problem: FitProblem, near: Maximum) -> Maximum:
-    """Follow with Newton steps where the top is not reached."""
-    if np.isfinite(near.deviance) and near.remaining > TOP:
-        return Maximum(*polish(problem, near.x))
+    """Follow where the top is not reached: Newton steps, and the climb again from their end."""
+    for _ in range(_TURNS):
+        if not np.isfinite(near.deviance) or near.remaining <= TOP:
+            break
+        before = near.deviance
+        near = Maximum(*polish(problem, near.x))
+        if near.remaining <= TOP:
+            break
+        near = approach(problem, near.x, MANY)
+        if before - near.deviance < TOP:
+            break
     return near
 
 

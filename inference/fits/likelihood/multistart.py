@@ -57,10 +57,10 @@ _LITTLE = _Effort(points=300, climbs=12, few=6, kept=4, many=40, polished=3)
 _MUCH = _Effort(points=600, climbs=24, few=10, kept=8, many=MANY, polished=6)
 _EASY = 5  # unknowns
 _WAVES = 3  # of such tries, as long as they help
-_RESTARTED = 3  # unknowns of which other values are tried once more
-_QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
-_FOLLOWED = 4  # of them, to the top
-_PROMISING = 50.0  # deviance above the best up to which such a try is followed
+_QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)  # values of each unknown that are tried
+_HELD, _RELEASED = 30, 60  # steps of a try while its unknown is held, and after that
+_FOLLOWED = 6  # of them, to the top
+_MOST = 12  # optima that are kept
 
 
 def _low_discrepancy(n: int, d: int) -> Array:
@@ -123,34 +123,41 @@ def _starts(problem: FitProblem, count: int) -> Array:
 
 
 def _second_wave(problem: FitProblem, best: Maximum, starts: Array) -> list[Maximum]:
-    """Look for more from the best optimum, its weakest unknowns held elsewhere for a while."""
-    _, facts = residuals_and_information(problem, best.x, best.positions)
-    weakest = np.argsort(-np.where(problem.logarithms, facts.sd, 0.0), kind="stable")
+    """Look for more from the best optimum, each of its unknowns held elsewhere for a while.
+
+    Optima that explain the frames nearly as well lie far apart along one or two unknowns, with
+    walls between them that grow with the square of the readings over their noise: how well the
+    frames are explained while an unknown is held says nothing of what lies behind.
+    """
     found: list[Maximum] = []
-    for j in weakest[:_RESTARTED].tolist():
+    for j in np.flatnonzero(problem.logarithms).tolist():
         for value in np.quantile(starts[:, j], _QUANTILES):
             x = best.x.copy()
             x[j] = value
             smaller, rest = conditional(problem, j, x)
-            there = approach(smaller, rest, MANY // 2)
-            if there.deviance < best.deviance + _PROMISING:
-                whole = unconditional(problem, smaller, there.x)
-                found.append(approach(problem, whole, MANY // 2))
-    found.sort(key=lambda optimum: optimum.deviance)
-    return [followed(problem, optimum) for optimum in found[:_FOLLOWED]]
+            there = approach(smaller, rest, _HELD)
+            whole = unconditional(problem, smaller, there.x)
+            found.append(approach(problem, whole, _RELEASED))
+    # most tries come back to the same few optima
+    apart = _distinct(problem, [best, *found], _FOLLOWED + 1)
+    return [followed(problem, optimum) for optimum in apart if optimum is not best]
 
 
-def _distinct(optima: list[Maximum], information: list[Information]) -> list[int]:
-    """Return the indices of optima that are not one with a better one before them."""
-    kept: list[int] = []
-    for i, optimum in enumerate(optima):
+def _distinct(problem: FitProblem, optima: list[Maximum], most: int) -> list[Maximum]:
+    """Return the best optima that are not one with a better one, the best first."""
+    kept: list[Maximum] = []
+    facts: list[Information] = []
+    for optimum in sorted(optima, key=lambda one: one.deviance):
+        if len(kept) == most or not np.isfinite(optimum.deviance):
+            break
         twin = False
-        for k in kept:
-            change = information[k].jacobian @ (optimum.x - optima[k].x)
-            close = optimum.deviance - optima[k].deviance < 1.0
+        for other, there in zip(kept, facts, strict=True):
+            change = there.jacobian @ (optimum.x - other.x)
+            close = optimum.deviance - other.deviance < 1.0
             twin = twin or (close and float(np.linalg.norm(change)) < _SAME)
         if not twin:
-            kept.append(i)
+            kept.append(optimum)
+            facts.append(residuals_and_information(problem, optimum.x, optimum.positions)[1])
     return kept
 
 
@@ -177,13 +184,10 @@ def find_maxima(problem: FitProblem) -> tuple[Maximum, ...]:
     second = [approach(problem, optimum.x, effort.many) for optimum in first[: effort.kept]]
     second.sort(key=lambda optimum: optimum.deviance)
     last = [followed(problem, optimum) for optimum in second[: effort.polished]]
-    last = [optimum for optimum in last if np.isfinite(optimum.deviance)]
-    last.sort(key=lambda optimum: optimum.deviance)
+    last = _distinct(problem, last, _MOST)
     for _ in range(_WAVES if last and len(problem) > _EASY else 0):
         before = last[0].deviance
-        last += _second_wave(problem, last[0], starts)
-        last.sort(key=lambda optimum: optimum.deviance)
+        last = _distinct(problem, last + _second_wave(problem, last[0], starts), _MOST)
         if before - last[0].deviance < TOP:
             break
-    facts = [residuals_and_information(problem, top.x, top.positions)[1] for top in last]
-    return tuple(last[i] for i in _distinct(last, facts))
+    return tuple(last)

@@ -20,6 +20,7 @@ __all__ = ["polish"]
 Array = NDArray[np.float64]
 
 _STEPS = 40
+_RADIUS = 3.0  # of the trust region at first, in directions of unit information
 _DIFFERENCE = 0.05  # standard deviations
 _LONGEST = 1.0  # change of a logarithm along one unit of a direction
 _ENOUGH = 5e-5  # half deviance that a whole step would still gain
@@ -99,7 +100,7 @@ def polish(problem: FitProblem, x: Array) -> tuple[Array, float, float, Array]:
     profile = _Profile(problem)
     x = x.copy()
     value, gradient = profile(x)
-    radius, predicted = 3.0, np.inf
+    radius, predicted = _RADIUS, np.inf
     for _ in range(_STEPS):
         if not (np.isfinite(value) and np.isfinite(gradient).all()):
             break
@@ -142,6 +143,8 @@ def polish(problem: FitProblem, x: Array) -> tuple[Array, float, float, Array]:
                 break
             radius = 0.25 * min(radius, float(np.linalg.norm(step)))
         if not moved:
+            # what a step of the first length would still gain, not what the last short one would
+            predicted = _step(basis.T @ gradient, hessian, _RADIUS)[1]
             break
         if gained < 0.25 * predicted:
             radius *= 0.5

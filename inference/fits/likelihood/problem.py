@@ -6,7 +6,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.fits.likelihood.arguments import CROSSTALK, SLOTS, Bounds, Fit, Layout, Place
+from inference.fits.likelihood.arguments import CROSSTALK, SLOTS, Bounds, Fit, Layout, Place, Static
 from inference.fits.likelihood.coordinates import (
     KNOWN,
     SAME,
@@ -138,13 +138,29 @@ class FitProblem:
             for j, slot in enumerate(self.slots.tolist()):
                 value = natural[:, j]
                 if slot in CROSSTALK:
-                    x[:, j] = value / self.unit
+                    x[:, j] = value / self.unit + self._bare(columns, CROSSTALK.index(slot))
                 elif slot in SHAPES:
                     c0 = columns.get(slot - 1, self.layout.known[slot - 1])
                     x[:, j] = np.log1p(value / (2 * np.sqrt(c0)))
                 else:
                     x[:, j] = np.log(value / (self.unit if slot in _IN_READINGS else 1.0))
         return x
+
+    def _bare(self, columns: dict[int, Array], side: int) -> Array | float:
+        """Return what the static light has beside crosstalk, in ``unit``."""
+        static, known = self.layout.static, self.layout.known
+        if not static.share > 0.0:
+            return 0.0
+        strength = known[Value.STRENGTH]
+        if Value.STRENGTH in columns:
+            strength = columns[Value.STRENGTH] / self.unit
+        distance = columns.get(Value.DISTANCE, known[Value.DISTANCE])
+        if static.wave_number > 0.0:
+            phase = static.wave_number * distance + static.phase
+            bare = np.sin(phase) if side else np.cos(phase)
+        else:
+            bare = np.ones_like(distance) if side else np.minimum(distance / static.r0, 1.0)
+        return np.asarray(static.share * strength * bare)
 
     def select(self, index: NDArray[np.intp]) -> "FitProblem":
         """Return the same problem with some of the frames."""
@@ -207,6 +223,16 @@ def _known_and_unknown(
     return names, index, known
 
 
+def _static(sensor: Sensor, parameters: Parameters, low: Array, high: Array, gain: Array) -> Static:
+    """Return what the coordinates of crosstalk have in them beside it."""
+    crosstalk = np.array(CROSSTALK)
+    # a bound of crosstalk is none of the static light
+    free = bool(np.isinf(low[crosstalk]).all() and np.isinf(high[crosstalk]).all())
+    share = float(np.median(gain)) if parameters.has_background and free else 0.0
+    r0, wave = instrument(sensor)
+    return Static(share, r0, *(wave or (0.0, 0.0)))
+
+
 def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
     """Set a fit up.
 
@@ -256,7 +282,7 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
     return FitProblem(
         names=names,
         slots=np.flatnonzero(index >= 0),
-        layout=Layout(index, known, low, high),
+        layout=Layout(index, known, low, high, _static(sensor, parameters, low, high, gain)),
         unit=unit,
         frames=readings,
         present=frames.present,

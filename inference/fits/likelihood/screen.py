@@ -68,8 +68,11 @@ def _equations(values: Array, ranges: Array, anchors: Indices, linear: Indices, 
 
 
 @compiled
-def _take_over(x: Array, solution: Array, linear: Indices, bounds: Bounds, layout: Layout) -> None:
+def _take_over(
+    place: Place, solution: Array, linear: Indices, bounds: Bounds, layout: Layout
+) -> None:
     """Put solved values into the coordinates, as far as they are physical."""
+    x, values = place.x, place.values
     for c in range(linear.size):
         k = linear[c]
         j = layout.coordinate[k]
@@ -77,6 +80,12 @@ def _take_over(x: Array, solution: Array, linear: Indices, bounds: Bounds, layou
             x[j] = solution[c]
         elif solution[c] > 0.0:
             x[j] = math.log(solution[c])
+    physical(values, x, layout)
+    for c in range(linear.size):
+        k = linear[c]
+        j = layout.coordinate[k]
+        if k in CROSSTALK:  # to the static light: what its physical value has lost is added
+            x[j] += x[j] - values[k]
         if not math.isfinite(x[j]):
             x[j] = math.nan
         x[j] = min(max(x[j], bounds.low[j]), bounds.high[j])
@@ -114,7 +123,7 @@ def screen(points: Array, scores: Array, ranges: Array, anchors: Indices, fit: F
         if 0 < linear.size <= 2 * anchors.size:
             matrix = _equations(values, ranges[i], anchors, linear, fit)
             solve_least_squares(solution, matrix)
-            _take_over(place.x, solution, linear, bounds, fit.layout)
+            _take_over(place, solution, linear, bounds, fit.layout)
         if deviance(place, fit) < math.inf:
             scores[i] = 0.0
             for j in range(n):

@@ -98,7 +98,7 @@ class Equations:
     def _with(self, readings: Array, ranges: Array) -> Observed:
         """Return the equations of other readings, their ranges following."""
         frames = dataclasses.replace(self.task.frames, readings=readings)
-        moved = self.technique.solve(dataclasses.replace(self.task, frames=frames))
+        moved = self.technique.solve(dataclasses.replace(self.task, frames=frames, exact=True))
         return self.equation(_nearest(moved.roots_m, ranges), frames)
 
     def response(self, ranges: Array) -> _Response:
@@ -142,7 +142,7 @@ def fit_equations(equations: Equations) -> tuple[LinearFit, TechniqueResult]:
         Where fewer frames have a range than the unknowns need, or do not tell them apart.
     """
     unknowns, technique = equations.unknowns, equations.technique
-    result = technique.solve(equations.task)
+    result = technique.solve(dataclasses.replace(equations.task, exact=True))
     needed = len(unknowns) + 1
     solved = int(np.count_nonzero(result.root_count))
     if solved < needed:

@@ -153,7 +153,7 @@ def _known(task: Task, path: str) -> float:
 
 def _solve(task: Task) -> TechniqueResult:
     unknown = unknowns_of(task.sensor, task.scene)
-    single = DIFFERENTIAL.solve(task)
+    single = DIFFERENTIAL.solve(dataclasses.replace(task, exact=True))
     solved = int(np.count_nonzero(single.root_count))
     if solved < len(unknown) + 1:
         raise RefusedError(

@@ -10,19 +10,25 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.answer.ranges import draw_ranges, replicate
 from inference.posterior.job import Job
 from inference.posterior.sample import Sample
+from inference.posterior.sampling.diagnostics import effective_sample_size
 
 __all__ = ["Draws", "draws_of"]
 
 Array = NDArray[np.float64]
 
-_RANGE_DRAWS = 1000
+_LEAST = 1000
+_PER_EFFECTIVE = 2.0  # draws of ranges for every effective draw: the error grows by a fifth
+_SHARE = 1.0 / 16.0  # of all draws: one with ranges costs four times as much as one without
+_MOST_FRAMES = 1_000_000  # draws times frames, some ten seconds, for which the least may be cut
+_FEWEST = 300
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Draws:
     """Draws from the posterior.
 
-    Ranges and readings are drawn for a few even steps of every walker.
+    Ranges and readings are drawn for even steps of every walker, twice as many as the parameters'
+    effective sample size, or a sixteenth of all draws, but a thousand at least.
 
     Attributes
     ----------
@@ -60,6 +66,20 @@ class Draws:
     log_likelihood: Array
 
 
+def _count(sample: Sample, frames: int) -> int:
+    """Return how many draws have ranges: as many as they are worth, bounded by what they cost."""
+    size = sample.log_density.size
+    ess = float(size)
+    if sample.chains is not None:
+        columns = np.moveaxis(sample.z, -1, 0)
+        sizes = [effective_sample_size(column) for column in columns]
+        ess = min((size for size in sizes if math.isfinite(size)), default=0.0)
+    elif sample.weighted is not None:
+        ess = sample.weighted.ess
+    wanted = max(min(_PER_EFFECTIVE * ess, _SHARE * size), _LEAST)
+    return int(min(wanted, max(_MOST_FRAMES // frames, _FEWEST)))
+
+
 def draws_of(
     density: CollapsedDensity, job: Job, sample: Sample, rng: np.random.Generator
 ) -> Draws:
@@ -82,7 +102,8 @@ def draws_of(
     """
     ensembles, walkers, steps = sample.log_density.shape
     d, frames = sample.z.shape[-1], len(job.frames)
-    each = min(max(math.ceil(_RANGE_DRAWS / (ensembles * walkers)), 1), steps)
+    count = _count(sample, len(density.frames))
+    each = min(max(math.ceil(count / (ensembles * walkers)), 1), steps)
     thinned = np.linspace(0, steps - 1, each).astype(np.intp)
     z = sample.z[:, :, thinned].reshape(ensembles * walkers * each, d)
     log_r = draw_ranges(density, z, rng)

@@ -50,22 +50,22 @@ def near_fold(job: Job, density: CollapsedDensity, z: Array, log_r: Array) -> ND
         False for saturated frames and those without object.
     """
     chosen = np.linspace(0, len(z) - 1, min(_DRAWS, len(z))).astype(np.intp)
-    turned = np.array([_turned(job, density, z[k], log_r[k]) for k in chosen])
+    turned = np.array([_turned(density, z[k], log_r[k]) for k in chosen])
     near = np.zeros(len(job.frames), dtype=bool)
     near[job.usable] = turned.mean(axis=0) >= _SHARE
     return near
 
 
-def _turned(job: Job, density: CollapsedDensity, z: Array, log_r: Array) -> NDArray[np.bool_]:
+def _turned(density: CollapsedDensity, z: Array, log_r: Array) -> NDArray[np.bool_]:
     """Whether the curve of each frame turns round, for one draw."""
     present = np.isfinite(log_r)
-    at = whitened(job.sensor, density.parameters, density.frames, z, log_r)
+    at = whitened(density.sensor, density.parameters, density.frames, z, log_r)
     offsets = np.concatenate([-_STEPS[::-1], [0.0], _STEPS])
     terms = some_of(density.parameters.terms(z[None]), slice(0, 1))
     low, high = _support(terms)
     u = np.where(present, log_r, 0.0)[:, None] + offsets
     gain = np.repeat(density.frames[:, 2], offsets.size)
-    path = sensitivity(job.sensor, terms, u.ravel(), gain)
+    path = sensitivity(density.sensor, terms, u.ravel(), gain)
     scale = _with_unknowns(at, present)
     mean = path.mean.reshape(*u.shape, 2)
     way = np.einsum("nij,nkj->nki", scale, mean - mean[:, [_STEPS.size]])

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.posterior.answer.error_parts import ErrorParts, ParameterErrorParts
 from inference.posterior.answer.posterior import ParameterMode, ParameterSummary
 from inference.posterior.answer.quantiles import quantiles, weighted_quantiles
 from inference.posterior.answer.separation import boundaries, labels
@@ -22,7 +23,9 @@ Array = NDArray[np.float64]
 _THINNED = 1000  # draws among which modes are looked for: of one walker they are far apart
 
 
-def summaries_of_chains(names: tuple[str, ...], draws: Array) -> dict[str, ParameterSummary]:
+def summaries_of_chains(
+    names: tuple[str, ...], draws: Array, moved: Array, shares: ErrorParts
+) -> dict[str, ParameterSummary]:
     """Summarise the draws of ensembles.
 
     Parameters
@@ -30,7 +33,11 @@ def summaries_of_chains(names: tuple[str, ...], draws: Array) -> dict[str, Param
     names : tuple of str
         Parameters.
     draws : ndarray, shape (ensembles, walkers, steps, d)
-        In SI units.
+        In SI units, as the ensembles drew them: what tells how well they mixed.
+    moved : ndarray, shape (ensembles, walkers, steps, d)
+        The same with the errors of the model: what is reported.
+    shares : ErrorParts of ndarray, shape (d,)
+        Of the standard deviations.
 
     Returns
     -------
@@ -41,7 +48,7 @@ def summaries_of_chains(names: tuple[str, ...], draws: Array) -> dict[str, Param
     thin = np.linspace(0, steps - 1, each).astype(np.intp)
     result = {}
     for j, name in enumerate(names):
-        x = draws[..., j]
+        drawn, x = draws[..., j], moved[..., j]
         cuts = boundaries(x[:, :, thin].ravel())
         label = labels(x, cuts)
         modes = tuple(
@@ -50,25 +57,32 @@ def summaries_of_chains(names: tuple[str, ...], draws: Array) -> dict[str, Param
         )
         several = cuts.size > 0
         q05, q50, q95 = quantiles(x, several)
-        ess = effective_sample_size(x)
+        ess = effective_sample_size(drawn)
         sd = float(x.std(ddof=1))
         result[name] = ParameterSummary(
             math.nan if several else float(x.mean()),
             math.nan if several else sd,
+            _parts(shares, j, math.nan if several else sd),
             q05,
             q50,
             q95,
             ess,
-            tail_effective_sample_size(x),
-            split_r_hat(x),
+            tail_effective_sample_size(drawn),
+            split_r_hat(drawn),
             math.nan if several else sd / math.sqrt(ess),
             modes,
         )
     return result
 
 
+def _parts(shares: ErrorParts, j: int, sd: float) -> ParameterErrorParts:
+    """Return what the standard deviation of one parameter is made of."""
+    parts = (shares.noise, shares.scene, shares.model)
+    return ParameterErrorParts(*(sd * float(part[j]) for part in parts))
+
+
 def summaries_of_weights(
-    names: tuple[str, ...], x: Array, weights: Array
+    names: tuple[str, ...], x: Array, weights: Array, shares: ErrorParts
 ) -> dict[str, ParameterSummary]:
     """Summarise weighted draws.
 
@@ -77,9 +91,11 @@ def summaries_of_weights(
     names : tuple of str
         Parameters.
     x : ndarray, shape (n, d)
-        Draws in SI units.
+        Draws in SI units, with the errors of the model.
     weights : ndarray, shape (n,)
         Sum to one.
+    shares : ErrorParts of ndarray, shape (d,)
+        Of the standard deviations.
 
     Returns
     -------
@@ -108,6 +124,7 @@ def summaries_of_weights(
         result[name] = ParameterSummary(
             math.nan if several else mean,
             math.nan if several else math.sqrt(variance),
+            _parts(shares, j, math.nan if several else math.sqrt(variance)),
             q05,
             q50,
             q95,

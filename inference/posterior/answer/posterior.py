@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from inference.identifiability.status import Identifiability
 from inference.posterior.answer.draws import Draws
+from inference.posterior.answer.error_parts import ErrorParts, ParameterErrorParts
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.selection.selection import SelectionSummary
 
 __all__ = [
+    "RANGE_COLUMNS",
     "Fit",
     "FitCheck",
     "JointMode",
@@ -47,12 +49,14 @@ def _plain(value: Any) -> Any:
 
 @dataclasses.dataclass(frozen=True)
 class ParameterSummary:
-    """One parameter, in SI units.
+    """One parameter, in SI units; without numbers where nothing was drawn.
 
     Attributes
     ----------
     mean, sd : float
         Of its draws; nan where they have several separate modes.
+    sd_parts : ParameterErrorParts
+        What ``sd`` is made of; nan with it.
     q05, q50, q95 : float
         Quantiles of its draws, whatever their modes.
     ess_bulk, ess_tail : float
@@ -67,6 +71,7 @@ class ParameterSummary:
 
     mean: float
     sd: float
+    sd_parts: ParameterErrorParts
     q05: float
     q50: float
     q95: float
@@ -147,7 +152,7 @@ class JointMode:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RangeSummary:
-    """Ranges of all frames [m]; nan where a frame holds no object or is saturated.
+    """Ranges of all frames [m]; nan where a frame holds no object, is saturated, or nothing drawn.
 
     Attributes
     ----------
@@ -155,6 +160,10 @@ class RangeSummary:
         Quantiles of the draws, whatever their modes.
     mean, sd : ndarray, shape (frames,)
         Of the draws; nan where they have several separate modes.
+    mcse_mean, mcse_q05, mcse_q50, mcse_q95 : ndarray, shape (frames,)
+        Monte Carlo standard errors: by how much another seed would move what they are of.
+    sd_parts : ErrorParts, shape (frames,)
+        What ``sd`` is made of; nan with it.
     near_fold : ndarray of bool, shape (frames,)
         Whether noise like that of the frame makes two modes out of one, or one out of two.
     modes : tuple of tuple of RangeMode
@@ -166,8 +175,21 @@ class RangeSummary:
     q95: Array
     mean: Array
     sd: Array
+    mcse_mean: Array
+    mcse_q05: Array
+    mcse_q50: Array
+    mcse_q95: Array
+    sd_parts: ErrorParts
     near_fold: NDArray[np.bool_]
     modes: tuple[tuple[RangeMode, ...], ...]
+
+
+# columns of numbers, nan where there is none
+RANGE_COLUMNS = tuple(
+    field.name
+    for field in dataclasses.fields(RangeSummary)
+    if field.name not in ("sd_parts", "near_fold", "modes")
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -178,7 +200,8 @@ class FitCheck:
     ----------
     name : str
         "total": chi-square of all frames; "worst_frame": its squared residual; "neighbours":
-        correlation of residuals along the range; "wander": their slow wandering along it.
+        correlation of residuals along the range; "wander": their slow wandering along it;
+        "flux_error": size of the flux's error that they ask for, against what the scene allows.
     statistic, expected : float
         Of the frames, and the mean over replicates of them.
     p_value : float
@@ -199,8 +222,10 @@ class Fit:
     ----------
     p_value : float
         Of all checks together.
-    misfit : bool
-        Whether it is below 1e-3, or the frames demand a larger discrepancy than was stated.
+    misfit : bool or None
+        Whether it is below 1e-3, the frames demand a larger discrepancy than was stated, or they
+        pull an unknown or ranges beyond their prior; None where nothing was drawn, so that nothing
+        was checked.
     reasons : tuple of str
         What misfits, in plain words.
     chi_square, degrees_of_freedom : float
@@ -212,7 +237,7 @@ class Fit:
     """
 
     p_value: float
-    misfit: bool
+    misfit: bool | None
     reasons: tuple[str, ...]
     chi_square: float
     degrees_of_freedom: float
@@ -248,6 +273,9 @@ class Posterior:
         "emcee" or "importance".
     seed : int
         The seed; the same seed gives the same draws.
+    drawn : bool
+        Whether anything was drawn, or nothing but ranges is unknown. Where not, there are no
+        intervals, and `identifiability` is what is foreseen.
     modes : tuple of JointMode
         All optima that were found, numbered as in the verdict.
     selection : SelectionSummary, optional
@@ -256,6 +284,7 @@ class Posterior:
 
     method: str
     seed: int
+    drawn: bool
     verdict: Verdict
     parameters: dict[str, ParameterSummary]
     modes: tuple[JointMode, ...]
@@ -272,13 +301,14 @@ class Posterior:
         document: dict[str, Any] = {
             "method": self.method,
             "seed": self.seed,
+            "drawn": self.drawn,
             "verdict": dataclasses.asdict(self.verdict),
             "parameters": {k: dataclasses.asdict(v) for k, v in self.parameters.items()},
             "modes": [dataclasses.asdict(mode) for mode in self.modes],
             "range_m": {
                 field.name: getattr(self.range_m, field.name)
                 for field in dataclasses.fields(RangeSummary)
-                if field.name != "modes"
+                if field.name not in ("modes", "sd_parts")
             },
             "identifiability": [dataclasses.asdict(row) for row in self.identifiability],
             "fit": dataclasses.asdict(self.fit),
@@ -286,6 +316,7 @@ class Posterior:
             "selection": None if self.selection is None else dataclasses.asdict(self.selection),
             "runtime": dataclasses.asdict(self.runtime),
         }
+        document["range_m"]["sd_parts"] = dataclasses.asdict(self.range_m.sd_parts)
         document["range_m"]["modes"] = [
             [dataclasses.asdict(mode) for mode in modes] for modes in self.range_m.modes
         ]

@@ -5,11 +5,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["quantiles", "weighted_quantiles"]
+__all__ = ["QUANTILES", "quantiles", "weighted_quantiles"]
 
 Array = NDArray[np.float64]
 
-_AT = (0.05, 0.5, 0.95)
+QUANTILES = (0.05, 0.5, 0.95)
 
 
 def quantiles(draws: Array, several_modes: bool) -> tuple[float, float, float]:
@@ -27,7 +27,7 @@ def quantiles(draws: Array, several_modes: bool) -> tuple[float, float, float]:
     (float, float, float)
     """
     method: Literal["inverted_cdf", "linear"] = "inverted_cdf" if several_modes else "linear"
-    q05, q50, q95 = np.quantile(draws.ravel(), np.array(_AT), method=method).tolist()
+    q05, q50, q95 = np.quantile(draws.ravel(), np.array(QUANTILES), method=method).tolist()
     return q05, q50, q95
 
 
@@ -50,9 +50,9 @@ def weighted_quantiles(
     order = np.argsort(draws)
     cumulative = np.cumsum(weights[order])
     if several_modes:
-        index = np.minimum(np.searchsorted(cumulative, _AT), draws.size - 1)
+        index = np.minimum(np.searchsorted(cumulative, QUANTILES), draws.size - 1)
         q05, q50, q95 = draws[order][index].tolist()
     else:
         middle = cumulative - 0.5 * weights[order]
-        q05, q50, q95 = np.interp(_AT, middle, draws[order]).tolist()
+        q05, q50, q95 = np.interp(QUANTILES, middle, draws[order]).tolist()
     return q05, q50, q95

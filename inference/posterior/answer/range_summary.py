@@ -4,8 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.answer.draws import Draws
-from inference.posterior.answer.posterior import RangeMode, RangeSummary
-from inference.posterior.answer.quantiles import quantiles
+from inference.posterior.answer.error_parts import ErrorParts, of_sd
+from inference.posterior.answer.posterior import RANGE_COLUMNS, RangeMode, RangeSummary
+from inference.posterior.answer.precision import mean_error, quantile_error
+from inference.posterior.answer.quantiles import QUANTILES, quantiles
 from inference.posterior.answer.separation import boundaries, labels
 from inference.posterior.answer.shares import resampled_share_error, share_error
 
@@ -15,7 +17,10 @@ Array = NDArray[np.float64]
 
 
 def range_summary(
-    draws: Draws, near_fold: NDArray[np.bool_], importance_ess: float | None
+    draws: Draws,
+    near_fold: NDArray[np.bool_],
+    importance_ess: float | None,
+    shares: ErrorParts,
 ) -> RangeSummary:
     """Summarise the ranges of all frames of a job.
 
@@ -27,23 +32,30 @@ def range_summary(
         Frames near a fold.
     importance_ess : float or None
         With importance sampling: its effective sample size.
+    shares : ErrorParts of ndarray, shape (frames,)
+        Of the standard deviations.
 
     Returns
     -------
     RangeSummary
     """
     n = draws.range_m.shape[-1]
-    columns = {name: np.full(n, np.nan) for name in ("q05", "q50", "q95", "mean", "sd")}
+    columns = {name: np.full(n, np.nan) for name in RANGE_COLUMNS}
     modes: list[tuple[RangeMode, ...]] = [()] * n
     for frame in np.flatnonzero(np.isfinite(draws.range_m[0, 0, 0])):
         r = draws.range_m[..., frame]
         cuts = boundaries(np.log(r).ravel())
         modes[frame] = _modes(r, labels(np.log(r), cuts), cuts.size + 1, importance_ess)
         q = quantiles(r, several_modes=cuts.size > 0)
-        columns["q05"][frame], columns["q50"][frame], columns["q95"][frame] = q
+        for at, value in zip(QUANTILES, q, strict=True):
+            name = f"q{100 * at:02.0f}"
+            columns[name][frame] = value
+            columns[f"mcse_{name}"][frame] = quantile_error(r, at, importance_ess)
         if cuts.size == 0:
             columns["mean"][frame], columns["sd"][frame] = r.mean(), r.std(ddof=1)
-    return RangeSummary(**columns, near_fold=near_fold, modes=tuple(modes))
+            columns["mcse_mean"][frame] = mean_error(r, importance_ess)
+    parts = of_sd(shares, columns["sd"])
+    return RangeSummary(**columns, sd_parts=parts, near_fold=near_fold, modes=tuple(modes))
 
 
 def _modes(

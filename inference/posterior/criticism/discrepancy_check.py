@@ -16,13 +16,14 @@ from inference.density.discrepant import DiscrepantDensity
 from inference.identifiability.status import Identifiability
 from inference.posterior.answer.posterior import Fit
 
-__all__ = ["LargerDiscrepancy", "judge_fit", "judge_scale", "larger_discrepancy"]
+__all__ = ["LargerDiscrepancy", "judge_fit", "larger_discrepancy", "with_model_part"]
 
 Array = NDArray[np.float64]
 
 _FACTOR = 2.0
 _MISFIT = 1e3  # Bayes factor: a false-alarm rate of at most 1e-3
-_MOVED = 1.0  # standard deviations: more than the answer's own uncertainty
+_BENT = 0.5  # share of a linear response that the next order adds, above which it is no guide
+_MOST = 0.5  # of the uncertainty, above which that matters
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,15 +34,15 @@ class LargerDiscrepancy:
     ----------
     bayes_factor : float
         Of the larger size against the stated one.
-    shift : float
-        Change of the mean of log r over frames and draws.
-    sd : float
-        Standard deviation of the mean of log r over frames, as stated.
+    of_z : ndarray, shape (d,)
+        Change of the mean of z.
+    of_log_r : ndarray, shape (frames,)
+        Change of the mean of log r; zero for a frame without object.
     """
 
     bayes_factor: float
-    shift: float
-    sd: float
+    of_z: Array
+    of_log_r: Array
 
 
 def larger_discrepancy(density: DiscrepantDensity, z: Array, log_r: Array) -> LargerDiscrepancy:
@@ -59,19 +60,20 @@ def larger_discrepancy(density: DiscrepantDensity, z: Array, log_r: Array) -> La
     Returns
     -------
     LargerDiscrepancy
-        Without a shift where no frame holds an object. Where the larger size would put the
-        parameters beyond all draws, both figures are too small, never too large.
+        Where the larger size would put the parameters beyond all draws, its figures are too small,
+        never too large.
     """
     larger = dataclasses.replace(density, discrepancy=_FACTOR * density.discrepancy)
     gain = larger.log_likelihood(z) - density.log_likelihood(z)
     gain = np.where(np.isfinite(gain), gain, -np.inf)
     factor = float(np.exp(min(special.logsumexp(gain) - np.log(len(z)), 700.0)))
-    present = np.isfinite(log_r[0])
-    if not present.any() or not np.isfinite(gain).any():
-        return LargerDiscrepancy(factor, 0.0, 0.0)
-    scale = log_r[:, present].mean(axis=1)
-    moved = float(special.softmax(gain) @ scale - scale.mean())
-    return LargerDiscrepancy(factor, moved, float(scale.std()))
+    if not np.isfinite(gain).any():
+        return LargerDiscrepancy(factor, np.zeros(z.shape[1]), np.zeros(log_r.shape[1]))
+    weights = special.softmax(gain)
+    ranges = np.where(np.isfinite(log_r), log_r, 0.0)
+    return LargerDiscrepancy(
+        factor, weights @ z - z.mean(axis=0), weights @ ranges - ranges.mean(axis=0)
+    )
 
 
 def judge_fit(fit: Fit, larger: LargerDiscrepancy) -> Fit:
@@ -85,34 +87,41 @@ def judge_fit(fit: Fit, larger: LargerDiscrepancy) -> Fit:
     return dataclasses.replace(fit, misfit=True, reasons=(*fit.reasons, reason))
 
 
-def judge_scale(
-    rows: tuple[Identifiability, ...], larger: LargerDiscrepancy
+def with_model_part(
+    rows: tuple[Identifiability, ...], model: float, whole: float, curvature: float
 ) -> tuple[Identifiability, ...]:
-    """Mark the common scale of the ranges as not identified where the stated size decides it.
+    """Say how much of the common scale's uncertainty is the model's, and whether it is known.
 
     Parameters
     ----------
     rows : tuple of Identifiability
-        As judged by the spread of the draws.
-    larger : LargerDiscrepancy
-        From `larger_discrepancy`.
+        As judged by the spread of the whole, the model's part included.
+    model, whole : float
+        Standard deviations of the mean of log r: from the model's errors, and from everything.
+    curvature : float
+        What the next order would add to the response to them, as a share of it.
 
     Returns
     -------
     tuple of Identifiability
-        The same rows, but that of ``range_m`` where the larger size moves the scale by more than
-        its standard deviation.
+        The same rows, but that of ``range_m``: with the figure, and `weak` at best where the
+        response is not linear and most of the uncertainty.
     """
-    if not abs(larger.shift) > _MOVED * larger.sd:
+    if not model > 0:
         return rows
-    reason = (
-        f"a discrepancy twice as large as stated would move the common scale of the ranges by "
-        f"{100 * larger.shift:+.2g} %, more than its own uncertainty of {100 * larger.sd:.2g} %: "
-        "it rests on how right the model of the object's flux is taken to be; known crosstalk, "
-        "frames without the object or a wider stroke would fix it"
-    )
+    text = f"; model error: +-{100 * model:.2g} %"
+    bent = curvature > _BENT and model > _MOST * whole
+    if bent:
+        text += (
+            f", by a linear response that the next order changes by {100 * curvature:.0f} % of "
+            "itself: state `discrepancy` as a number, and the error is integrated out in full"
+        )
     return tuple(
-        dataclasses.replace(row, status="not_identified", reason=reason)
+        dataclasses.replace(
+            row,
+            status="weak" if bent and row.status == "identified" else row.status,
+            reason=row.reason + text,
+        )
         if row.parameter == "range_m"
         else row
         for row in rows

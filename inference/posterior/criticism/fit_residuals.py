@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from inference.density.collapsed import CollapsedDensity
-from inference.density.discrepant import DiscrepantDensity
+from inference.density.discrepant import DiscrepantDensity, with_discrepancy
 from inference.density.profile import best_ranges
 from inference.density.static import StaticDensity
 from inference.density.whitened import whitened
@@ -34,11 +34,23 @@ class FitResiduals:
         Squared residual of every frame, in the order of the frames.
     log_r : ndarray, shape (n,)
         Best ranges of the frames with an object, ascending.
+    error : ndarray, shape (1 + replicates,)
+        Sum of the squared coefficients of the flux's error that the frames ask for, which are
+        standard normal by what the scene allows; zero where it allows for none.
     """
 
     across: Array
     squared: Array
     log_r: Array
+    error: Array
+
+
+def _with_flux_error(job: Job, density: CollapsedDensity) -> CollapsedDensity:
+    """Return the density with all that the flux may err by, sampled or not."""
+    error = job.scene.model_error
+    if isinstance(density, DiscrepantDensity | StaticDensity) or error.flux == 0:
+        return density  # at rest it is no different from another c2
+    return with_discrepancy(density, error.flux)
 
 
 def _without_flux_error(density: CollapsedDensity) -> CollapsedDensity:
@@ -86,22 +98,23 @@ def fit_residuals(
     FitResiduals
     """
     n, d = len(density.frames), z.size
+    density = _with_flux_error(job, density)
     plain = _without_flux_error(density)
     seen = best_ranges(plain, z[None])[0, :, 0]
     many = np.broadcast_to(z, (replicates, d))
     anew = replicate(density, many, np.broadcast_to(seen, (replicates, n)).copy(), rng)
     readings = np.concatenate([density.frames[None, :, :2], anew])
     if isinstance(density, StaticDensity):
-        return _of_one_range(job, density, z, seen, readings)
+        return _of_one_range(density, z, seen, readings)
     stacked = _stacked(plain, readings)
     best = best_ranges(stacked, z[None])[0, :, 0]
-    at = whitened(job.sensor, density.parameters, stacked.frames, z, best)
+    at = whitened(density.sensor, density.parameters, stacked.frames, z, best)
     sets = replicates + 1
     across = np.einsum("ni,ni->n", at.across, at.residual).reshape(sets, n)
     square = np.sum(at.residual**2, axis=1).reshape(sets, n)
     present = np.isfinite(seen)
     # rows of the frames themselves stand for those of the replicates: only noise lies between
-    own = at.jacobian[:n]
+    own, of_z = at.jacobian[:n], d
     if isinstance(density, DiscrepantDensity):
         # the error's coefficients, whose prior has unit scale too, are fitted like parameters
         functions = density.functions_at(seen)[0]
@@ -115,7 +128,8 @@ def fit_residuals(
     )
     empty = at.residual.reshape(sets, n, 2)[:, ~present].reshape(sets, -1)
     before = np.concatenate([across[:, present], empty], axis=1)
-    fitted = before - _followed(before, rows)
+    followed, found = _followed(before, rows)
+    fitted = before - followed
     count = int(present.sum())
     squared = np.empty((sets, n))
     # what is left along a curve, at the ends of the prior, stays as it is
@@ -123,15 +137,14 @@ def fit_residuals(
     squared[:, present] = fitted[:, :count] ** 2 + np.maximum(along, 0.0)
     squared[:, ~present] = np.sum(fitted[:, count:].reshape(sets, -1, 2) ** 2, axis=2)
     order = np.argsort(seen[present])
-    return FitResiduals(fitted[:, :count][:, order], squared, seen[present][order])
+    error = np.square(found[:, of_z:]).sum(axis=1)
+    return FitResiduals(fitted[:, :count][:, order], squared, seen[present][order], error)
 
 
-def _of_one_range(
-    job: Job, density: StaticDensity, z: Array, seen: Array, readings: Array
-) -> FitResiduals:
+def _of_one_range(density: StaticDensity, z: Array, seen: Array, readings: Array) -> FitResiduals:
     """Do the same where all frames have one range, which is fitted like a parameter."""
     sets, n, _ = readings.shape
-    at = whitened(job.sensor, density.parameters, density.frames, z, seen)
+    at = whitened(density.sensor, density.parameters, density.frames, z, seen)
     off = readings - (
         density.frames[:, :2] - np.linalg.solve(at.whitener, at.residual[..., None])[..., 0]
     )
@@ -143,16 +156,21 @@ def _of_one_range(
     if not at_end.any():
         rows = np.concatenate([rows, at.along.reshape(2 * n, 1)], axis=1)
     # a range at an end of its prior cannot follow what lies beyond
-    fitted = residuals - _followed(residuals, rows, free=0 if at_end.any() else 1)
+    fitted = residuals - _followed(residuals, rows, free=0 if at_end.any() else 1)[0]
     squared = np.sum(fitted.reshape(sets, n, 2) ** 2, axis=2)
-    return FitResiduals(np.empty((sets, 0)), squared, np.empty(0))
+    return FitResiduals(np.empty((sets, 0)), squared, np.empty(0), np.zeros(sets))
 
 
-def _followed(residuals: Array, rows: Array, free: int = 0) -> Array:
-    """Return the part of residuals that the parameters follow, the last few without a prior."""
+def _followed(residuals: Array, rows: Array, free: int = 0) -> tuple[Array, Array]:
+    """Return the part of residuals that the parameters follow, and how far they go.
+
+    The last few are without a prior.
+    """
     d = rows.shape[1]
     if d == 0:
-        return np.zeros_like(residuals)
+        return np.zeros_like(residuals), np.zeros((len(residuals), 0))
     prior = np.eye(d)[: d - free]
-    basis = linalg.qr(np.concatenate([rows, prior]), mode="economic")[0][: len(rows)]
-    return np.asarray((residuals @ basis) @ basis.T)
+    basis, triangle = linalg.qr(np.concatenate([rows, prior]), mode="economic")
+    seen = residuals @ basis[: len(rows)]
+    gone = linalg.solve_triangular(triangle, seen.T).T
+    return np.asarray(seen @ basis[: len(rows)].T), np.asarray(gone)

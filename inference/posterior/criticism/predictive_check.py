@@ -50,11 +50,16 @@ def _wander(of: FitResiduals) -> Array:
     return np.asarray(np.sum((of.across @ kernel) * of.across, axis=1))
 
 
+def _flux_error(of: FitResiduals) -> Array:
+    return of.error
+
+
 _CHECKS: dict[str, Callable[[FitResiduals], Array]] = {
     "total": _total,
     "worst_frame": _worst,
     "neighbours": _neighbours,
     "wander": _wander,
+    "flux_error": _flux_error,
 }
 
 
@@ -151,10 +156,16 @@ def _words(check: FitCheck, outliers: tuple[int, ...]) -> str:
     if check.name == "neighbours":
         return (
             f"residuals of neighbouring ranges go together (correlation {check.statistic:.2g}): "
-            "the model has a smooth error along the range; state a `discrepancy`"
+            "the model has a smooth error along the range beyond what `discrepancy` allows"
+        )
+    if check.name == "flux_error":
+        size = math.sqrt(check.statistic / max(check.expected, 1e-300))
+        return (
+            f"the object's flux would have to differ from the model by {size:.3g} times what "
+            "`discrepancy` allows"
         )
     return (
         "residuals wander slowly along the range, "
         f"{check.statistic / max(check.expected, 1e-300):.3g} times as much as by noise: "
-        "the model has a smooth error; state a `discrepancy`"
+        "the model has a smooth error beyond what `discrepancy` allows"
     )

@@ -26,7 +26,7 @@ from inference.density.static import StaticDensity
 from simulator.priors import Distribution, NormalDistribution, UniformDistribution
 from simulator.scene import Reference, Stroke
 
-__all__ = ["parameter_conflicts", "prior_conflicts", "range_conflicts", "scores"]
+__all__ = ["parameter_conflicts", "prior_conflicts", "range_conflicts", "ranges_beyond", "scores"]
 
 Array = NDArray[np.float64]
 
@@ -169,28 +169,15 @@ def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
     tuple of str
         The reasons.
     """
-    law = density.parameters.range_prior
-    distribution = _uniform(law.low, law.high) if isinstance(law, Stroke | Reference) else law
+    distribution = _distribution(density.parameters.range_prior)
     with np.errstate(invalid="ignore"):
         middle = np.exp(np.median(log_r, axis=0))
     ends = distribution.from_normal(special.ndtri([_OUTER, 1 - _OUTER]))
     near = [middle < ends[0], middle > ends[1]]
     if not (near[0].any() or near[1].any()):
         return ()
-    r0, wave = density.instrument.r0, density.instrument.wave
-    farthest = r0 if wave is None else 2 * math.pi / wave[0]
-    high = min(_BEYOND * float(ends[1]), farthest)
-    if math.isfinite(distribution.high):
-        high = max(high, distribution.high)
-    # ranges that were stated beyond the sensor's reach have room as well
-    high = max(high, _WIDER * float(ends[1]))
-    wide = dataclasses.replace(
-        density,
-        parameters=dataclasses.replace(
-            density.parameters, range_prior=_uniform(float(ends[0]) / _BEYOND, high)
-        ),
-    )
     chosen = _few(z)
+    wide = _without_ends(density, distribution)
     gain = np.median(_best_fit(wide, chosen) - _best_fit(density, chosen), axis=0)
     out = _deviations(distribution, np.where(np.isnan(middle), ends.mean(), middle))
     # at most 1.1e-5 of runs in each direction, however many frames there are
@@ -211,6 +198,55 @@ def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
                 "they would fit far better: widen range_m"
             )
     return tuple(reasons)
+
+
+def ranges_beyond(density: CollapsedDensity, z: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Find frames that would fit far better beyond the ends of the prior of their ranges.
+
+    Parameters
+    ----------
+    density : CollapsedDensity
+        The density.
+    z : ndarray, shape (d,)
+        Parameters, which stay as they are.
+
+    Returns
+    -------
+    ndarray of bool, shape (frames,)
+        Whether each would gain half of a chi-square of 30; none under a law that fades, as ranges
+        that contradict it are followed.
+    ndarray, shape (frames,)
+        Where each would fit best [m]; nan for a frame without object.
+    """
+    law = _distribution(density.parameters.range_prior)
+    wide = _without_ends(density, law)
+    best = np.exp(best_ranges(wide, z[None])[0, :, 0])
+    if isinstance(law, NormalDistribution):
+        return np.zeros(best.size, dtype=bool), best
+    gain = (_best_fit(wide, z[None]) - _best_fit(density, z[None]))[0]
+    with np.errstate(invalid="ignore"):
+        outside = (best < law.low) | (best > law.high)
+    return np.broadcast_to(gain > _GAIN, best.shape) & outside, best
+
+
+def _distribution(law: Distribution | Stroke | Reference) -> Distribution:
+    """Return the law of a range, for one of unknown or no spread a uniform one."""
+    return _uniform(law.low, law.high) if isinstance(law, Stroke | Reference) else law
+
+
+def _without_ends(density: CollapsedDensity, law: Distribution) -> CollapsedDensity:
+    """Return the density under a law that goes on where this one ends, as far as sensors see."""
+    ends = law.from_normal(special.ndtri([_OUTER, 1 - _OUTER]))
+    r0, wave = density.instrument.r0, density.instrument.wave
+    farthest = r0 if wave is None else 2 * math.pi / wave[0]
+    high = min(_BEYOND * float(ends[1]), farthest)
+    if math.isfinite(law.high):
+        high = max(high, law.high)
+    # ranges that were stated beyond the sensor's reach have room as well
+    high = max(high, _WIDER * float(ends[1]))
+    wide = _uniform(float(ends[0]) / _BEYOND, high)
+    parameters = dataclasses.replace(density.parameters, range_prior=wide)
+    return dataclasses.replace(density, parameters=parameters)
 
 
 def _deviations(law: Distribution, r: Array) -> Array:

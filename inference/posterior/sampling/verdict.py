@@ -1,8 +1,8 @@
 """The verdict on a run: a list of gates, the first failure named first.
 
 These gates look at the draws alone. Those that ask the density itself (another branch, another way
-to the same means, a prior that ends too early) are in `cross_check` and `prior_conflict`; how often
-each alarms falsely, and what it catches, is measured by `benchmarks/verdict_gates.py`.
+to the same means) are in `cross_check`; how often each alarms falsely, and what it catches, is
+measured by `benchmarks/verdict_gates.py`.
 """
 
 import dataclasses

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.start import Optimum
+from inference.posterior.selection.consequence import Reported, reported
 from inference.posterior.selection.cross_validation import cross_validate
 from inference.posterior.selection.evidence import weigh
 from simulator.scene import Crosstalk, Scene
@@ -35,6 +36,8 @@ class Candidate:
         The largest Pareto shape of all frames.
     calls : int
         Density evaluations.
+    reported : Reported or None
+        What it says of unknowns and ranges; None where no parameters explain the frames.
     """
 
     terms: tuple[str, ...]
@@ -44,6 +47,7 @@ class Candidate:
     log_predictive: Array
     predictive_k_hat: float
     calls: int
+    reported: Reported | None
 
 
 def candidate_terms(scene: Scene) -> tuple[tuple[str, ...], ...]:
@@ -116,4 +120,5 @@ def assess(
         predicted.log_predictive,
         predicted.worst_k_hat,
         weighed.calls + calls,
+        reported(density, weighed, rng),
     )

@@ -3,7 +3,9 @@
 Every combination of kept and left-out terms is a candidate model. Two criteria judge it: its
 evidence, and the cross-validated log predictive density of the frames. The evidence alone would
 leave a real term out for the width of its prior (Lindley 1957), the predictive density alone
-ignores what the prior says of the term; a term is left out only where neither demands it.
+ignores what the prior says of the term. A term is left out only where neither demands it, and where
+leaving it out changes nothing that is reported: what neither demands may still be there, and be
+felt at the far end of the ranges.
 """
 
 import dataclasses
@@ -12,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from inference.posterior.selection.comparison import EVIDENCE_MARGIN, Comparison, compare
+from inference.posterior.selection.consequence import Consequence, consequence
 from inference.posterior.selection.leave_one_out import standard_error
 from inference.posterior.selection.models import Candidate
 from simulator.scene import Scene
@@ -92,11 +95,14 @@ class SelectionSummary:
 
 
 def _acceptable(candidate: Candidate, candidates: Sequence[Candidate]) -> bool:
-    """Tell whether no model with more terms is demanded by either criterion."""
+    """Tell whether no model with more terms is demanded, or says something else."""
     for other in candidates:
         if set(other.terms) > set(candidate.terms):
             gain = compare(other, candidate)
+            change = consequence(other.reported, candidate.reported)
             if gain.by_evidence or gain.by_prediction:
+                return False
+            if change is not None and not change.harmless:
                 return False
     return True
 
@@ -119,10 +125,11 @@ def _choose(candidates: Sequence[Candidate]) -> Candidate:
 def decide(scene: Scene, candidates: Sequence[Candidate]) -> tuple[Decision, ...]:
     """Decide which optional terms stay.
 
-    The simplest candidate is chosen over which no larger one is demanded. A larger one is demanded
-    by its evidence, above `EVIDENCE_MARGIN` within two standard errors, or by its predictive
-    density, above `PREDICTIVE_MARGIN`. Where crosstalk alone and a background alone would both do,
-    and the data do not tell them apart, both stay.
+    The simplest candidate is chosen over which no larger one is demanded, and that no larger one
+    contradicts. A larger one is demanded by its evidence, above `EVIDENCE_MARGIN` within two
+    standard errors, or by its predictive density, above `PREDICTIVE_MARGIN`; it contradicts where
+    a mean or an interval is another one (`consequence`). Where crosstalk alone and a background
+    alone would both do, and the data do not tell them apart, both stay.
 
     Parameters
     ----------
@@ -144,16 +151,20 @@ def decide(scene: Scene, candidates: Sequence[Candidate]) -> tuple[Decision, ...
         flipped = tuple(
             other for other in scene.optional_terms if (other in chosen.terms) != (other == term)
         )
-        pair = (chosen, by_terms[flipped]) if kept else (by_terms[flipped], chosen)
-        gain = compare(*pair)
+        larger, smaller = (chosen, by_terms[flipped]) if kept else (by_terms[flipped], chosen)
+        gain = compare(larger, smaller)
+        change = consequence(larger.reported, smaller.reported)
         agree = gain.predictive_trusted and gain.by_evidence == gain.by_prediction == kept
-        decisions.append(Decision(term, kept, agree, _reason(kept, gain)))
+        decisions.append(Decision(term, kept, agree, _reason(kept, gain, change)))
     return tuple(decisions)
 
 
-def _reason(kept: bool, gain: Comparison) -> str:
+def _reason(kept: bool, gain: Comparison, change: Consequence | None) -> str:
     if not kept:
-        return f"the data do not demand it: {gain.words}"
+        nothing = (
+            "" if change is None else f", and nothing changes that is reported: {change.words}"
+        )
+        return f"the data do not demand it{nothing}; {gain.words}"
     if gain.by_evidence and gain.by_prediction:
         return f"the data demand it: {gain.words}"
     if gain.by_evidence or gain.by_prediction:
@@ -162,6 +173,8 @@ def _reason(kept: bool, gain: Comparison) -> str:
         if not gain.predictive_trusted:
             other = "the predictive density cannot be known"
         return f"kept because the {one} demands it, though {other}; {gain.words}"
+    if change is not None and not change.harmless:
+        return f"kept because the answer hangs on it: {change.words}; {gain.words}"
     return f"kept because the data demand one of the terms and do not tell which: {gain.words}"
 
 

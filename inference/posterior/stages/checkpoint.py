@@ -5,7 +5,13 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
+from inference.posterior.archive import (
+    pack,
+    pack_addition,
+    pack_parts,
+    unpack,
+    unpack_parts,
+)
 from inference.posterior.selection.selection import Selection
 from inference.posterior.stages.stage import Settled, Stage, Weighted
 
@@ -37,15 +43,33 @@ class Checkpoint:
 
     def to_bytes(self) -> bytes:
         """Return the checkpoint for a store."""
+        return pack(*self._packed())
+
+    def addition(self, before: "Checkpoint") -> bytes | None:
+        """Return what a store that holds an earlier checkpoint needs besides.
+
+        Parameters
+        ----------
+        before : Checkpoint
+            What it holds.
+
+        Returns
+        -------
+        bytes or None
+            To be read behind what it holds; None where nothing of that is of use any more.
+        """
+        return pack_addition(*self._packed(), before._packed()[1])
+
+    def _packed(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         arrays: dict[str, NDArray[Any]] = {}
         meta = {
             field.name: pack_parts(getattr(self, field.name), field.name, arrays)
             for field in dataclasses.fields(self)
         }
-        return pack(meta, arrays)
+        return meta, arrays
 
     @classmethod
-    def from_bytes(cls, data: bytes) -> "Checkpoint":
-        """Read what `to_bytes` wrote."""
-        meta, arrays = unpack(data)
+    def from_bytes(cls, *pieces: bytes) -> "Checkpoint":
+        """Read what `to_bytes` wrote, and what `addition` wrote after it, in this order."""
+        meta, arrays = unpack(*pieces)
         return cls(**{name: unpack_parts(item, arrays) for name, item in meta.items()})

@@ -15,7 +15,8 @@ _STEP_S = 5e-4  # of an ensemble, beside its evaluations
 def _evaluation_s(job: Job) -> float:
     """Return about how long one parameter vector takes [s]."""
     seconds = int(job.usable.sum()) * _EVALUATION_S
-    return seconds if job.scene.discrepancy is None else seconds * _WITH_DISCREPANCY
+    error = job.scene.model_error
+    return seconds * _WITH_DISCREPANCY if error.integrated and error.flux > 0 else seconds
 
 
 def evaluations(job: Job) -> int:

@@ -12,7 +12,10 @@ populations, once.
 """
 
 import dataclasses
+import math
+from typing import ClassVar
 
+from inference.posterior.progress import Phase, Progress
 from inference.posterior.sampling.ensemble import Ensemble
 from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.population import Population
@@ -22,7 +25,6 @@ from inference.posterior.sampling.verdict import Chains, Verdict, chains_of
 __all__ = [
     "MOST_STEPS",
     "Drawing",
-    "Progress",
     "Selecting",
     "Settled",
     "Stage",
@@ -35,33 +37,14 @@ __all__ = [
 MOST_STEPS = 20_000
 
 
-@dataclasses.dataclass(frozen=True)
-class Progress:
-    """How far a job is.
-
-    Attributes
-    ----------
-    steps, target : int
-        Steps of each ensemble, and how many may be needed as far as can be told.
-    ess, rhat : float or None
-        Least effective sample size and largest R-hat.
-    finished : bool
-        Whether only the summary is left.
-    """
-
-    steps: int
-    target: int
-    ess: float | None
-    rhat: float | None
-    finished: bool
-
-
 class _NotBegun:
     """A stage before the first step."""
 
+    phase: ClassVar[Phase] = "starting"
+
     def progress(self, _: int) -> Progress:
         """Tell how far this is."""
-        return Progress(0, MOST_STEPS, None, None, False)
+        return Progress(self.phase, 0, None, None, None, False)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,6 +70,8 @@ class Tempering(_NotBegun):
     verdict : Verdict
         On what was drawn so far, which is nothing.
     """
+
+    phase: ClassVar[Phase] = "tempering"
 
     proposal: Proposal
     populations: tuple[Population | None, ...]
@@ -134,12 +119,14 @@ class Walking:
 
     def progress(self, target_ess: int) -> Progress:
         """Tell how far this is."""
-        target = self.steps
-        if not self.finished:
-            share = (self.ess or 1.0) / target_ess
-            wanted = max(target / share, target + 1) if target else MOST_STEPS
-            target = int(min(wanted, MOST_STEPS))
-        return Progress(self.steps, target, self.ess, self.r_hat, self.finished)
+        if self.finished:
+            return Progress("summarising", self.steps, self.steps, self.ess, self.r_hat, True)
+        target = None
+        # with enough draws it is R-hat or a mode that is waited for, nobody knows for how long
+        if self.steps and self.ess is not None and self.ess < target_ess:
+            wanted = min(self.steps * target_ess / self.ess, MOST_STEPS)
+            target = max(math.ceil(wanted), self.steps + 1)
+        return Progress("sampling", self.steps, target, self.ess, self.r_hat, False)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -163,7 +150,7 @@ class Weighted:
     def progress(self, _: int) -> Progress:
         """Tell how far this is."""
         count = len(self.draws.z)
-        return Progress(count, count, self.draws.ess, None, True)
+        return Progress("summarising", count, count, self.draws.ess, None, True)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -177,7 +164,7 @@ class Settled:
 
     def progress(self, _: int) -> Progress:
         """Tell how far this is."""
-        return Progress(0, 0, None, None, True)
+        return Progress("summarising", 0, 0, None, None, True)
 
 
 Drawing = Tempering | Walking | Weighted | Settled

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.posterior.checks import check_best_fit
+from inference.posterior.checks import check_best_fit, check_ranges
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
 from inference.posterior.sampling.effort import scouts
@@ -73,6 +73,7 @@ def begin(job: Job) -> tuple[Drawing, int]:
     if len(density.parameters) == 0:
         if not np.isfinite(density(np.empty((1, 0)))[0]):
             raise RefusedError("no range allowed by the scene explains every frame")
+        check_ranges(density, job.scene, np.empty(0))
         return Settled(), 1
     optima, scouted, calls = _optima(job, density)
     if not optima:
@@ -80,6 +81,7 @@ def begin(job: Job) -> tuple[Drawing, int]:
             "no parameters within their priors explain the frames; widen the priors, or check the "
             "noise's `read` against the readings"
         )
+    check_ranges(density, job.scene, optima[0].z)
     check_best_fit(density, optima[0].z)
     proposal = Proposal(mixture_of(optima), None, _SHARE)
     if job.settings.method in ("importance", "auto"):

@@ -103,8 +103,8 @@ def _turns(frame: _ScaledFrame, far: KnownBackground, slope: Array, turns: Array
 @compiled
 def _error_bar(
     r: float, frame: _ScaledFrame, far: KnownBackground, band: float
-) -> tuple[float, bool]:
-    """Return a root's standard deviation and whether it is physical, to within the noise."""
+) -> tuple[float, float, bool]:
+    """Return a root's sd, its change by late light, and whether noise allows it to be physical."""
     slope = frame.b * shadow_slope(r, far.c0, far.c1)
     flux = frame.w2 - frame.b * shadow(r, far.c0, far.c1)
     steep = flux + slope * (far.distance - r)
@@ -116,7 +116,7 @@ def _error_bar(
     spread = math.sqrt(max(variance, 0.0))
     spread = band * spread + 64.0 * EPSILON * (abs(frame.w2) + frame.b) * (1.0 + abs(lever) * r)
     seen = r + far.c1 >= -(band * sd + 1e-12 * r)
-    return sd, seen and not flux < -spread
+    return sd, flux / steep, seen and not flux < -spread
 
 
 @compiled
@@ -162,5 +162,7 @@ def solve_balance(net: Net, far: KnownBackground, r0: float, band: float, found:
                 continue
             found.roots[i, roots] = r
             found.near[i, roots] = near
-            found.sds[i, roots], found.physical[i, roots] = _error_bar(r, frame, far, band)
+            sd, late, physical = _error_bar(r, frame, far, band)
+            found.sds[i, roots], found.late[i, roots] = sd, late
+            found.physical[i, roots] = physical
             roots += 1

@@ -160,6 +160,7 @@ def solve_phase(net: Net, back: KnownBackground, phase: Phase, band: float, foun
                 near = j > 0 and abs(left - goal) * _length(low, frame, far, back) < reach
                 near |= j < count and abs(right - goal) * _length(high, frame, far, back) < reach
                 found.roots[i, roots], found.sds[i, roots] = r, sd
+                found.late[i, roots] = -k * error.flux / error.steep
                 found.near[i, roots] = near
                 found.physical[i, roots] = r + back.c1 >= -(band * sd + 1e-12 * r)
                 roots += 1

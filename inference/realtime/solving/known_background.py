@@ -36,7 +36,10 @@ class Found(NamedTuple):
     Attributes
     ----------
     roots, sds : ndarray, shape (n, m)
-        Ranges and their first-order standard deviations; nan where there is none.
+        Ranges and their first-order standard deviations by noise; nan where there is none.
+    late : ndarray, shape (n, m)
+        Change of the root by an error of the object's effective distance (docs/model.md,
+        model-error).
     near : ndarray of bool, shape (n, m)
         Whether noise reaches the fold beside the root.
     near_frame : ndarray of bool, shape (n,)
@@ -47,6 +50,7 @@ class Found(NamedTuple):
 
     roots: Array
     sds: Array
+    late: Array
     near: Flags
     near_frame: Flags
     physical: Flags

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from inference.realtime.solving.bracketing import STEPS, best, narrowed, next_point, start
 from inference.realtime.solving.exact import difference_of_products
-from simulator.compiled import compiled
+from simulator.compiled import compiled, compiled_for_both
 
 __all__ = ["fill", "horner", "real_roots"]
 
@@ -65,7 +65,7 @@ def _quadratic(a: float, b: float, c: float, low: float, high: float, out: Array
     return found
 
 
-@compiled
+@compiled_for_both
 def real_roots(coefficients: Array, low: float, high: float, out: Array) -> int:
     """Find every sign change of a polynomial in (low, high).
 

@@ -37,6 +37,8 @@ class Pulse(NamedTuple):
         Ranges that are allowed [m].
     full_late, full_whole : float
         Full scale, inf where there is none.
+    error : float
+        Standard deviation of the error of the effective distance, the model's part [m].
     """
 
     r0: float
@@ -48,13 +50,18 @@ class Pulse(NamedTuple):
     high: float
     full_late: float
     full_whole: float
+    error: float
 
 
 class Columns(NamedTuple):
-    """Results of n frames: ranges, standard deviations, and why there is none (0: there is)."""
+    """Results of n frames: ranges, standard deviations, and why there is none (0: there is).
+
+    The standard deviations are the whole and, of these, what noise does.
+    """
 
     roots: Array
     sds: Array
+    noise: Array
     reason: NDArray[np.uint8]
 
 
@@ -117,7 +124,8 @@ def pulsed_ranges(flat: Array, pulse: Pulse, columns: Columns) -> int:
     columns : Columns
         Receives the results.
     """
-    roots, sds, reason = columns.roots, columns.sds, columns.reason
+    roots, sds, noise, reason = columns.roots, columns.sds, columns.noise, columns.reason
+    square = pulse.error * pulse.error
     bad = 0
     for i in range(roots.size):
         raw1, raw2 = flat[2 * i], flat[2 * i + 1]
@@ -137,7 +145,10 @@ def pulsed_ranges(flat: Array, pulse: Pulse, columns: Columns) -> int:
         good = (pulse.low <= r) & (r <= pulse.high) & _valid(r, late, whole)
         good &= (sd < math.inf) & (abs(raw1) < pulse.full_late) & (abs(raw2) < pulse.full_whole)
         roots[i] = r if good else math.nan
-        sds[i] = sd if good else math.nan
+        noise[i] = sd if good else math.nan
+        whole_sd = math.sqrt(sd * sd + square)
+        # the square of what is tiny or huge is no number
+        sds[i] = (whole_sd if sd < whole_sd < math.inf else sd) if good else math.nan
         reason[i] = 0 if good else 1
         bad += 0 if good else 1
     return bad

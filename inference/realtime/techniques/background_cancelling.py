@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from inference.estimates import TechniqueResult
 from inference.realtime.assemble import NOISE_BAND, Outcome, assemble, reasons_of
 from inference.realtime.from_curve import candidates_of
+from inference.realtime.model_error import model_error_of
 from inference.realtime.net import UNREPRESENTABLE, Form, Net, known_net_readings
 from inference.realtime.solving.bracketing import EPSILON
 from inference.realtime.solving.curves import cancelling_quadrature, cancelling_ratio
@@ -60,7 +61,10 @@ class _Wave(NamedTuple):
 
 
 class _Scene(NamedTuple):
-    """What the background is computed from: gain c2, c0, c1, its strength, the relative error."""
+    """What the background is computed from: gain c2, c0, c1, its strength, the relative error.
+
+    An error of the model's flux acts as one of the signal does.
+    """
 
     gain: float
     c0: float
@@ -120,7 +124,7 @@ def _solve(task: Task) -> TechniqueResult:
                 c0=known.get("object.c0"),
                 c1=known.get("object.c1"),
                 strength=known.get("background.strength"),
-                relative=net.relative,
+                relative=math.hypot(net.relative, model_error_of(task).flux),
             )
             wave = None
             if isinstance(sensor, SineWaveSensor):

@@ -1,7 +1,5 @@
 """Derivatives with a known background in them: immune to both terms, two roots as a rule."""
 
-import dataclasses
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,9 +7,10 @@ from inference.estimates import TechniqueResult
 from inference.realtime.assemble import NOISE_BAND, Outcome, assemble, reasons_of
 from inference.realtime.derivatives import DERIVATIVE_REASONS, derivatives_of
 from inference.realtime.from_curve import candidates_of
+from inference.realtime.model_error import model_error_of
 from inference.realtime.motion import law_of_model
 from inference.realtime.solving.curves import both_phase, both_ratio
-from inference.realtime.techniques.differential import target_of
+from inference.realtime.techniques.differential import target_of, with_law
 from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor
 
@@ -53,7 +52,7 @@ def _solve(task: Task) -> TechniqueResult:
     if task.physical:
         # the visible share of the background is not negative beyond -c1'
         with np.errstate(invalid="ignore"):
-            slack = NOISE_BAND * np.where(np.isfinite(candidates.sd), candidates.sd, 0.0)
+            slack = NOISE_BAND * np.where(np.isfinite(candidates.noise), candidates.noise, 0.0)
             slack += 1e-12 * candidates.roots
             physical = candidates.roots + known.get("background.shadow.c1") >= -slack
     reason = np.where(targets.contact, _CONTACT, _NO_RANGE)
@@ -61,15 +60,9 @@ def _solve(task: Task) -> TechniqueResult:
     support = known.support if task.physical else (0.0, np.inf)
     outcome = Outcome(physical, support, reason.astype(np.uint8), _REASONS)
     result = assemble("background_cancelling_differential", rate.state, candidates, outcome)
-    return _with_law(task, result)
-
-
-def _with_law(task: Task, result: TechniqueResult) -> TechniqueResult:
-    """Add the power law and zeta that the known object has at the unique range."""
-    power, zeta = law_of_model(
-        result.range_m, task.known.get("object.c0"), task.known.get("object.c1")
-    )
-    return dataclasses.replace(result, power_law=power, zeta=zeta)
+    shape = known.get("object.c0"), known.get("object.c1")
+    flux = model_error_of(task).flux
+    return with_law(result, law_of_model(result.range_m, result.sd_m, shape, flux))
 
 
 BACKGROUND_CANCELLING_DIFFERENTIAL = Technique(

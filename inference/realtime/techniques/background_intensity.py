@@ -7,6 +7,7 @@ import numpy as np
 from inference.estimates import TechniqueResult
 from inference.realtime.assemble import NOISE_BAND, Candidates, Outcome, assemble, reasons_of
 from inference.realtime.from_curve import stacked
+from inference.realtime.model_error import model_error_of
 from inference.realtime.net import Net, known_net_readings
 from inference.realtime.solving.background_balance import solve_balance
 from inference.realtime.solving.background_phase import Phase, solve_phase
@@ -49,10 +50,15 @@ def _solve(task: Task) -> TechniqueResult:
         _part(sensor, net.select(slice(i, i + step)), background, unit, width)
         for i in range(0, n, step)
     ]
-    roots, sds, near, near_frame, physical = zip(*parts, strict=True)
+    roots, sds, late, near, near_frame, physical = zip(*parts, strict=True)
+    error = model_error_of(task).range_m
     with np.errstate(all="ignore"):
         candidates = Candidates(
-            stacked(roots) * unit, stacked(sds) * unit, stacked(near), np.concatenate(near_frame)
+            stacked(roots) * unit,
+            stacked(sds) * unit,
+            stacked(near),
+            np.concatenate(near_frame),
+            model=np.abs(stacked(late)) * error if error > 0 else None,
         )
     if isinstance(sensor, PulsedSensor):
         reason = np.full(n, _BEYOND)
@@ -73,6 +79,7 @@ def _part(sensor: Sensor, net: Net, background: KnownBackground, unit: float, wi
     found = Found(
         roots=np.full((n, width), np.nan),
         sds=np.full((n, width), np.nan),
+        late=np.full((n, width), np.nan),
         near=np.zeros((n, width), np.bool_),
         near_frame=np.zeros(n, np.bool_),
         physical=np.zeros((n, width), np.bool_),
@@ -90,6 +97,7 @@ def _part(sensor: Sensor, net: Net, background: KnownBackground, unit: float, wi
     return Found(
         found.roots[:, :used],
         found.sds[:, :used],
+        found.late[:, :used],
         found.near[:, :used],
         found.near_frame,
         found.physical[:, :used],

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.estimates import Status, TechniqueResult
+from inference.estimates import SdParts, Status, TechniqueResult
 from inference.realtime.assemble import (
     DROWNED,
     NOISE_BAND,
@@ -15,6 +15,7 @@ from inference.realtime.assemble import (
     assemble,
     reasons_of,
 )
+from inference.realtime.model_error import model_error_of
 from inference.realtime.net import ABSENT, SATURATED, UNREPRESENTABLE, known_net_readings
 from inference.realtime.solving.pulse_ratio import (
     Codes,
@@ -112,13 +113,14 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
         high=high * (1 + slack),
         full_late=full_late,
         full_whole=full_whole,
+        error=model_error_of(task).range_m,
     )
     # one block for all columns: freshly mapped pages would cost more than the arithmetic
-    block = np.empty(27 * n, dtype=np.uint8)
-    roots, sds = block[: 8 * n].view(np.float64), block[8 * n : 16 * n].view(np.float64)
-    count = block[16 * n : 24 * n].view(np.intp)
-    status, reason, near = (block[(24 + i) * n : (25 + i) * n] for i in range(3))
-    columns = Columns(roots, sds, reason)
+    block = np.empty(35 * n, dtype=np.uint8)
+    roots, sds, noise = (block[8 * i * n : 8 * (i + 1) * n].view(np.float64) for i in range(3))
+    count = block[24 * n : 32 * n].view(np.intp)
+    status, reason, near = (block[(32 + i) * n : (33 + i) * n] for i in range(3))
+    columns = Columns(roots, sds, noise, reason)
     flat = np.ascontiguousarray(frames.readings).reshape(-1)
     bad = pulsed_ranges(flat, pulse, columns)
     count.fill(1)
@@ -140,6 +142,11 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
         status=status,
         roots_m=roots[:, None],
         roots_sd_m=sds[:, None],
+        sd_parts_m=SdParts(
+            columns.noise[:, None],
+            np.broadcast_to(0.0, (n, 1)),
+            np.broadcast_to(pulse.error, (n, 1)),
+        ),
         root_count=count,
         near_fold=near.view(np.bool_),
         reason=reason,
@@ -149,7 +156,7 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
 
 def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
     net = known_net_readings(task)
-    k = sensor.wave_number
+    k, error = sensor.wave_number, model_error_of(task).range_m
     with np.errstate(all="ignore"):
         modulus = np.hypot(net.first, net.second)
         phase = _phase(net.first, net.second, sensor.phase_offset_rad)
@@ -170,7 +177,8 @@ def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
             roots[roots > task.high_m] = np.nan
         candidates = Candidates(
             roots=roots,
-            sd=np.broadcast_to((sd / k)[:, None], roots.shape),
+            noise=np.broadcast_to((sd / k)[:, None], roots.shape),
+            model=np.broadcast_to(error, roots.shape) if error > 0 else None,
             near=np.zeros(roots.shape, dtype=np.bool_),
             near_frame=np.zeros(len(task.frames), dtype=np.bool_),
         )
@@ -191,7 +199,7 @@ CONVENTIONAL = Technique(
     kinds=("pulsed", "sine_wave"),
     observables="w1 and w2, or i and q",
     needs=(),
-    immune_to=("discrepancy",),  # the flux cancels in the ratio and in the phase
+    immune_to=("discrepancy",),  # of the flux, which cancels in the ratio and in the phase
     uses_background=False,
     differential=False,
     cost=1.0,

@@ -16,13 +16,14 @@ from inference.realtime.assemble import (
 )
 from inference.realtime.derivatives import DERIVATIVE_REASONS, derivatives_of
 from inference.realtime.from_curve import candidates_of
-from inference.realtime.motion import law_of_model, law_of_motion
+from inference.realtime.model_error import model_error_of
+from inference.realtime.motion import MotionLaw, law_of_model, law_of_motion
 from inference.realtime.net import Net, net_readings
 from inference.realtime.solving.curves import differential_phase, differential_ratio
 from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor
 
-__all__ = ["DIFFERENTIAL", "Targets", "target_of"]
+__all__ = ["DIFFERENTIAL", "Targets", "target_of", "with_law"]
 
 Array = NDArray[np.float64]
 
@@ -93,8 +94,11 @@ def target_of(task: Task, rate: Net) -> Targets:
             contact = (ratio <= 0) & (sensor.r0 * ratio > -NOISE_BAND * sd)
             return Targets(top, d2, sd, contact | (ratio == 0), still)
         length = np.hypot(d1, d2)
-        angle = np.arctan2(d2, d1) - sensor.phase_offset_rad
-        phase = np.mod(angle, np.pi)
+        # turned into the upper half plane first: there a small phase keeps its relative precision
+        cosine, sine = math.cos(sensor.phase_offset_rad), math.sin(sensor.phase_offset_rad)
+        x, y = d1 * cosine + d2 * sine, d2 * cosine - d1 * sine
+        turned = np.where((y < 0) | ((y == 0) & (x < 0)), -1.0, 1.0)
+        phase = np.arctan2(turned * y, turned * x)
         size = np.ldexp(length, exponent)
         sd = np.sqrt(rate.variance(-d2 / length / size, d1 / length / size))
         band = np.minimum(NOISE_BAND * sd, 0.25 * np.pi)
@@ -157,7 +161,9 @@ def _fixed_distance(task: Task, targets: Targets, high: float) -> Candidates:
             roots = (targets.top[:, None] + math.pi * np.arange(turns)) / k
             sd = targets.sd / k
         roots = np.where((roots > 0) & (roots <= high), roots, np.nan)
-    return _without_folds(roots, np.broadcast_to(sd[:, None], roots.shape))
+    error = model_error_of(task).range_m
+    found = _without_folds(roots, np.broadcast_to(sd[:, None], roots.shape))
+    return dataclasses.replace(found, model=np.broadcast_to(error, roots.shape) if error else None)
 
 
 def _without_folds(roots: Array, sd: Array) -> Candidates:
@@ -212,18 +218,33 @@ def _bounded(
 
 def _with_motion(task: Task, result: TechniqueResult, rate: Net) -> TechniqueResult:
     """Add power law and zeta: measured where crosstalk is known, else those of the model."""
-    known = task.known
+    known, error = task.known, model_error_of(task)
     if known.crosstalk is not None and task.scene.background is None:
         net = net_readings(task.sensor, known.crosstalk, task.frames)
-        power, zeta = law_of_motion(task.sensor, net, rate)
+        law = law_of_motion(task.sensor, net, rate, error.range_m)
     elif task.scene.motion == "radial" and known.has("object.c0", "object.c1"):
-        power, zeta = law_of_model(result.range_m, known.get("object.c0"), known.get("object.c1"))
+        shape = known.get("object.c0"), known.get("object.c1")
+        law = law_of_model(result.range_m, result.sd_m, shape, error.flux)
     else:
         nothing = np.full(len(result), np.nan)
-        power, zeta = nothing, nothing
+        law = MotionLaw(nothing, nothing, nothing, nothing)
         if task.scene.motion == "tangential":
-            zeta = np.where(result.status == Status.UNIQUE, 1.0, np.nan)
-    return dataclasses.replace(result, power_law=power, zeta=zeta)
+            exact = result.status == Status.UNIQUE
+            law = law._replace(
+                zeta=np.where(exact, 1.0, np.nan), zeta_sd=np.where(exact, 0.0, np.nan)
+            )
+    return with_law(result, law)
+
+
+def with_law(result: TechniqueResult, law: MotionLaw) -> TechniqueResult:
+    """Return a result with power law and zeta."""
+    return dataclasses.replace(
+        result,
+        power_law=law.power,
+        power_law_sd=law.power_sd,
+        zeta=law.zeta,
+        zeta_sd=law.zeta_sd,
+    )
 
 
 DIFFERENTIAL = Technique(

@@ -16,8 +16,6 @@ from simulator.scene import parse_scene
 from tests.density.reference import Case, log_density, mean_readings
 from tests.posterior.scenes import KINDS, sensor_of
 
-pytestmark = pytest.mark.xdist_group("kernels")  # compile each kernel once, in one process
-
 Array = NDArray[np.float64]
 
 PLATE = (0.0769, -0.123, 0.0957)

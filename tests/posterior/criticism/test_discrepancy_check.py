@@ -15,8 +15,8 @@ from inference.posterior.answer.ranges import draw_ranges
 from inference.posterior.criticism.discrepancy_check import (
     LargerDiscrepancy,
     judge_fit,
-    judge_scale,
     larger_discrepancy,
+    with_model_part,
 )
 from simulator.scene import parse_scene
 from tests.posterior.scenes import OBJECT, data, sensor_of
@@ -83,19 +83,23 @@ def test_an_error_far_above_the_stated_size_is_a_misfit() -> None:
     assert judge_fit(GOOD, found).misfit
 
 
-def test_a_scale_that_moves_with_the_size_is_not_identified() -> None:
-    moved = judge_scale(ROWS, LargerDiscrepancy(bayes_factor=2.0, shift=-0.1, sd=0.05))
-    assert moved[0] == ROWS[0]
-    assert moved[1].status == "not_identified"
-    assert "-10 %" in moved[1].reason
-    assert judge_scale(ROWS, LargerDiscrepancy(2.0, 0.04, 0.05)) == ROWS
-    # nothing is known of a scale where no frame holds an object
-    assert judge_scale(ROWS, LargerDiscrepancy(2.0, 0.0, 0.0)) == ROWS
+def test_the_model_error_is_a_number_and_small_ones_take_no_status_away() -> None:
+    """Issue 12.7: a scale known to 0.03 % that the model's error moves by as much."""
+    small = with_model_part(ROWS, model=3e-4, whole=4e-4, curvature=0.0)
+    assert small[0] == ROWS[0]
+    assert small[1].status == "identified"
+    assert small[1].reason.endswith("model error: +-0.03 %")
+    bent = with_model_part(ROWS, model=0.03, whole=0.04, curvature=0.7)
+    assert bent[1].status == "weak"
+    assert "state `discrepancy` as a number" in bent[1].reason
+    # it matters only where the model's part does
+    assert with_model_part(ROWS, model=0.01, whole=0.04, curvature=0.7)[1].status == "identified"
+    assert with_model_part(ROWS, model=0.0, whole=0.04, curvature=0.0) == ROWS
 
 
 def test_a_misfit_that_was_seen_stays() -> None:
-    bad = dataclasses.replace(GOOD, misfit=True, reasons=("a reason",))
-    assert judge_fit(bad, LargerDiscrepancy(0.1, 0.0, 0.1)) == bad
-    both = judge_fit(bad, LargerDiscrepancy(1e4, 0.0, 0.1))
+    bad, nothing = dataclasses.replace(GOOD, misfit=True, reasons=("a reason",)), np.zeros(1)
+    assert judge_fit(bad, LargerDiscrepancy(0.1, nothing, nothing)) == bad
+    both = judge_fit(bad, LargerDiscrepancy(1e4, nothing, nothing))
     assert both.misfit
     assert len(both.reasons) == 2

@@ -43,8 +43,9 @@ def checked(sensor: Sensor, scene: Scene, frames: Frames, seed: int = 0) -> Fit:
     return predictive_check(job, density, z, rng)
 
 
-def scene_of(crosstalk: bool) -> Scene:
-    return parse_scene({"crosstalk": UNKNOWN_CROSSTALK} if crosstalk else {})
+def scene_of(crosstalk: bool, discrepancy: float | None = None) -> Scene:
+    scene: dict[str, Any] = {"crosstalk": UNKNOWN_CROSSTALK} if crosstalk else {}
+    return parse_scene(scene if discrepancy is None else {**scene, "discrepancy": discrepancy})
 
 
 @functools.cache
@@ -93,7 +94,7 @@ def test_what_is_wrong_is_named(
     spoilt = dataclasses.replace(
         frames, readings=spoil(frames.readings, np.geomspace(0.1, 2.0, 40))
     )
-    fit = checked(sensor, scene_of(False), spoilt)
+    fit = checked(sensor, scene_of(False, 0), spoilt)
     assert fit.misfit
     assert fit.p_value < 1e-3
     assert fit.reasons
@@ -106,9 +107,27 @@ def test_what_is_wrong_is_named(
         assert any("discrepancy" in reason for reason in fit.reasons)
 
 
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+def test_an_error_of_the_default_size_is_no_misfit_and_a_gross_one_is(kind: str) -> None:
+    """A scene that says nothing allows for 7 % of the flux, not for ten times as much, and not for
+    a frame that is off on its own."""
+    sensor, scene, at = sensor_of(kind), scene_of(False), np.geomspace(0.1, 2.0, 40)
+    frames = data(sensor, frames=40).frames
+    for spoil, wrong in (
+        (wobble(0.05), None),
+        (wobble(0.8), "flux_error"),
+        (one_off, "worst_frame"),
+    ):
+        spoilt = dataclasses.replace(frames, readings=spoil(frames.readings, at))
+        fit = checked(sensor, scene, spoilt)
+        assert fit.misfit == (wrong is not None)
+        failed = {check.name for check in fit.checks if check.p_value < 2e-4}
+        assert wrong is None or wrong in failed
+
+
 def test_noise_larger_than_stated_is_a_misfit() -> None:
     told, real = sensor_of("pulsed", 2000.0), sensor_of("pulsed", 1000.0)
-    fit = checked(told, scene_of(False), data(real, frames=40).frames)
+    fit = checked(told, scene_of(False, 0), data(real, frames=40).frames)
     assert fit.misfit
     assert fit.chi_square > 2 * fit.degrees_of_freedom
     assert any("chi-square" in reason for reason in fit.reasons)
@@ -120,7 +139,7 @@ def test_degrees_of_freedom_are_frames_less_parameters(crosstalk: bool) -> None:
     sqrt(2 * 15 / 1000); a parameter that the prior helps to fix costs less than one."""
     sensor = sensor_of("pulsed")
     frames = data(sensor, TRUTH if crosstalk else {}, 20).frames
-    freedom = checked(sensor, scene_of(crosstalk), frames).degrees_of_freedom
+    freedom = checked(sensor, scene_of(crosstalk, 0), frames).degrees_of_freedom
     assert freedom == pytest.approx(15 if crosstalk else 17, abs=5 * 0.18 + 0.5)
 
 
@@ -130,7 +149,7 @@ def test_known_parameters_and_empty_frames() -> None:
     rng = np.random.default_rng(220)
     bare = np.array([0.002, 0.01]) + sensor.noise.read[0] * rng.standard_normal((4, 2))
     told = Frames(np.concatenate([frames.readings, bare]), object_present=np.arange(12) < 8)
-    scene = parse_scene({"object": OBJECT} | TRUTH)
+    scene = parse_scene({"object": OBJECT, "discrepancy": 0} | TRUTH)
     fit = checked(sensor, scene, told)
     assert not fit.misfit
     assert fit.degrees_of_freedom == pytest.approx(8 + 2 * 4, abs=1.0)

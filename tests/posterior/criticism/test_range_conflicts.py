@@ -14,7 +14,7 @@ from simulator.scene import parse_scene
 from simulator.sensor import PulsedSensor, Sensor, parse_sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
-from tests.posterior.scenes import OBJECT, sensor_of
+from tests.posterior.scenes import OBJECT, data, sensor_of
 
 SETTINGS = SamplerSettings(seed=1, max_seconds=30)
 
@@ -25,7 +25,7 @@ def still(sensor: Sensor, r: float, frames: int) -> Frames:
 
 
 def answer(sensor: Sensor, frames: Frames, range_m: dict[str, Any], **more: Any) -> Posterior:
-    scene = parse_scene({"object": OBJECT, "range_m": range_m, **more})
+    scene = parse_scene({"object": OBJECT, "range_m": range_m, "discrepancy": 0, **more})
     return infer(sensor, scene, frames, SETTINGS)
 
 
@@ -58,20 +58,59 @@ def test_readings_far_outside_a_narrow_prior_are_followed_and_it_is_named(motion
     np.testing.assert_allclose(
         [found.range_m.q05[0], found.range_m.q95[0]], [low, high], atol=0.2 * (high - low)
     )
-    assert not found.verdict.converged
-    (reason,) = found.verdict.reasons
+    # the draws are what the scene states: that it is wrong is said of the model
+    assert found.verdict.converged
+    assert found.fit.misfit
+    (reason,) = (reason for reason in found.fit.reasons if "range_m" in reason)
     assert "next to no mass" in reason
     assert "widen range_m" in reason
+    assert all(row.status != "identified" for row in found.identifiability)
 
 
-def test_a_common_range_at_the_end_of_its_prior_is_named_and_a_misfit() -> None:
-    """All frames together would fit 38 standard deviations better beyond."""
+@pytest.mark.parametrize("motion", ["radial", "static"])
+def test_a_stated_range_that_the_readings_contradict_is_refused(motion: str) -> None:
+    """At rest all frames together would fit 38 standard deviations better beyond."""
     sensor = sensor_of("pulsed", 100.0)
     law = {"prior": "uniform", "low": 0.5, "high": 1.0}
-    found = answer(sensor, still(sensor, 1.01, 100), law, motion="static")
-    assert not found.verdict.converged
-    assert "upper end of range_m" in found.verdict.reasons[0]
+    far, frames = (1.01, 100) if motion == "static" else (1.5, 4)
+    with pytest.raises(InvalidInputError) as caught:
+        answer(sensor, still(sensor, far, frames), law, motion=motion)
+    (problem,) = caught.value.problems
+    assert problem.pointer == "/scene/range_m"
+    assert f"{frames} of {frames} frames would fit far better" in problem.message
+    assert "widen it" in problem.message
+
+
+def test_one_range_of_many_beyond_the_end_is_answered_and_a_misfit() -> None:
+    sensor = sensor_of("pulsed", 300.0)
+    scene = parse_scene({"object": OBJECT})
+    path = SampledTrajectory(range_m=[0.6, 0.7, 0.8, 1.2])
+    law = {"prior": "uniform", "low": 0.5, "high": 1.0}
+    found = answer(sensor, simulate(sensor, scene, path, 1).frames, law)
+    assert found.verdict.converged
     assert found.fit.misfit
+    assert any("1 frames pile up at the upper end" in reason for reason in found.fit.reasons)
+
+
+def test_a_posterior_at_a_stated_end_of_a_prior_is_exact() -> None:
+    """The truth lies there: draws pile up, converge, and nothing is wrong."""
+    sensor = sensor_of("pulsed", 100.0)
+    scene = {"c0": OBJECT["c0"], "c1": OBJECT["c1"]}
+    frames = data(sensor, frames=6).frames
+    prior = {"prior": "uniform", "low": 0.01, "high": OBJECT["c2"]}
+    known = {"prior": "reference", "low": 0.05, "high": 5.0}
+    settings = SamplerSettings(seed=1, method="auto", target_ess=100)
+    stated = parse_scene({"object": scene | {"c2": prior}, "range_m": known})
+    found = infer(sensor, stated, frames, settings)
+    assert found.verdict.converged, found.verdict.reasons
+    assert not found.fit.misfit
+    # a tenth of it is far more than the noise: now the data pull beyond
+    prior["high"] = 0.9 * OBJECT["c2"]
+    stated = parse_scene({"object": scene | {"c2": prior}, "range_m": known})
+    found = infer(sensor, stated, frames, settings)
+    assert found.verdict.converged, found.verdict.reasons
+    assert found.fit.misfit
+    assert any(reason.startswith("object.c2 piles up") for reason in found.fit.reasons)
 
 
 def test_a_common_range_within_a_narrow_prior_is_no_conflict() -> None:

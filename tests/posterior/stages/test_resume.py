@@ -65,10 +65,20 @@ def test_in_every_stage(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     job = fold.prepare(sensor, parse_scene(scene), simulated.frames, settings)
     stored_job = job.to_bytes()
     checkpoint, seen = fold.start(job), []
+    before: fold.Checkpoint | None = None
+    kept: list[bytes] = []  # as a store has it: a whole one, and what was appended since
     for _ in range(most):
         seen.append(type(checkpoint.stage))
-        stored = fold.Checkpoint.from_bytes(checkpoint.to_bytes())
+        added = None if before is None else checkpoint.addition(before)
+        kept = [checkpoint.to_bytes()] if added is None else [*kept, added]
+        stored = fold.Checkpoint.from_bytes(*kept)
         assert same(stored, checkpoint)
+        stage = checkpoint.stage
+        was = 0 if before is None or not isinstance(before.stage, Walking) else before.stage.steps
+        if isinstance(stage, Walking) and stage.steps > was > 0:  # steps are not written anew
+            chains = sum(ensemble.chain.nbytes for ensemble in stage.ensembles)
+            assert len(kept[-1]) < len(checkpoint.to_bytes()) - 0.5 * chains * was / stage.steps
+        before = checkpoint
         again = fold.Job.from_bytes(stored_job)
         pieces = [fold.run(task) for task in fold.tasks(job, checkpoint)]
         others = [fold.run(task) for task in fold.tasks(again, stored)]

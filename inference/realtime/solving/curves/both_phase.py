@@ -7,6 +7,7 @@ import math
 
 from inference.realtime.solving.curves.curve import Curve, CurveParameters, Search
 from inference.realtime.solving.curves.terms import (
+    Response,
     background_rate,
     background_rates,
     object_bend,
@@ -21,6 +22,7 @@ __all__ = [
     "guess",
     "power_law",
     "residual",
+    "response",
     "slope",
     "turning",
     "value",
@@ -64,6 +66,22 @@ def slope(u: float, p: CurveParameters) -> float:
     """Return d value / du."""
     x, y = direction(u, p)
     return turning(u, p) / u / (x * x + y * y)
+
+
+@compiled
+def response(u: float, p: CurveParameters) -> Response:
+    """Return what errors of the model do to the value."""
+    b = log_slope(u, p.c0, p.c1)
+    x, y = direction(u, p)
+    k, turn = p.wave, p.wave * u
+    square = x * x + y * y
+    # the object's phasor b + j k u grows by delta and turns by k epsilon; its slopes add to it
+    return Response(
+        (x * turn - y * b) / square,
+        -y / square,
+        k * ((x * b + y * turn) / square),
+        k * (x / square),
+    )
 
 
 @compiled

@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from inference.realtime.solving.curves.curve import Curve, CurveParameters, Search
 from inference.realtime.solving.curves.terms import (
+    Response,
     background_rate,
     background_rates,
     exact_object,
@@ -23,6 +24,7 @@ __all__ = [
     "guess",
     "power_law",
     "residual",
+    "response",
     "slope",
     "turning",
     "value",
@@ -64,6 +66,15 @@ def slope(u: float, p: CurveParameters) -> float:
     """Return d value / du."""
     x, _ = direction(u, p)
     return turning(u, p) / u / x / x
+
+
+@compiled
+def response(u: float, p: CurveParameters) -> Response:
+    """Return what errors of the model do to the value."""
+    b = log_slope(u, p.c0, p.c1)
+    x, y = direction(u, p)
+    q = y / x
+    return Response((u * (1.0 + b) - q * b) / x, (u - q) / x, b / x, 1.0 / x)
 
 
 @compiled

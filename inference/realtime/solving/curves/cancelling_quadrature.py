@@ -7,10 +7,11 @@ import math
 
 from inference.realtime.solving.curves import differential_phase, intensity
 from inference.realtime.solving.curves.curve import Curve, CurveParameters, Level
+from inference.realtime.solving.curves.terms import Response
 from simulator.compiled import compiled
 from simulator.object_model import log_slope, quadratic
 
-__all__ = ["CURVE", "KIND", "guess", "power_law", "residual", "slope", "value"]
+__all__ = ["CURVE", "KIND", "guess", "power_law", "residual", "response", "slope", "value"]
 
 KIND = 5
 
@@ -27,6 +28,13 @@ def slope(u: float, p: CurveParameters) -> float:
     angle = p.wave * (p.distance - u)
     b = log_slope(u, p.c0, p.c1)
     return intensity.value(u, p) * (b * math.sin(angle) / u - p.wave * math.cos(angle))
+
+
+@compiled
+def response(u: float, p: CurveParameters) -> Response:
+    """Return what errors of the model do to the value."""
+    turn = -p.wave * math.cos(p.wave * (p.distance - u))
+    return Response(value(u, p), 0.0, turn * intensity.value(u, p), 0.0)
 
 
 @compiled

@@ -4,10 +4,11 @@ import math
 
 from inference.realtime.solving.curves import intensity
 from inference.realtime.solving.curves.curve import Curve, CurveParameters, Polynomial
+from inference.realtime.solving.curves.terms import Response
 from simulator.compiled import compiled
 from simulator.object_model import log_slope
 
-__all__ = ["CURVE", "KIND", "guess", "power_law", "residual", "slope", "value"]
+__all__ = ["CURVE", "KIND", "guess", "power_law", "residual", "response", "slope", "value"]
 
 KIND = 4
 
@@ -23,6 +24,12 @@ def slope(u: float, p: CurveParameters) -> float:
     """Return d value / du."""
     b = log_slope(u, p.c0, p.c1)
     return intensity.value(u, p) * (b * (p.distance - u) / u - 1.0) / p.distance
+
+
+@compiled
+def response(u: float, p: CurveParameters) -> Response:
+    """Return what errors of the model do to the value."""
+    return Response(value(u, p), 0.0, -intensity.value(u, p) / p.distance, 0.0)
 
 
 @compiled

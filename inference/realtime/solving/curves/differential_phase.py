@@ -6,10 +6,11 @@ k u - atan2(k u Q, 4u^2 + 3 c1 u + 2 c0), modulo pi.
 import math
 
 from inference.realtime.solving.curves.curve import Curve, CurveParameters, Polynomial
+from inference.realtime.solving.curves.terms import Response
 from simulator.compiled import compiled
 from simulator.object_model import log_slope, quadratic
 
-__all__ = ["CURVE", "KIND", "guess", "power_law", "residual", "slope", "value"]
+__all__ = ["CURVE", "KIND", "guess", "power_law", "residual", "response", "slope", "value"]
 
 KIND = 3
 
@@ -29,6 +30,15 @@ def slope(u: float, p: CurveParameters) -> float:
     bend = (u * (12.0 * u + 6.0 * p.c1) + 2.0 * p.c0) / quadratic(u, p.c0, p.c1)
     b = log_slope(u, p.c0, p.c1)
     return k * (k * k * u * u + bend) / (b * b + k * k * u * u)
+
+
+@compiled
+def response(u: float, p: CurveParameters) -> Response:
+    """Return what errors of the model do to the value."""
+    b = log_slope(u, p.c0, p.c1)
+    x = p.wave * u
+    square = b * b + x * x
+    return Response(0.0, -x / square, p.wave, p.wave * (b / square))
 
 
 @compiled

@@ -4,7 +4,7 @@ u (3u^2 + 2 c1 u + c0) / (4u^2 + 3 c1 u + 2 c0).
 """
 
 from inference.realtime.solving.curves.curve import Curve, CurveParameters, Polynomial
-from inference.realtime.solving.curves.terms import exact_object, object_bend
+from inference.realtime.solving.curves.terms import Response, exact_object, object_bend
 from simulator.compiled import compiled
 from simulator.object_model import log_slope, quadratic
 
@@ -15,6 +15,7 @@ __all__ = [
     "guess",
     "power_law",
     "residual",
+    "response",
     "slope",
     "turning",
     "value",
@@ -54,6 +55,13 @@ def slope(u: float, p: CurveParameters) -> float:
     """Return d value / du."""
     x, _ = direction(u, p)
     return turning(u, p) / u / x / x
+
+
+@compiled
+def response(u: float, p: CurveParameters) -> Response:
+    """Return what errors of the model do to the value."""
+    b = log_slope(u, p.c0, p.c1)
+    return Response(0.0, -u / b / b, 1.0, 1.0 / b)
 
 
 @compiled

@@ -18,9 +18,19 @@ from inference.realtime.solving.curves import (
     intensity_w1,
 )
 from inference.realtime.solving.curves.curve import CurveParameters
+from inference.realtime.solving.curves.terms import Response
 from simulator.compiled import compiled
 
-__all__ = ["direction", "guess", "power_law", "residual", "slope", "turning", "value"]
+__all__ = [
+    "direction",
+    "guess",
+    "power_law",
+    "residual",
+    "response",
+    "slope",
+    "turning",
+    "value",
+]
 
 
 @compiled
@@ -65,6 +75,28 @@ def slope(kind: int, u: float, p: CurveParameters) -> float:
     if kind == both_phase.KIND:
         return both_phase.slope(u, p)
     return math.nan
+
+
+@compiled
+def response(kind: int, u: float, p: CurveParameters) -> Response:
+    """Return what errors of the model do to a curve's value."""
+    if kind == intensity.KIND:
+        return intensity.response(u, p)
+    if kind == intensity_w1.KIND:
+        return intensity_w1.response(u, p)
+    if kind == differential_ratio.KIND:
+        return differential_ratio.response(u, p)
+    if kind == differential_phase.KIND:
+        return differential_phase.response(u, p)
+    if kind == cancelling_ratio.KIND:
+        return cancelling_ratio.response(u, p)
+    if kind == cancelling_quadrature.KIND:
+        return cancelling_quadrature.response(u, p)
+    if kind == both_ratio.KIND:
+        return both_ratio.response(u, p)
+    if kind == both_phase.KIND:
+        return both_phase.response(u, p)
+    return Response(math.nan, math.nan, math.nan, math.nan)
 
 
 @compiled

@@ -3,10 +3,11 @@
 import math
 
 from inference.realtime.solving.curves.curve import Curve, CurveParameters, Polynomial
+from inference.realtime.solving.curves.terms import Response
 from simulator.compiled import compiled
 from simulator.object_model import log_slope, quadratic
 
-__all__ = ["CURVE", "KIND", "guess", "power_law", "residual", "slope", "value"]
+__all__ = ["CURVE", "KIND", "guess", "power_law", "residual", "response", "slope", "value"]
 
 KIND = 1
 
@@ -21,6 +22,13 @@ def value(u: float, p: CurveParameters) -> float:
 def slope(u: float, p: CurveParameters) -> float:
     """Return d value / du."""
     return value(u, p) * (1.0 + log_slope(u, p.c0, p.c1)) / u
+
+
+@compiled
+def response(u: float, p: CurveParameters) -> Response:
+    """Return what errors of the model do to the value."""
+    late = value(u, p)
+    return Response(late, 0.0, late / u, 0.0)
 
 
 @compiled

@@ -4,12 +4,33 @@ Divided by Phi: b = u Phi'/Phi, and so on. The background's part comes from dS/d
 """
 
 from fractions import Fraction
+from typing import NamedTuple
 
 from inference.realtime.solving.curves.curve import CurveParameters
 from simulator.compiled import compiled
 from simulator.object_model import quadratic
 
-__all__ = ["background_rate", "background_rates", "exact_object", "object_bend"]
+__all__ = ["Response", "background_rate", "background_rates", "exact_object", "object_bend"]
+
+
+class Response(NamedTuple):
+    """What errors of the model do to a curve's value at a point (docs/model.md, model-error).
+
+    The object's light is Phi exp(delta) and its time of flight that of u + epsilon; the errors and
+    their slopes along log u are independent of one another at a point.
+
+    Attributes
+    ----------
+    flux, flux_slope : float
+        Derivatives of the value to delta and to d delta / d log u.
+    late, late_slope : float
+        Derivatives to epsilon and to d epsilon / d log u [1 / length].
+    """
+
+    flux: float
+    flux_slope: float
+    late: float
+    late_slope: float
 
 
 @compiled

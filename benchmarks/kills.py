@@ -1,0 +1,294 @@
+"""What kill -9 does to a service: nothing but cost time.
+
+    python -m benchmarks.kills                     an SQLite file, one service
+    python -m benchmarks.kills --postgres          a PostgreSQL of its own, two services
+
+Jobs are asked for, services and workers are killed at random moments while they run, and a service
+is started anew. No accepted job may be lost or doubled, none may fail, and answers (their run times
+apart) and draws must be those of an undisturbed run, byte for byte.
+"""
+
+import argparse
+import contextlib
+import dataclasses
+import json
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+SERVE = (sys.executable, "-m", "service.cli", "serve", "--port", "0")
+ENDED = {"done", "cancelled", "failed"}
+
+
+def children(pid: int) -> list[int]:
+    """Return the processes that another one has started, as Linux tells it."""
+    found = []
+    for path in Path("/proc").iterdir():
+        if path.name.isdigit():
+            with contextlib.suppress(OSError):
+                if int((path / "stat").read_text().rsplit(")", 1)[1].split()[1]) == pid:
+                    found.append(int(path.name))
+    return found
+
+
+class Service:
+    """A service in a process of its own, on a port that the system picks."""
+
+    def __init__(self, command: Sequence[str], database: str) -> None:
+        kept = {k: v for k, v in os.environ.items() if not k.startswith("HYBRIDTOF_")}
+        here = {"PYTHONPATH": str(Path(__file__).parents[1]), "HYBRIDTOF_DATABASE": database}
+        self.process = subprocess.Popen(  # noqa: S603
+            command, stderr=subprocess.PIPE, text=True, env=kept | here
+        )
+        assert self.process.stderr is not None
+        said = []
+        for line in self.process.stderr:
+            said.append(line)
+            if match := re.search(r"running on (http://\S+)", line):
+                self.address = match[1]
+                break
+        else:
+            raise RuntimeError("".join(said))
+        # what it says later must not fill the pipe
+        self._drain = subprocess.Popen(("cat",), stdin=self.process.stderr, stdout=-3)  # noqa: S607
+
+    def workers(self) -> list[int]:
+        """Return its worker processes."""
+        return [pid for pid in children(self.process.pid) if "spawn_main" in _command(pid)]
+
+    def kill(self) -> None:
+        """End it as a power cut would."""
+        self.process.kill()
+        self.process.wait()
+        self._drain.wait()
+        assert self.process.stderr is not None
+        self.process.stderr.close()
+
+
+def _command(pid: int) -> str:
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{pid}/cmdline").read_text()
+    return ""
+
+
+@dataclasses.dataclass
+class Fleet:
+    """Services that share a database.
+
+    Attributes
+    ----------
+    command : sequence of str
+        Starts one.
+    database : str
+        Its address.
+    services : list of Service
+        Those that live.
+    """
+
+    command: Sequence[str]
+    database: str
+    services: list[Service]
+
+    def ask(self, method: str, path: str, **options: Any) -> httpx.Response:
+        """Ask any of the services, until one answers."""
+        while True:
+            for service in self.services:
+                with contextlib.suppress(httpx.TransportError):
+                    address = service.address + path
+                    response = httpx.request(method, address, timeout=60, **options)
+                    if response.status_code != 503:
+                        return response
+            time.sleep(0.05)
+
+    def kill(self, rng: random.Random) -> str:
+        """Kill a service or a worker, whichever comes; a service is started anew."""
+        index = rng.randrange(len(self.services))
+        service = self.services[index]
+        pids = [service.process.pid, *service.workers()]
+        if (pid := rng.choice(pids)) == service.process.pid:
+            service.kill()
+            self.services[index] = Service(self.command, self.database)
+            return "service"
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+        return "worker"
+
+    def steps(self) -> list[int]:
+        """Return how far the jobs are, the newest first."""
+        page = self.ask("GET", "/v1/posteriors?limit=200").json()
+        return [item["progress"]["steps"] for item in page["items"]]
+
+
+@contextlib.contextmanager
+def fleet(command: Sequence[str], database: str, services: int) -> Iterator[Fleet]:
+    """Start services, and kill them at the end."""
+    running = Fleet(command, database, [])
+    try:
+        for _ in range(services):
+            running.services.append(Service(command, database))
+        yield running
+    finally:
+        for service in running.services:
+            service.kill()
+
+
+def survived(
+    running: Fleet,
+    bodies: Mapping[str, Any],
+    kills: int,
+    wait: Callable[[Fleet], None],
+    rng: random.Random,
+) -> dict[str, tuple[Any, bytes]]:
+    """Ask for jobs, kill, and return each job's answer and draws when all have ended.
+
+    Parameters
+    ----------
+    running : Fleet
+        The services.
+    bodies : mapping
+        Requests by their idempotency keys.
+    kills : int
+        How many.
+    wait : callable
+        Is called before each.
+    rng : random.Random
+        Says what is killed.
+    """
+    ids = {}
+    for key, body in bodies.items():
+        response = _create(running, key, body)
+        ids[key] = response["id"]
+    for _ in range(kills):
+        wait(running)
+        running.kill(rng)
+    found = {}
+    for key, name in ids.items():
+        path = f"/v1/posteriors/{name}"
+        while (answer := running.ask("GET", path).json())["status"] not in ENDED:
+            time.sleep(0.05)
+        assert answer["status"] == "done", answer
+        draws = running.ask("GET", path + "/draws", headers={"Accept": "application/x-ndjson"})
+        del answer["runtime"], answer["id"]
+        found[key] = answer, draws.content
+        # the same request is the same job still
+        assert _create(running, key, bodies[key])["id"] == name
+    listed = running.ask("GET", "/v1/posteriors?limit=200").json()["items"]
+    assert sorted(item["id"] for item in listed) == sorted(ids.values())
+    return found
+
+
+def _create(running: Fleet, key: str, body: Any) -> Any:
+    response = running.ask("POST", "/v1/posteriors", json=body, headers={"Idempotency-Key": key})
+    assert response.status_code == 202, response.text
+    return response.json()
+
+
+@contextlib.contextmanager
+def postgres() -> Iterator[str | None]:
+    """Run a PostgreSQL of its own, reached through a socket; None where none is installed."""
+    folders = sorted(Path("/usr/lib/postgresql").glob("*/bin"))
+    binaries = shutil.which("initdb") or (str(folders[-1] / "initdb") if folders else None)
+    if binaries is None:
+        yield None
+        return
+    here = Path(binaries).resolve().parent
+    home = Path(tempfile.mkdtemp(prefix="hybridtof-pg-"))
+    who: tuple[str, ...] = ()
+    if os.geteuid() == 0:  # the server refuses to run as root
+        shutil.chown(home, "postgres")
+        who = ("setpriv", "--reuid=postgres", "--regid=postgres", "--clear-groups")
+    run = {"check": True, "stdout": subprocess.DEVNULL, "cwd": home}
+    data = str(home / "data")
+    options = f"-k {home} -c listen_addresses= -c max_connections=60"
+    try:
+        subprocess.run((*who, here / "initdb", "-D", data, "-U", "me", "-A", "trust"), **run)  # type: ignore[call-overload]  # noqa: S603
+        start = (*who, here / "pg_ctl", "-D", data, "-w", "-l", home / "log", "-o", options)
+        subprocess.run((*start, "start"), **run)  # type: ignore[call-overload]  # noqa: S603
+        try:
+            yield f"postgresql://me@/postgres?host={home}"
+        finally:
+            stop = (*who, here / "pg_ctl", "-D", data, "-m", "immediate", "-w", "stop")
+            subprocess.run(stop, **run)  # type: ignore[call-overload]  # noqa: S603
+    finally:
+        shutil.rmtree(home, ignore_errors=True)
+
+
+def requests(count: int) -> dict[str, Any]:
+    """Return small posteriors of real frames, each with a seed of its own."""
+    from service.answers.simulations import simulation_of
+    from service.requests import SimulationRequest
+    from simulator.validated import parse
+
+    sensor = {
+        "kind": "pulsed",
+        "pulse_width_s": 1e-7,
+        "gain": 1.0,
+        "noise": {"read": [1e-4, 1e-4]},
+    }
+    system = {"sensor": sensor, "scene": {"crosstalk": [0.01, 0.02], "discrepancy": 0}}
+    known = system | {
+        "scene": {"object": {"c0": 0.0769, "c1": -0.123, "c2": 0.1}, "crosstalk": [0.01, 0.02]}
+    }
+    path = {"kind": "radial", "from_m": 0.2, "to_m": 2.0, "frames": 20, "spacing": "log"}
+    bodies = {}
+    for seed in range(1, count + 1):
+        asked = parse(SimulationRequest, known | {"trajectory": path, "seed": seed})
+        sampler = {"seed": seed, "target_ess": 3000, "max_seconds": 86_400.0}
+        frames = simulation_of(asked)["frames"]
+        bodies[f"job-{seed}"] = system | {"frames": frames, "sampler": sampler}
+    return bodies
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--jobs", type=int, default=20)
+    parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--postgres", action="store_true")
+    args = parser.parse_args()
+    bodies, rng = requests(args.jobs), random.Random(args.seed)
+    with contextlib.ExitStack() as stack:
+        folder = stack.enter_context(tempfile.TemporaryDirectory())
+        address = f"sqlite:///{folder}/jobs.sqlite"
+        if args.postgres:
+            found = stack.enter_context(postgres())
+            if found is None:
+                sys.exit("PostgreSQL is not installed")
+            address = found
+        begin = time.monotonic()
+        with fleet(SERVE, f"sqlite:///{folder}/undisturbed.sqlite", 1) as alone:
+            expected = survived(alone, bodies, 0, lambda _: None, rng)
+        between = time.monotonic()
+        with fleet(SERVE, address, 2 if args.postgres else 1) as running:
+            disturbed = survived(
+                running, bodies, args.kills, lambda _: time.sleep(rng.uniform(0.5, 5.0)), rng
+            )
+        same = sum(disturbed[key] == expected[key] for key in expected)
+        print(
+            json.dumps(
+                {
+                    "database": "postgresql" if args.postgres else "sqlite",
+                    "jobs": args.jobs,
+                    "kills": args.kills,
+                    "identical": same,
+                    "undisturbed_s": round(between - begin, 1),
+                    "disturbed_s": round(time.monotonic() - between, 1),
+                }
+            )
+        )
+        sys.exit(same != len(expected))
+
+
+if __name__ == "__main__":
+    main()

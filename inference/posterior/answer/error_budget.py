@@ -1,0 +1,278 @@
+"""The error budget of an answer: its draws moved by what the model may be wrong by, and its parts.
+
+A posterior whose scene states no size for the model's error is sampled as if there were none. Then
+every draw is moved by an error of the flux, drawn from what the readings leave of it and followed
+linearly from draws near it (`inference.identifiability.model_response`), and every range by a
+random smooth error of the effective distance. Where sizes are stated, the flux's error is
+integrated out already; draws are moved by that of the distance, and by what a flux error twice as
+large would move them.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from inference.density.collapsed import CollapsedDensity
+from inference.identifiability.experiment import Experiment
+from inference.identifiability.model_response import (
+    ModelResponse,
+    curvature_of_response,
+    model_response,
+)
+from inference.posterior.answer.error_parts import ErrorParts
+from inference.posterior.criticism.discrepancy_check import LargerDiscrepancy
+from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
+from inference.posterior.job import Job
+from simulator.discrepancy import discrepancy_basis
+
+__all__ = ["ErrorBudget", "error_budget"]
+
+Array = NDArray[np.float64]
+
+_REFERENCES = 200  # draws at which the response is computed
+_FRAMES = 20_000  # that this may cost
+_FEWEST = 20
+_TRIED = 12  # of them, at which the response is followed beyond its first order
+_AT_ONCE = 20_000  # draws that are moved
+# what linear response is taken for at most: e-folds of a range, and standard deviations of a prior
+_FARTHEST_RANGE, _FARTHEST = 1.0, 3.0
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ErrorBudget:
+    """How the draws of an answer move with the errors of its model.
+
+    Attributes
+    ----------
+    z : ndarray, shape (m, d)
+        Draws at which the response was computed.
+    log_r : ndarray, shape (m, frames)
+        Their ranges; nan for a frame without object.
+    by_z : ndarray, shape (m, d, 1 + k)
+        Change of z, and with each of k independent standard normal errors.
+    by_log_r : ndarray, shape (m, frames, 1 + k)
+        Change of log r likewise.
+    of_z, of_log_r : ErrorParts of ndarray, shape (d,) and (frames,)
+        Shares of the standard deviation; their squares add up to one.
+    curvature : float
+        What the next order would add to the response to the flux's error, as a share of it, root
+        mean square over ranges and draws; 0 where it was integrated out.
+    """
+
+    z: Array
+    log_r: Array
+    by_z: Array
+    by_log_r: Array
+    of_z: ErrorParts
+    of_log_r: ErrorParts
+    curvature: float
+
+    @functools.cached_property
+    def _tree(self) -> tuple[KDTree, Array]:
+        sd = self.z.std(axis=0)
+        unit = np.where(sd > 0, sd, 1.0)
+        return KDTree(self.z / unit), unit
+
+    def errors(self, count: int, rng: np.random.Generator) -> Array:
+        """Draw errors for draws, shape (count, 1 + k): the first is a constant one."""
+        errors = rng.standard_normal((count, self.by_z.shape[2]))
+        errors[:, 0] = 1.0
+        return errors
+
+    def moved(self, z: Array, errors: Array) -> Array:
+        """Move parameters, shape (n, d), each by the response of the draw nearest to it."""
+        if z.shape[1] == 0:
+            return z
+        result = np.empty_like(z)
+        tree, unit = self._tree
+        for start in range(0, len(z), _AT_ONCE):
+            part = slice(start, start + _AT_ONCE)
+            near = tree.query(z[part] / unit)[1]
+            shift = np.einsum("ndk,nk->nd", self.by_z[near], errors[part])
+            result[part] = z[part] + _bounded(shift, _FARTHEST)
+        return result
+
+    def moved_ranges(self, log_r: Array, errors: Array, ends: Array) -> Array:
+        """Move ranges by the same errors, inside the ends of their prior.
+
+        Parameters
+        ----------
+        log_r : ndarray, shape (n, frames)
+            Draws; nan for a frame without object.
+        errors : ndarray, shape (n, 1 + k)
+            Of each draw.
+        ends : ndarray, shape (n, 2)
+            Lowest and highest log r of the prior at each draw.
+
+        Returns
+        -------
+        ndarray, shape (n, frames)
+            Each range follows the response at the nearest of its own draws: of its own mode.
+        """
+        result = log_r.copy()
+        for j in np.flatnonzero(np.isfinite(log_r).all(axis=0)):
+            order = np.argsort(self.log_r[:, j])
+            places = self.log_r[order, j]
+            right = np.clip(np.searchsorted(places, log_r[:, j]), 1, max(len(places) - 1, 1))
+            right = np.minimum(right, len(places) - 1)
+            left = np.maximum(right - 1, 0)
+            nearer = log_r[:, j] - places[left] < places[right] - log_r[:, j]
+            near = order[np.where(nearer, left, right)]
+            shift = np.einsum("nk,nk->n", self.by_log_r[near, j], errors)
+            result[:, j] += _bounded(shift, _FARTHEST_RANGE)
+        return np.clip(result, ends[:, :1], ends[:, 1:])
+
+
+def _bounded(shift: Array, limit: float) -> Array:
+    return np.asarray(limit * np.tanh(shift / limit))
+
+
+def error_budget(
+    job: Job,
+    density: CollapsedDensity,
+    z: Array,
+    log_r: Array,
+    larger: LargerDiscrepancy | None,
+    sensitivity: PriorSensitivity | None,
+    rng: np.random.Generator,
+) -> ErrorBudget:
+    """Compute the response to the model's errors at draws, and the parts of their spread.
+
+    Parameters
+    ----------
+    job : Job
+        The job.
+    density : CollapsedDensity
+        Its density.
+    z : ndarray, shape (n, d)
+        Draws of equal weight.
+    log_r : ndarray, shape (n, frames)
+        Their ranges; nan for a frame without object.
+    larger : LargerDiscrepancy or None
+        Where the flux's error was integrated out: what one twice as large would change.
+    sensitivity : PriorSensitivity or None
+        Where the answer rests on the law of the ranges: what the reference prior would change, as
+        the last of the errors.
+    rng : numpy.random.Generator
+        Source of randomness.
+
+    Returns
+    -------
+    ErrorBudget
+    """
+    error = job.scene.model_error
+    count = int(np.clip(_FRAMES // max(log_r.shape[1], 1), _FEWEST, _REFERENCES))
+    chosen = np.linspace(0, len(z) - 1, min(count, len(z))).astype(np.intp)
+    flux = 0.0 if error.integrated else error.flux
+    experiments = [
+        Experiment(
+            density.sensor,
+            density.parameters,
+            z[i],
+            log_r[i],
+            density.frames[:, 2],
+            discrepancy=flux or None,
+            common_range=job.scene.motion == "static",
+        )
+        for i in chosen
+    ]
+    readings = density.frames[:, :2]
+    responses = [model_response(each, readings) for each in experiments]
+    curvature = _curvature(experiments, responses, rng) if flux > 0 else 0.0
+    stretch = np.hypot(1.0, min(curvature, 1.0))  # what the next order may add is no less wide
+    by_z = [
+        np.array([each.shift[0] for each in responses])[:, :, None],
+        stretch * np.array([each.parameters for each in responses]),
+    ]
+    by_log_r = [
+        np.array([each.shift[1] for each in responses])[:, :, None],
+        stretch * np.array([each.log_r for each in responses]),
+    ]
+    if larger is not None:
+        by_z.append(np.broadcast_to(larger.of_z[:, None], (*z[chosen].shape, 1)))
+        by_log_r.append(np.broadcast_to(larger.of_log_r[:, None], (*log_r[chosen].shape, 1)))
+    if error.range_m > 0:
+        moved = _range_error(density, log_r[chosen], responses, error.range_m)
+        by_z.append(np.zeros((*z[chosen].shape, moved.shape[2])))
+        by_log_r.append(moved)
+    if sensitivity is not None:
+        by_z.append(np.broadcast_to(sensitivity.of_z[:, None], (*z[chosen].shape, 1)))
+        moved = np.broadcast_to(sensitivity.of_log_r[:, None], (*log_r[chosen].shape, 1))
+        by_log_r.append(moved)
+    of_z, of_log_r = np.concatenate(by_z, axis=2), np.concatenate(by_log_r, axis=2)
+    return ErrorBudget(
+        z[chosen],
+        log_r[chosen],
+        of_z,
+        of_log_r,
+        *_parts(z, log_r, responses, (of_z, of_log_r), integrated=larger is not None),
+        curvature,
+    )
+
+
+def _curvature(
+    experiments: Sequence[Experiment],
+    responses: Sequence[ModelResponse],
+    rng: np.random.Generator,
+) -> float:
+    """Return the share of the response that the next order would add."""
+    missed, size = 0.0, 0.0
+    for i in np.linspace(0, len(experiments) - 1, min(_TRIED, len(experiments))).astype(int):
+        of = responses[i]
+        normal = rng.standard_normal(of.log_r.shape[1])
+        present = np.isfinite(experiments[i].log_r)
+        if not present.any():
+            return 0.0
+        # what is wildly off counts as wholly off, and no more
+        moved = float(np.mean(np.square((of.log_r @ normal + of.shift[1])[present])))
+        off = curvature_of_response(experiments[i], of.error.mean + of.error.spread @ normal)
+        missed += min(off**2, moved)
+        size += moved
+    return float(np.sqrt(missed / size)) if size > 0 else 0.0
+
+
+def _range_error(
+    density: CollapsedDensity, log_r: Array, responses: Sequence[ModelResponse], size: float
+) -> Array:
+    """Return how ranges follow a smooth error of the effective distance, shape (m, frames, k)."""
+    basis = discrepancy_basis(*density.parameters.reach_m)
+    present = np.isfinite(log_r)
+    at = np.where(present, log_r, basis.first)
+    told = np.array([each.told for each in responses])
+    scale = np.where(present, size * told * np.exp(-at), 0.0)
+    return np.asarray(scale[:, :, None] * basis.values(at))
+
+
+def _parts(
+    z: Array,
+    log_r: Array,
+    responses: Sequence[ModelResponse],
+    moved: tuple[Array, Array],
+    *,
+    integrated: bool,
+) -> tuple[ErrorParts, ErrorParts]:
+    """Divide the variance of z and of log r."""
+    mean = {
+        name: np.mean(np.square([getattr(each, name) for each in responses]), axis=0)
+        for name in ("own", "alone", "shared", "sd")
+    }
+    response = [np.square(part[:, :, 1:]).sum(axis=2).mean(axis=0) for part in moved]
+    found = []
+    for values, own, shared, added in (
+        (z, mean["alone"], mean["sd"] - mean["alone"], response[0]),
+        (log_r, mean["own"], mean["shared"], response[1]),
+    ):
+        variance = values.var(axis=0)
+        first = np.fmin(own, variance)
+        scene = variance - first
+        if integrated:  # the draws have the error: what an exact model would leave is the scene's
+            scene = np.clip(shared, 0.0, scene)
+        model = variance - first - scene + added
+        whole = first + scene + model
+        unit = np.where(whole > 0, whole, 1.0)
+        found.append(ErrorParts(*(np.sqrt(part / unit) for part in (first, scene, model))))
+    return found[0], found[1]

@@ -1,0 +1,70 @@
+"""Monte Carlo errors of what draws are summarised to: by how much another seed would move it."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from inference.posterior.sampling.diagnostics import effective_sample_size
+
+__all__ = ["mean_error", "quantile_error"]
+
+Array = NDArray[np.float64]
+
+_ONE_SD = float(stats.norm.cdf(1.0))
+
+
+def _effective(draws: Array, importance_ess: float | None) -> float:
+    """Return the number of independent draws that a mean of these is as good as."""
+    if importance_ess is not None:
+        # resampled by weight, with the error of the weights and that of resampling
+        return 1.0 / (1.0 / importance_ess + 1.0 / draws.size)
+    return effective_sample_size(draws)
+
+
+def mean_error(draws: Array, importance_ess: float | None) -> float:
+    """Return the standard error of the mean of draws.
+
+    Parameters
+    ----------
+    draws : ndarray, shape (ensembles, walkers, steps)
+        Draws of one quantity.
+    importance_ess : float or None
+        Importance sample size of the draws that these were resampled from; None for walkers.
+
+    Returns
+    -------
+    float
+        nan where the draws do not differ.
+    """
+    return float(draws.std()) / math.sqrt(_effective(draws, importance_ess))
+
+
+def quantile_error(draws: Array, at: float, importance_ess: float | None) -> float:
+    """Return the standard error of a quantile of draws (Vehtari et al. 2021).
+
+    The share of draws below the quantile is known like that of so many independent draws: its law
+    is a beta, whose quantiles at one standard deviation to either side are looked up among the
+    draws. No density at the quantile is needed.
+
+    Parameters
+    ----------
+    draws : ndarray, shape (ensembles, walkers, steps)
+        Draws of one quantity.
+    at : float
+        Probability of the quantile.
+    importance_ess : float or None
+        As for `mean_error`.
+
+    Returns
+    -------
+    float
+        nan where the draws do not differ.
+    """
+    below = (draws <= np.quantile(draws, at)).astype(float)
+    n = _effective(below, importance_ess)
+    if not math.isfinite(n):
+        return math.nan
+    shares = stats.beta.ppf([1.0 - _ONE_SD, _ONE_SD], n * at + 1.0, n * (1.0 - at) + 1.0)
+    return 0.5 * float(np.ptp(np.quantile(draws, np.asarray(shares))))

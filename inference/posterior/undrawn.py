@@ -1,0 +1,111 @@
+"""The answer of a job that has drawn nothing: starting points are no draws, and give no intervals.
+
+What can be said without draws is said: the optima that were found, and what the readings should
+tell at the best of them, by the identifiability of the scene.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.density.collapsed import CollapsedDensity
+from inference.density.profile import best_ranges
+from inference.frame.blocks import GAIN
+from inference.identifiability.before_data import identifiability
+from inference.identifiability.status import Identifiability
+from inference.posterior.answer.error_parts import ErrorParts, ParameterErrorParts
+from inference.posterior.answer.folds import near_fold
+from inference.posterior.answer.posterior import (
+    RANGE_COLUMNS,
+    Fit,
+    ParameterSummary,
+    RangeSummary,
+)
+from inference.posterior.findings import Findings
+from inference.posterior.job import Job
+from inference.posterior.stages.stage import Tempering, Walking
+from simulator.errors import HybridTofError
+
+__all__ = ["without_draws"]
+
+Array = NDArray[np.float64]
+
+_NOTHING_DRAWN = "nothing was drawn from the posterior: no intervals are known, give it more time"
+
+
+def without_draws(job: Job, density: CollapsedDensity, stage: Tempering | Walking) -> Findings:
+    """Say what is known of a job that has drawn nothing.
+
+    Parameters
+    ----------
+    job : Job
+        In the scene that is sampled.
+    density : CollapsedDensity
+        Its density.
+    stage : Tempering or Walking
+        Where it stands, with the optima that were found.
+
+    Returns
+    -------
+    Findings
+        Without a number for any unknown or range; frames near a fold are those of the best fit;
+        rows as foreseen, and a fit of which `misfit` is None.
+    """
+    nan, optima = math.nan, stage.proposal.optima.centres
+    no_parts = ParameterErrorParts(nan, nan, nan)
+    nothing = ParameterSummary(nan, nan, no_parts, nan, nan, nan, nan, nan, None, nan, ())
+    best = optima[[int(np.argmax(density(optima)))]]
+    log_r = best_ranges(density, best)[:, :, 0]
+    n = len(job.frames)
+    unknown = {name: np.full(n, nan) for name in RANGE_COLUMNS}
+    folds = near_fold(job, density, best, log_r)
+    return Findings(
+        (_NOTHING_DRAWN, *stage.verdict.reasons),
+        None,
+        dict.fromkeys(density.parameters.names, nothing),
+        RangeSummary(
+            **unknown,
+            sd_parts=ErrorParts(*np.full((3, n), nan)),
+            near_fold=folds,
+            modes=((),) * n,
+        ),
+        _foreseen(job, density, best, log_r[0]),
+        Fit(nan, None, ("not checked: nothing was drawn yet",), nan, nan, (), ()),
+    )
+
+
+def _foreseen(
+    job: Job, density: CollapsedDensity, best: Array, log_r: Array
+) -> tuple[Identifiability, ...]:
+    """Return what frames at the best fit's ranges tell, before any draw.
+
+    No row reads `identified`: that is said of what was drawn, and the best fit may be a false one.
+    """
+    names = density.parameters.names
+    values = density.parameters.natural(best)[0].tolist()
+    present = np.isfinite(log_r)
+    ranges = np.where(present, np.exp(log_r), 1.0)
+    try:
+        found = identifiability(
+            job.sensor,
+            job.scene,
+            ranges.tolist(),
+            present.tolist(),
+            dict(zip(names, values, strict=True)),
+            density.frames[:, GAIN].tolist(),
+        ).identifiability
+    except HybridTofError as error:
+        reason = f"not known yet: nothing was drawn, and nothing can be foreseen ({error})"
+        return tuple(
+            Identifiability(name, "not_identified", math.nan, reason)
+            for name in (*names, "range_m")
+        )
+    rows = []
+    for row in found:
+        status = "weak" if row.status == "identified" else row.status
+        words = row.status.replace("_", " ")
+        reason = f"nothing was drawn; foreseen at the best fit so far: {words}, {row.reason}"
+        rows.append(dataclasses.replace(row, status=status, reason=reason))
+    return tuple(rows)

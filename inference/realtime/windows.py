@@ -1,0 +1,220 @@
+"""Derivatives of readings over windows of frames, each as wide as noise asks and its bias allows.
+
+A moving average of M + 1 first differences is the difference (x_i - x_(i-M-1)) / (M + 1) (App. A,
+25-27 as corrected): a longer window has less noise, and belongs to its centre. So a frame's own
+derivative needs a window around it. Five readings (i - 2 m .. i + 2 m) with Lagrange's weights give
+it to fourth order at any spacing; at the ends, and nowhere else, the frame is not in the middle.
+
+What remains is a bias. Three readings of the same window err by a known multiple of the third
+derivative, five by one of the fifth; of a flux falling as r^-N their ratio follows from that of
+three to five, to within a sixth for N from 2 to 4 (docs/model.md, window). So the bias is estimated
+from readings alone, and stated as a part of the covariance, in the direction in which it points.
+Of all half widths m that is taken whose direction has the least noise and bias together; a window
+whose direction does not agree with those of narrower ones ends the search, whatever it says of
+itself.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.realtime.net import Net
+from simulator.compiled import compiled
+
+__all__ = ["HALF_WIDTHS", "Windows", "differences"]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+HALF_WIDTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
+_NODES = 5
+_AGREEMENT = 2.0  # standard deviations
+_END = 8  # frames from an end, where windows to one side are better than none
+_BENDS = 3.0  # 2 (N + 3) / (N + 1) is 3.3 to 2.8 of a power law of N = 2 to 4
+# 3! 3! / 5!: from products of distances to the factors of the errors of five and of three readings
+_FACTORIALS = 0.3
+
+
+class Windows(NamedTuple):
+    """Differences over the window of every frame, each of shape (n,); nan where none is allowed.
+
+    Attributes
+    ----------
+    first, second : ndarray
+        Derivatives of both readings [reading units / s].
+    var1, var2, cov : ndarray
+        Their noise and bias.
+    direction_sd : ndarray
+        Uncertainty of their direction [rad], in units of the noise.
+    """
+
+    first: Array
+    second: Array
+    var1: Array
+    var2: Array
+    cov: Array
+    direction_sd: Array
+
+
+class _Difference(NamedTuple):
+    """A derivative of both readings, its noise, and the product of distances to other nodes."""
+
+    d1: float
+    d2: float
+    v1: float
+    v2: float
+    v12: float
+    distances: float
+
+
+@compiled
+def _difference(t: Array, net: Net, nodes: Indices, at: int, first: int, last: int) -> _Difference:
+    """Differentiate at one of the nodes ``first`` to ``last``, by Lagrange's weights."""
+    here = nodes[at]
+    x = t[here]
+    d1, d2, v1, v2, v12, own, distances = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0
+    for j in range(first, last + 1):
+        if j == at:
+            continue
+        node = nodes[j]
+        weight = 1.0 / (t[node] - x)
+        distances *= t[node] - x
+        for other in range(first, last + 1):
+            if other not in (j, at):
+                weight *= (x - t[nodes[other]]) / (t[node] - t[nodes[other]])
+        # differences from the frame's own reading, so that a constant cancels exactly
+        d1 += weight * (net.first[node] - net.first[here])
+        d2 += weight * (net.second[node] - net.second[here])
+        v1 += weight * (weight * net.var1[node])
+        v2 += weight * (weight * net.var2[node])
+        v12 += weight * (weight * net.cov[node])
+        own -= weight
+    v1 += own * (own * net.var1[here])
+    v2 += own * (own * net.var2[here])
+    v12 += own * (own * net.cov[here])
+    return _Difference(d1, d2, v1, v2, v12, abs(distances))
+
+
+@compiled
+def _placed(i: int, m: int, start: int, end: int, nodes: Indices) -> tuple[int, int]:
+    """Fill in the nodes of a window of half width m among frames ``start`` to ``end`` - 1.
+
+    Returns how many there are, and the frame's own place among them.
+    """
+    count, at = _placed_from_zero(i - start, m, end - start, nodes)
+    for j in range(count):
+        nodes[j] += start
+    return count, at
+
+
+@compiled
+def _placed_from_zero(i: int, m: int, n: int, nodes: Indices) -> tuple[int, int]:
+    if n < 2:
+        return 0, 0
+    if n < _NODES:
+        for j in range(n):
+            nodes[j] = j
+        return (n, i) if m == 1 else (0, 0)
+    before = 2
+    if i < 2 * m:
+        before = i // m
+    elif i + 2 * m >= n:
+        before = _NODES - 1 - (n - 1 - i) // m
+    if before != 2 and min(i, n - 1 - i) >= _END:
+        return 0, 0
+    low = i - before * m
+    if low < 0 or low + (_NODES - 1) * m >= n:
+        return 0, 0
+    for j in range(_NODES):
+        nodes[j] = low + j * m
+    return _NODES, before
+
+
+@compiled
+def _bias(
+    t: Array,
+    net: Net,
+    nodes: Indices,
+    count: int,
+    at: int,
+    whole: _Difference,
+    s1: float,
+    s2: float,
+) -> tuple[float, float]:
+    """Return about how far a derivative is from the truth, as a vector."""
+    if count == 2:  # nothing tells
+        return 0.0, 0.0
+    few = 3 if count > 3 else 2
+    first = min(max(at - 1, 0), count - few)
+    part = _difference(t, net, nodes, at, first, first + few - 1)
+    b1, b2 = whole.d1 - part.d1, whole.d2 - part.d2
+    if count < _NODES:
+        return b1, b2
+    size = math.hypot(whole.d1 / s1, whole.d2 / s2)
+    bend = math.hypot(b1 / s1, b2 / s2) / size if size > 0.0 else math.inf
+    share = _BENDS * _FACTORIALS * whole.distances / (part.distances * part.distances) * bend
+    return share * b1, share * b2
+
+
+@compiled
+def differences(t: Array, net: Net, gain: Array | None, out: Windows) -> None:
+    """Fill in the differences of n frames.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Times, increasing [s].
+    net : Net
+        Readings of the frames and their noise.
+    gain : ndarray, shape (n,), optional
+        Factors of the frames on the sensor's gain, where windows must not mix them.
+    out : Windows
+        Receives the results.
+    """
+    n = t.size
+    nodes = np.empty(_NODES, dtype=np.intp)
+    angles, sds = np.empty(len(HALF_WIDTHS)), np.empty(len(HALF_WIDTHS))
+    start, end = 0, n
+    for i in range(n):
+        if gain is not None and (i == 0 or i == end):
+            start, end = i, i + 1
+            while end < n and gain[end] == gain[i]:
+                end += 1
+        tried, best, widest = 0, math.inf, 0.0
+        s1, s2 = math.sqrt(net.var1[i]), math.sqrt(net.var2[i])
+        for m in HALF_WIDTHS:
+            count, at = _placed(i, m, start, end, nodes)
+            if count == 0:
+                break
+            whole = _difference(t, net, nodes, at, 0, count - 1)
+            b1, b2 = _bias(t, net, nodes, count, at, whole, s1, s2)
+            x, y = whole.d2 / s2, whole.d1 / s1
+            square = x * x + y * y
+            noise, turn = math.inf, 0.0
+            if square > 0.0:
+                spread = x * x * whole.v1 / s1 / s1 + y * y * whole.v2 / s2 / s2
+                spread -= 2.0 * x * y * whole.v12 / s1 / s2
+                noise = math.sqrt(max(spread, 0.0)) / square
+                turn = abs(x * b1 / s1 - y * b2 / s2) / square
+            # the bias grows with the window, whatever noise makes of its estimate
+            if turn < widest and turn > 0.0:
+                b1, b2 = b1 * widest / turn, b2 * widest / turn
+                turn = widest
+            widest = turn
+            angle, sd = math.atan2(y, x), math.sqrt(noise * noise + turn * turn)
+            agrees = True
+            for earlier in range(tried):
+                off = abs(angle - angles[earlier]) % math.pi
+                off = min(off, math.pi - off)
+                agrees &= off <= _AGREEMENT * math.hypot(sd, sds[earlier])
+            if not agrees:
+                break
+            angles[tried], sds[tried] = angle, sd
+            tried += 1  # noqa: SIM113  # not every width is tried
+            if tried == 1 or sd < best:
+                best = sd
+                out.first[i], out.second[i], out.direction_sd[i] = whole.d1, whole.d2, sd
+                out.var1[i], out.var2[i] = whole.v1 + b1 * b1, whole.v2 + b2 * b2
+                out.cov[i] = whole.v12 + b1 * b2

@@ -1,0 +1,68 @@
+"""Notices when kernels are compiled in this process, and what that takes."""
+
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+__all__ = ["compiling_s", "watch_compiling"]
+
+_EVENT = "numba:compile"  # kernels whose machine code was found on the disk are not in it
+
+
+class _Watch:
+    """What was noticed."""
+
+    def __init__(self) -> None:
+        self.tell: Callable[[bool], None] = lambda _: None
+        self.seconds = 0.0
+        self.listening = False
+        self._depth = 0
+        self._began = 0.0
+
+    def begin(self) -> None:
+        """Take in a beginning: kernels that kernels call are compiled within one another."""
+        self._depth += 1
+        if self._depth == 1:
+            self._began = time.process_time()
+            self.tell(True)
+
+    def end(self) -> None:
+        """Take in an end."""
+        self._depth -= 1
+        if self._depth == 0:
+            self.seconds += time.process_time() - self._began
+            self.tell(False)
+
+
+_watch = _Watch()
+
+
+def watch_compiling(tell: Callable[[bool], None]) -> None:
+    """Be told when compiling begins and ends, from now on, where numba is loaded at all.
+
+    Parameters
+    ----------
+    tell : callable
+        Gets True at the beginning and False at the end; takes the place of the one before.
+    """
+    _watch.tell = tell
+    if not _watch.listening and "numba" in sys.modules:
+        from numba.core import event
+
+        register: Any = event.register  # numba has no types here
+
+        class Listener(event.Listener):
+            def on_start(self, _: Any) -> None:
+                _watch.begin()
+
+            def on_end(self, _: Any) -> None:
+                _watch.end()
+
+        register(_EVENT, Listener())
+        _watch.listening = True
+
+
+def compiling_s() -> float:
+    """Return the processor time that compiling has taken since it is watched [s]."""
+    return _watch.seconds

@@ -1,0 +1,370 @@
+"""Jobs in a database: an SQLite file, or PostgreSQL."""
+
+import contextlib
+import dataclasses
+import json
+import threading
+import time
+from collections.abc import Callable, Collection, Iterator
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.exc import SQLAlchemyError
+
+from service.errors import BusyError, IdempotencyError, StoreError
+from service.store.database import brief, engine_of, is_sqlite, ready
+from service.store.holder import has_ended
+from service.store.record import FINISHED, QUEUED, Claimed, JobRecord, NewJob, Status
+from service.store.tables import CHECKPOINT, JOB
+
+__all__ = ["Retention", "SqlJobStore"]
+
+_LEASE_S = 15.0
+_BRIEF = tuple(
+    JOB.c[field.name]
+    for field in dataclasses.fields(JobRecord)
+    if field.name not in ("result", "problem")
+)
+_ALL = (*_BRIEF, JOB.c.result, JOB.c.problem)
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Retention:
+    """What is kept of jobs that have ended; the oldest go first.
+
+    Attributes
+    ----------
+    jobs : int
+        Jobs, unfinished ones included.
+    draws_bytes : int
+        Bytes of the checkpoints of finished jobs, from which draws are made.
+    age_s : float
+        Seconds since the end.
+    """
+
+    jobs: int
+    draws_bytes: int = 2**30
+    age_s: float = 30 * 86_400.0
+
+
+def _text(value: dict[str, Any] | None) -> str | None:
+    return None if value is None else json.dumps(value, allow_nan=False)
+
+
+def _record(row: sa.Row[Any]) -> JobRecord:
+    fields = dict(row._mapping)
+    for name in ("progress", "result", "problem"):
+        if fields.get(name) is not None:
+            fields[name] = json.loads(fields[name])
+    return JobRecord(**fields)
+
+
+class SqlJobStore:
+    """See `service.store.job_store.JobStore`.
+
+    Parameters
+    ----------
+    url : str
+        SQLAlchemy's address of an SQLite file or a PostgreSQL database.
+    retention : Retention
+        What is kept.
+    busy_s : float
+        How long to wait for others that write, before saying that the store is locked [s].
+    clock : callable
+        Seconds, the same for all processes that share the store: a difference costs work that is
+        done twice, and nothing else.
+
+    Raises
+    ------
+    InvalidInputError
+        Where the database cannot be used.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        retention: Retention,
+        busy_s: float = 5.0,
+        clock: Callable[[], float] = time.time,
+    ) -> None:
+        self.engine = engine_of(url, busy_s)
+        ready(self.engine)
+        self._writing = self.engine.execution_options(writes=True)
+        # writers of one process queue here: SQLite would let them poll
+        self._lock = threading.Lock() if is_sqlite(self.engine) else contextlib.nullcontext()
+        self._insert = sqlite.insert if is_sqlite(self.engine) else postgresql.insert
+        self._retention = retention
+        self._clock = clock
+
+    @contextlib.contextmanager
+    def _read(self) -> Iterator[sa.Connection]:
+        with self._saying("read"), self.engine.begin() as connection:
+            yield connection
+
+    @contextlib.contextmanager
+    def _write(self) -> Iterator[sa.Connection]:
+        with self._saying("written"), self._lock, self._writing.begin() as connection:
+            yield connection
+
+    @contextlib.contextmanager
+    def _saying(self, deed: str) -> Iterator[None]:
+        try:
+            yield
+        except SQLAlchemyError as error:
+            message = f"the store of jobs cannot be {deed} now: {brief(error)}"
+            raise StoreError(message) from error
+
+    def add(self, job: NewJob) -> JobRecord:
+        """See `JobStore.add`."""
+        with self._write() as connection:
+            known = self._of_key(connection, job)
+            if known is not None:
+                return known
+            self._make_room(connection)
+            row = dataclasses.asdict(job) | {
+                "status": "queued",
+                "cancel_requested": False,
+                "number": 0,
+                "revision": 1,
+                "progress": _text(QUEUED),
+                "wall_s": 0.0,
+                "cpu_s": 0.0,
+                "size": 0,
+                "held_until": 0.0,
+            }
+            added = connection.execute(self._insert(JOB).values(row).on_conflict_do_nothing())
+            if not added.rowcount:  # on PostgreSQL a key may come twice at a time
+                known = self._of_key(connection, job)
+                if known is not None:
+                    return known
+            return self._one(connection, job.id)
+
+    @staticmethod
+    def _of_key(connection: sa.Connection, job: NewJob) -> JobRecord | None:
+        if job.key is None:
+            return None
+        same = (JOB.c.client == job.client, JOB.c.key == job.key)
+        row = connection.execute(sa.select(JOB.c.id, JOB.c.digest).where(*same)).one_or_none()
+        if row is None:
+            return None
+        if row.digest != job.digest:
+            raise IdempotencyError("the key came before with another request")
+        return SqlJobStore._one(connection, row.id)
+
+    def _make_room(self, connection: sa.Connection) -> None:
+        count = connection.scalar(sa.select(sa.func.count()).select_from(JOB)) or 0
+        surplus = count - self._retention.jobs + 1
+        if surplus <= 0:
+            return
+        oldest = sa.select(JOB.c.sequence).where(JOB.c.ended.is_not(None)).order_by(JOB.c.sequence)
+        going = connection.scalars(oldest.limit(surplus)).all()
+        if len(going) < surplus:
+            raise BusyError(f"{self._retention.jobs} posteriors are waiting or running")
+        connection.execute(sa.delete(JOB).where(JOB.c.sequence.in_(going)))
+
+    @staticmethod
+    def _one(connection: sa.Connection, job_id: str) -> JobRecord:
+        return _record(connection.execute(sa.select(*_ALL).where(JOB.c.id == job_id)).one())
+
+    def get(self, job_id: str) -> JobRecord | None:
+        """See `JobStore.get`."""
+        with self._read() as connection:
+            row = connection.execute(sa.select(*_ALL).where(JOB.c.id == job_id)).one_or_none()
+        return None if row is None else _record(row)
+
+    def page(self, client: str, after: int | None, limit: int) -> list[JobRecord]:
+        """See `JobStore.page`."""
+        query = sa.select(*_BRIEF).where(JOB.c.client == client)
+        if after is not None:
+            query = query.where(JOB.c.sequence < after)
+        with self._read() as connection:
+            rows = connection.execute(query.order_by(JOB.c.sequence.desc()).limit(limit)).all()
+        return [_record(row) for row in rows]
+
+    def claim(self, holder: str) -> Claimed | None:
+        """See `JobStore.claim`."""
+        now = self._clock()
+        unfinished = JOB.c.status.in_(("queued", "running"))
+        with self._read() as connection:
+            holders = connection.scalars(
+                sa.select(JOB.c.holder).where(unfinished, JOB.c.held_until > now).distinct()
+            ).all()
+        ended = [name for name in holders if name is not None and has_ended(name)]
+        free = sa.or_(JOB.c.held_until <= now, JOB.c.holder.in_(ended))
+        query = sa.select(JOB.c.id).where(unfinished, free).order_by(JOB.c.sequence).limit(1)
+        with self._read() as connection:
+            if connection.scalar(query) is None:  # most often: nothing need be locked to see it
+                return None
+        with self._write() as connection:
+            job_id = connection.scalar(query.with_for_update(skip_locked=True))
+            if job_id is None:
+                return None
+            connection.execute(
+                sa.update(JOB)
+                .where(JOB.c.id == job_id)
+                .values(
+                    status="running",
+                    holder=holder,
+                    held_until=now + _LEASE_S,
+                    revision=JOB.c.revision + 1,
+                )
+            )
+            return self._claimed(connection, job_id)
+
+    @staticmethod
+    def _claimed(connection: sa.Connection, job_id: str) -> Claimed | None:
+        row = connection.execute(sa.select(*_ALL).where(JOB.c.id == job_id)).one_or_none()
+        job = connection.scalar(sa.select(JOB.c.job).where(JOB.c.id == job_id))
+        if row is None or job is None:
+            return None
+        pieces = connection.scalars(
+            sa.select(CHECKPOINT.c.bytes)
+            .where(CHECKPOINT.c.job_id == job_id)
+            .order_by(CHECKPOINT.c.number)
+        ).all()
+        held = tuple(bytes(piece) for piece in pieces)
+        return Claimed(_record(row), bytes(job), held)
+
+    def renew(self, holder: str, job_ids: Collection[str]) -> None:
+        """See `JobStore.renew`."""
+        held = sa.and_(JOB.c.holder == holder, JOB.c.id.in_(list(job_ids)))
+        with self._write() as connection:
+            until = self._clock() + _LEASE_S
+            connection.execute(sa.update(JOB).where(held).values(held_until=until))
+
+    def release(self, holder: str) -> None:
+        """See `JobStore.release`."""
+        with self._write() as connection:
+            free = {"holder": None, "held_until": 0.0}
+            connection.execute(sa.update(JOB).where(JOB.c.holder == holder).values(**free))
+
+    def _follow(
+        self, connection: sa.Connection, record: JobRecord, **values: Any
+    ) -> JobRecord | None:
+        """Change a running job that stands at the number at which it was seen."""
+        same = (JOB.c.id == record.id, JOB.c.number == record.number, JOB.c.status == "running")
+        changed = connection.execute(
+            sa.update(JOB).where(*same).values(revision=JOB.c.revision + 1, **values)
+        )
+        return self._one(connection, record.id) if changed.rowcount else None
+
+    def advance(
+        self,
+        record: JobRecord,
+        data: bytes,
+        whole: bool,
+        progress: dict[str, Any],
+        wall_s: float,
+        cpu_s: float,
+    ) -> JobRecord | None:
+        """See `JobStore.advance`."""
+        number = record.number + 1
+        with self._write() as connection:
+            after = self._follow(
+                connection,
+                record,
+                number=number,
+                progress=_text(progress),
+                wall_s=wall_s,
+                cpu_s=cpu_s,
+                size=len(data) if whole else JOB.c.size + len(data),
+            )
+            if after is None:
+                return None
+            if whole:
+                connection.execute(sa.delete(CHECKPOINT).where(CHECKPOINT.c.job_id == record.id))
+            row = {"job_id": record.id, "number": number, "bytes": data}
+            connection.execute(sa.insert(CHECKPOINT).values(**row))
+            return after
+
+    def report(self, record: JobRecord, progress: dict[str, Any]) -> JobRecord | None:
+        """See `JobStore.report`."""
+        with self._write() as connection:
+            return self._follow(connection, record, progress=_text(progress))
+
+    def finish(
+        self,
+        record: JobRecord,
+        status: Status,
+        result: dict[str, Any] | None,
+        problem: dict[str, Any] | None = None,
+    ) -> JobRecord | None:
+        """See `JobStore.finish`."""
+        # the steps that were made stay; what was foretold has come to an end
+        progress = record.progress | {"eta_s": 0.0 if status == "done" else None}
+        with self._write() as connection:
+            after = self._follow(
+                connection,
+                record,
+                status=status,
+                progress=_text(progress),
+                result=_text(result),
+                problem=_text(problem),
+                ended=self._clock(),
+                holder=None,
+                held_until=0.0,
+            )
+            self._drop_draws(connection)
+            return after
+
+    def restart(self, record: JobRecord, version: str) -> JobRecord | None:
+        """See `JobStore.restart`."""
+        with self._write() as connection:
+            again = {"number": 0, "format": version, "cpu_s": 0.0, "wall_s": 0.0, "size": 0}
+            after = self._follow(connection, record, **again)
+            connection.execute(sa.delete(CHECKPOINT).where(CHECKPOINT.c.job_id == record.id))
+            return after
+
+    def cancel(self, job_id: str) -> JobRecord | None:
+        """See `JobStore.cancel`."""
+        seen = {"cancel_requested": True, "revision": JOB.c.revision + 1}
+        with self._write() as connection:
+            queued = (JOB.c.id == job_id, JOB.c.status == "queued")
+            ended = {"status": "cancelled", "ended": self._clock()}
+            connection.execute(sa.update(JOB).where(*queued).values(**seen, **ended))
+            running = (JOB.c.id == job_id, JOB.c.status == "running")
+            connection.execute(
+                sa.update(JOB).where(*running, ~JOB.c.cancel_requested).values(**seen)
+            )
+            row = connection.execute(sa.select(*_ALL).where(JOB.c.id == job_id)).one_or_none()
+            return None if row is None else _record(row)
+
+    def delete(self, job_id: str) -> bool:
+        """See `JobStore.delete`."""
+        with self._write() as connection:
+            return bool(connection.execute(sa.delete(JOB).where(JOB.c.id == job_id)).rowcount)
+
+    def drawn(self, job_id: str) -> Claimed | None:
+        """See `JobStore.drawn`."""
+        with self._read() as connection:
+            return self._claimed(connection, job_id)
+
+    def sweep(self) -> None:
+        """See `JobStore.sweep`."""
+        with self._write() as connection:
+            old = JOB.c.ended < self._clock() - self._retention.age_s
+            connection.execute(sa.delete(JOB).where(old))
+            self._drop_draws(connection)
+
+    def _drop_draws(self, connection: sa.Connection) -> None:
+        """Forget the checkpoints of the oldest jobs that have ended, where they are too many."""
+        finished = JOB.c.status.in_(sorted(FINISHED))
+        sizes = connection.execute(
+            sa.select(JOB.c.id, JOB.c.size)
+            .where(finished, JOB.c.size > 0)
+            .order_by(JOB.c.sequence.desc())
+        ).all()
+        kept, going = 0, []
+        for job_id, size in sizes:
+            kept += size
+            if kept > self._retention.draws_bytes:
+                going.append(job_id)
+        if going:
+            gone = CHECKPOINT.c.job_id.in_(going)
+            connection.execute(sa.delete(CHECKPOINT).where(gone))
+            connection.execute(sa.update(JOB).where(JOB.c.id.in_(going)).values(size=0))
+
+    def close(self) -> None:
+        """See `JobStore.close`."""
+        self.engine.dispose()

@@ -1,0 +1,48 @@
+"""The tables, as the last migration leaves them."""
+
+import sqlalchemy as sa
+
+__all__ = ["CHECKPOINT", "JOB", "METADATA"]
+
+METADATA = sa.MetaData()
+
+JOB = sa.Table(
+    "job",
+    METADATA,
+    # the order of arrival; 64 bits, but SQLite counts by itself in the type INTEGER alone
+    sa.Column("sequence", sa.BigInteger().with_variant(sa.Integer(), "sqlite"), primary_key=True),
+    sa.Column("id", sa.String(32), nullable=False, unique=True),
+    sa.Column("client", sa.String(64), nullable=False),
+    sa.Column("key", sa.String(255)),
+    sa.Column("digest", sa.String(64), nullable=False),
+    sa.Column("format", sa.String(64), nullable=False),
+    sa.Column("method", sa.String(32), nullable=False),
+    sa.Column("seed", sa.BigInteger, nullable=False),
+    sa.Column("job", sa.LargeBinary, nullable=False),
+    sa.Column("status", sa.String(16), nullable=False),
+    sa.Column("cancel_requested", sa.Boolean, nullable=False),
+    sa.Column("number", sa.Integer, nullable=False),
+    sa.Column("revision", sa.Integer, nullable=False),
+    sa.Column("progress", sa.Text, nullable=False),
+    sa.Column("wall_s", sa.Double, nullable=False),
+    sa.Column("cpu_s", sa.Double, nullable=False),
+    sa.Column("result", sa.Text),
+    sa.Column("problem", sa.Text),
+    sa.Column("size", sa.BigInteger, nullable=False),
+    sa.Column("ended", sa.Double),
+    sa.Column("holder", sa.String(128)),
+    sa.Column("held_until", sa.Double, nullable=False),
+    sa.UniqueConstraint("client", "key", name="job_client_key"),
+    sa.Index("job_status", "status"),
+    sqlite_autoincrement=True,
+)
+
+CHECKPOINT = sa.Table(
+    "checkpoint",
+    METADATA,
+    sa.Column(
+        "job_id", sa.String(32), sa.ForeignKey("job.id", ondelete="CASCADE"), primary_key=True
+    ),
+    sa.Column("number", sa.Integer, primary_key=True),
+    sa.Column("bytes", sa.LargeBinary, nullable=False),
+)

@@ -1,0 +1,151 @@
+"""One worker: a spawned process of one thread, the near end of its pipe, and an eye on it."""
+
+import contextlib
+import multiprocessing
+import os
+import threading
+import time
+from collections.abc import Iterator
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
+from typing import Any
+
+from service.process_watch import ended_by_itself, processor_time
+from service.worker import COMPILING, THREAD_VARIABLES, work
+
+__all__ = ["DiedError", "Watch", "WorkerProcess"]
+
+_LOOK_S = 0.5
+_environment_lock = threading.Lock()
+
+
+class DiedError(Exception):
+    """The process ended, or was ended, before it answered.
+
+    Attributes
+    ----------
+    own : bool
+        Whether it was the task's doing.
+    """
+
+    def __init__(self, message: str, own: bool) -> None:
+        super().__init__(message)
+        self.own = own
+
+
+class Watch:
+    """What a task may take, and what is known of it while it runs.
+
+    Parameters
+    ----------
+    limit_s : float
+        Processor time after which the process is ended [s]; that of compiling does not count.
+    stall_s : float
+        Time without any processor time after which it is ended [s]: it was stopped, or waits for
+        what never comes.
+
+    Attributes
+    ----------
+    compiling : bool
+        Whether machine code is being made.
+    """
+
+    def __init__(self, limit_s: float, stall_s: float) -> None:
+        self.limit_s = limit_s
+        self.stall_s = stall_s
+        self.compiling = False
+
+
+@contextlib.contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Let processes that are started inside inherit the limit of one thread."""
+    with _environment_lock:
+        before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+        os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+        try:
+            yield
+        finally:
+            for name, value in before.items():
+                if value is None:
+                    del os.environ[name]
+                else:
+                    os.environ[name] = value
+
+
+class WorkerProcess:
+    """A process that runs one task at a time.
+
+    It ends with the thread that made it (`service.parent_death`).
+    """
+
+    process: SpawnProcess
+    pipe: "Connection[object, object]"
+
+    def __init__(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.pipe, far = context.Pipe()
+        self.process = context.Process(target=work, args=(far,), daemon=True)
+        with _one_thread_each():
+            self.process.start()
+        far.close()  # so that the process's death is the end of the pipe
+
+    @property
+    def pid(self) -> int:
+        """Its number."""
+        assert self.process.pid is not None  # noqa: S101  (it was started)
+        return self.process.pid
+
+    def ask(self, task: object, watch: Watch) -> tuple[bool, Any]:
+        """Run a task; return whether it succeeded, and its result or exception.
+
+        Raises
+        ------
+        DiedError
+            Where there is no answer to be had; the process has ended then.
+        """
+        try:
+            self.pipe.send(task)
+            while True:
+                self._await(watch)
+                answer: Any = self.pipe.recv()
+                if answer[0] != COMPILING:
+                    return bool(answer[0]), answer[1]
+                watch.compiling = answer[1]
+        except (EOFError, OSError):
+            self.process.join(_LOOK_S)
+            own = ended_by_itself(self.process.exitcode)
+            self.end(kill=True)
+            raise DiedError(f"exit code {self.process.exitcode}", own) from None
+        finally:
+            watch.compiling = False
+
+    def _await(self, watch: Watch) -> None:
+        """Return when there is something to receive.
+
+        On a loaded machine wall time tells nothing: what runs at all takes processor time.
+        """
+        began = self._clock()
+        seen, since = began, time.monotonic()
+        while not self.pipe.poll(_LOOK_S):
+            used, now = self._clock(), time.monotonic()
+            if used > seen:
+                seen, since = used, now
+            if watch.compiling:
+                began = used
+            if used - began > watch.limit_s:
+                self.end(kill=True)
+                raise DiedError(f"more than {watch.limit_s:.0f} s of processor time", own=True)
+            if now - since > watch.stall_s:
+                self.end(kill=True)
+                raise DiedError(f"stood still for {watch.stall_s:.0f} s", own=False)
+
+    def _clock(self) -> float:
+        used = processor_time(self.pid)
+        return time.monotonic() if used is None else used
+
+    def end(self, kill: bool) -> None:
+        """End the process: with its task, or when it has answered."""
+        if kill:
+            self.process.kill()
+        self.pipe.close()
+        self.process.join()

@@ -1,0 +1,88 @@
+"""The linear response to errors of the model, against all unknowns solved at once."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from inference.density.whitened import whitened
+from inference.identifiability.expected_posterior import expected_posterior
+from inference.identifiability.experiment import Experiment
+from inference.identifiability.model_response import curvature_of_response, model_response
+from simulator.parameters import parameters_of
+from simulator.scene import parse_scene
+from tests.posterior.scenes import UNKNOWN_CROSSTALK, sensor_of
+
+Array = NDArray[np.float64]
+
+SUPPORT = {"prior": "reference", "low": 0.02, "high": 15.0}
+
+
+def experiment(
+    kind: str, snr: float, discrepancy: float = 0.07, range_m: object = SUPPORT, *, empty: int = 0
+) -> Experiment:
+    sensor = sensor_of(kind, snr)
+    scene = parse_scene({"crosstalk": UNKNOWN_CROSSTALK, "range_m": range_m})
+    log_r = np.append(np.log(np.geomspace(0.3, 1.5, 15)), np.full(empty, np.nan))
+    z = np.array([0.2, -0.1, 0.3, 0.1, 0.05])
+    return Experiment(sensor, parameters_of(sensor, scene), z, log_r, discrepancy=discrepancy)
+
+
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+@pytest.mark.parametrize("snr", [100.0, 1e4])
+def test_spread_and_response_together_are_the_error_integrated_out(kind: str, snr: float) -> None:
+    """The identity of block inverses; what the support leaves open adds 1e-4 of the precision."""
+    at = experiment(kind, snr, empty=3)
+    found, wanted = model_response(at, at.readings.mean), expected_posterior(at)
+    z = np.hypot(found.sd, np.linalg.norm(found.parameters, axis=1))
+    assert z == pytest.approx(wanted.sd[: z.size], rel=1e-3)
+    log_r = np.sqrt(found.own**2 + found.shared**2 + np.square(found.log_r).sum(axis=1))
+    present = np.isfinite(at.log_r)
+    assert log_r[present] == pytest.approx(wanted.range_sd[present], rel=1e-3)
+    assert np.all(log_r[~present] == 0.0)
+
+
+@pytest.mark.parametrize("range_m", [SUPPORT, {"prior": "normal", "mean": 0.8, "sd": 1e-3}])
+def test_the_shift_is_that_of_all_unknowns_solved_at_once(range_m: dict[str, object]) -> None:
+    at = experiment("pulsed", 1000.0, range_m=range_m)
+    rng = np.random.default_rng(3)
+    n, d, k = at.log_r.size, at.z.size, at.by_error.shape[2]
+    readings = at.readings.mean * (1.0 + 0.02 * rng.standard_normal((n, 1)))
+    frames = np.column_stack([readings, np.ones(n)])
+    of = whitened(at.sensor, at.parameters, frames, at.z, at.log_r)
+    errors = np.einsum("nij,njk->nik", of.whitener, at.by_error)
+    blocks = np.zeros((n, 2, n))
+    blocks[np.arange(n), :, np.arange(n)] = of.along
+    prior, r = at.range_prior, np.exp(at.log_r)
+    rows = np.concatenate([of.jacobian, blocks, errors], axis=2).reshape(2 * n, -1)
+    held = np.zeros((d + n + k, d + n + k))
+    held[np.arange(d + n + k), np.arange(d + n + k)] = [
+        *np.ones(d),
+        *np.full(n, r * prior.inverse_sd),
+        *np.ones(k),
+    ]
+    pull = np.concatenate([-at.z, (prior.mean - r) * prior.inverse_sd, np.zeros(k)])
+    whole, target = np.concatenate([rows, held]), np.append(of.residual.ravel(), pull)
+    integrated = np.linalg.lstsq(whole, target, rcond=None)[0][: d + n]
+    exact = np.linalg.lstsq(whole[:, : d + n], target, rcond=None)[0]
+    found = model_response(at, readings).shift
+    wanted = integrated - exact
+    size = np.abs(wanted[d:]).max()
+    assert found[0] == pytest.approx(wanted[:d], abs=1e-3 * np.abs(wanted[:d]).max())
+    assert found[1] == pytest.approx(wanted[d:], abs=1e-3 * size)
+
+
+def test_a_small_error_is_followed_to_second_order() -> None:
+    """Half the error misses by a quarter."""
+    at, rng = experiment("pulsed", 1000.0), np.random.default_rng(5)
+    coefficients = rng.standard_normal(at.by_error.shape[2])
+    missed = [curvature_of_response(at, np.asarray(s * coefficients)) for s in (0.04, 0.02)]
+    assert missed[1] / missed[0] == pytest.approx(0.25, abs=0.05)
+
+
+def test_a_range_that_the_prior_tells_does_not_follow() -> None:
+    free = experiment("pulsed", 30.0)
+    told = experiment("pulsed", 30.0, range_m={"prior": "normal", "mean": 0.6, "sd": 1e-6})
+    assert np.all(model_response(free, free.readings.mean).told > 0.9)
+    found = model_response(told, told.readings.mean)
+    assert np.all(found.told < 1e-2)
+    assert np.abs(found.log_r).max() < 1e-3 * np.abs(found.parameters).max()

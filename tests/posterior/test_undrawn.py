@@ -1,0 +1,84 @@
+"""A posterior that was stopped before its first draw: starting points are no intervals."""
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from inference.posterior.infer import infer
+from inference.posterior.settings import SamplerSettings
+from service.answers.posteriors import PosteriorResponse, full
+from service.cli import main
+from service.store.record import QUEUED, JobRecord
+from simulator.scene import parse_scene
+from tests.posterior.scenes import UNKNOWN_CROSSTALK, data, sensor_of
+
+NO_TIME = SamplerSettings(seed=1, max_seconds=1e-3)
+SENSOR = sensor_of("pulsed")
+SIMULATED = data(SENSOR, {"crosstalk": [0.002, 0.01]}, frames=8).frames
+# the last without the object, so that it has no range to foresee anything at
+FRAMES = dataclasses.replace(SIMULATED, object_present=np.arange(8) < 7)
+
+
+# with an optional term nothing is decided yet: it stays
+@pytest.mark.parametrize("crosstalk", [UNKNOWN_CROSSTALK, {"values": UNKNOWN_CROSSTALK}])
+def test_nothing_drawn_has_no_numbers_and_says_what_is_foreseen(crosstalk: Any) -> None:
+    if isinstance(crosstalk, dict):
+        crosstalk = crosstalk | {"optional": True}
+    found = infer(SENSOR, parse_scene({"crosstalk": crosstalk}), FRAMES, NO_TIME)
+    assert not found.drawn
+    assert not found.verdict.converged
+    assert any("nothing was drawn" in reason for reason in found.verdict.reasons)
+    assert found.fit.misfit is None
+    assert found.fit.reasons == ("not checked: nothing was drawn yet",)
+    for name in ("q05", "q50", "q95", "mean", "sd"):
+        assert np.isnan(getattr(found.range_m, name)).all()
+        assert all(math.isnan(getattr(row, name)) for row in found.parameters.values())
+    assert set(found.range_m.modes) == {()}
+    assert found.draws.range_m.shape == (1, 1, 0, 8)
+    # eight frames, one of them empty, tell all five unknowns; what is foreseen is not yet found
+    assert [row.parameter for row in found.identifiability] == [*found.parameters, "range_m"]
+    for row in found.identifiability:
+        assert row.status == "weak"
+        assert "foreseen at the best fit so far: identified" in row.reason
+    assert all(mode.weight is None for mode in found.modes)
+    # what OpenAPI says is what is sent
+    result = found.to_json()
+    record = JobRecord("a", "", "emcee", 1, "", 1, 1, "done", False, 1, QUEUED, 0, 0, result)
+    answer = PosteriorResponse.model_validate(full(record))
+    assert answer.model_dump(exclude={"problem"}) == full(record)
+
+
+def test_an_object_at_rest_foresees_what_it_will_never_tell() -> None:
+    still = data(SENSOR, frames=8, span=(0.241, 0.2411)).frames
+    rows = infer(SENSOR, parse_scene({"motion": "static"}), still, NO_TIME).identifiability
+    by_name = {row.parameter: row for row in rows}
+    assert by_name["object.c0"].status == "not_identified"
+    assert "the object must move" in by_name["object.c0"].reason
+
+
+def test_the_command_line_does_not_take_it_for_an_answer(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    frames, scene, draws = (tmp_path / name for name in ("f.json", "s.json", "d.nc"))
+    readings = dict(zip(("w1", "w2"), SIMULATED.readings.T.tolist(), strict=True))
+    frames.write_text(json.dumps(readings))
+    stated = {
+        "sensor": SENSOR.model_dump(mode="json", exclude_none=True),
+        "scene": {"crosstalk": UNKNOWN_CROSSTALK},
+    }
+    scene.write_text(json.dumps(stated))
+    arguments = [str(frames), "--scene", str(scene), "--max-seconds", "0.001", "--seed", "1"]
+    assert main(["infer", *arguments, "--draws", str(draws)]) == 3
+    out, err = capsys.readouterr()
+    printed = json.loads(out)
+    assert printed["drawn"] is False
+    assert printed["fit"]["misfit"] is None
+    assert printed["range_m"]["q50"] == [None] * 8
+    assert "not converged: stopped at the time limit" in err
+    assert "is not written: nothing was drawn" in err
+    assert not draws.exists()

@@ -1,0 +1,48 @@
+"""Services and workers are killed while jobs run; the long version is `make kills`."""
+
+import random
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from benchmarks.kills import Fleet, fleet, postgres, survived
+from tests.service.conftest import FRAMES, SENSOR
+from tests.service.fake_fold import CHUNKS, STEPS
+from tests.service.test_jobs import undisturbed
+from tests.service.test_server import fake_server
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[str, int]]:
+    """Address of a database, and how many services share it."""
+    if request.param == "sqlite":
+        yield f"sqlite:///{tmp_path}/jobs.sqlite", 1
+        return
+    with postgres() as address:
+        if address is None:
+            pytest.skip("no PostgreSQL server is installed")
+        yield address, 2
+
+
+def test_kills_change_nothing(database: tuple[str, int]) -> None:
+    address, services = database
+    sampler = {"seed": 5, "ensembles": 2}
+    body = {"sensor": SENSOR, "scene": {}, "frames": FRAMES, "sampler": sampler}
+    reached = [0]
+
+    def further(running: Fleet) -> None:
+        """Wait until something was computed since the last kill, or all is."""
+        while reached[0] >= (steps := sum(running.steps())) < 3 * CHUNKS * STEPS:
+            time.sleep(0.02)
+        reached[0] = steps
+
+    with fleet(fake_server(sleep=0.2), address, services) as running:
+        bodies = dict.fromkeys("abc", body)
+        found = survived(running, bodies, 4, further, random.Random(2))
+    answers = [answer for answer, _ in found.values()]
+    assert [a["parameters"]["object.c0"]["mean"] for a in answers] == [undisturbed()] * 3
+    assert all(one == found["a"] for one in found.values())
