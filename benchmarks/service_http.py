@@ -17,6 +17,8 @@ import numpy as np
 
 from benchmarks.service_estimates import body
 
+JSON = {"Content-Type": "application/json"}
+
 
 def waits(address: str, until: "Future[httpx.Response] | None", count: int) -> list[float]:
     """Time health checks, ``count`` of them or until a request is answered."""
@@ -50,13 +52,14 @@ def main() -> None:
         address = match[1]
         httpx.get(address + "/health/live").raise_for_status()
         print(f"first health answer after {time.perf_counter() - start:.1f} s")
-        httpx.post(address + "/v1/estimates", content=body(10), timeout=600).raise_for_status()
+        first = httpx.post(address + "/v1/estimates", content=body(10), headers=JSON, timeout=600)
+        first.raise_for_status()
         content = body(n)
         show("idle", waits(address, None, 100))
         with ThreadPoolExecutor(1) as threads:
             start = time.perf_counter()
             batch = threads.submit(
-                httpx.post, address + "/v1/estimates", content=content, timeout=600
+                httpx.post, address + "/v1/estimates", content=content, headers=JSON, timeout=600
             )
             show("during the batch", waits(address, batch, 0))
         response = batch.result()

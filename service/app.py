@@ -10,6 +10,8 @@ from fastapi import FastAPI
 
 from inference.posterior import fold as posterior_fold
 from service import openapi, problems
+from service.border import gate
+from service.border.authorities import Authorities
 from service.fold import Fold
 from service.jobs import Jobs
 from service.process_pool import ProcessPool
@@ -65,10 +67,14 @@ def create_app(
         description="Distance from hybrid intensity/time-of-flight sensors. SI units throughout.",
         lifespan=lifespan,
         redirect_slashes=False,
+        # pages that fetch their scripts from elsewhere; /openapi.json says what they would show
+        docs_url=None,
+        redoc_url=None,
     )
     app.state.shared = shared
     problems.install(app)
     openapi.install(app, ROUTERS)
     for router in ROUTERS:
         app.include_router(router)
+    gate.install(app, ROUTERS, Authorities.of(settings.allowed_hosts))
     return app

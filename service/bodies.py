@@ -1,19 +1,25 @@
 """Request bodies: bytes, bounded; then JSON; then a validated request."""
 
+import re
 from collections.abc import AsyncIterator
+from email.message import Message
 from typing import Generic, TypeVar
 
 import anyio.to_thread
 from fastapi import Request
+from starlette.datastructures import Headers
 
 from service.errors import BodyTooLargeError, MalformedError, UnsupportedMediaTypeError
 from service.shared import shared_of
 from service.strict_json import check_bulk, decode
 from simulator.validated import Validated, parse
 
-__all__ = ["BodyOf", "parse_document", "read_limited"]
+__all__ = ["BodyOf", "check_media_type", "parse_document", "read_limited"]
 
 T = TypeVar("T", bound=Validated)
+
+_JSON = re.compile(r"application/(?:json|[a-z0-9!#$&^_.+-]+\+json)")
+_CHARSETS = frozenset({"utf-8", "utf8", "us-ascii"})
 
 
 def parse_document(model: type[T], raw: bytes) -> T:
@@ -81,15 +87,34 @@ async def read_limited(chunks: AsyncIterator[bytes], declared: str | None, limit
     return bytes(body)
 
 
-def _check_media_type(header: str | None) -> None:
-    """Accept JSON by any of its names, and a body that does not say what it is."""
-    if header is None:
-        return
-    kind = header.split(";")[0].strip().lower()
-    if kind != "application/json" and not (
-        kind.startswith("application/") and kind.endswith("+json")
-    ):
+def check_media_type(headers: Headers) -> None:
+    """Accept JSON in UTF-8 by any of its names, and nothing that does not say that it is.
+
+    A page of somebody else can send forms and plain text without asking, but not this.
+
+    Parameters
+    ----------
+    headers : Headers
+        Of the request.
+
+    Raises
+    ------
+    UnsupportedMediaTypeError
+        Where the body is declared to be something else, in another charset or compressed, or is
+        not declared.
+    """
+    given = headers.getlist("content-type")
+    message = Message()
+    message["Content-Type"] = given[0] if given else "none"
+    kind = message.get_content_type()
+    if len(given) != 1 or not _JSON.fullmatch(kind):
         raise UnsupportedMediaTypeError("Content-Type must be application/json")
+    charset = message.get_content_charset("utf-8")
+    if charset not in _CHARSETS:
+        raise UnsupportedMediaTypeError("the charset must be utf-8")
+    codings = ",".join(headers.getlist("content-encoding")).lower().split(",")
+    if {coding.strip() for coding in codings} - {"", "identity"}:
+        raise UnsupportedMediaTypeError("the body must not be compressed: no Content-Encoding")
 
 
 class BodyOf(Generic[T]):
@@ -115,7 +140,7 @@ class BodyOf(Generic[T]):
         UnsupportedMediaTypeError, BodyTooLargeError, MalformedError, InvalidInputError
             Each as its name says.
         """
-        _check_media_type(request.headers.get("content-type"))
+        check_media_type(request.headers)
         shared = shared_of(request)
         raw = await read_limited(
             request.stream(), request.headers.get("content-length"), shared.settings.max_body_bytes

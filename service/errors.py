@@ -9,6 +9,9 @@
         ├── MalformedError             the body or a header cannot be read at all
         ├── BodyTooLargeError
         ├── UnsupportedMediaTypeError
+        ├── MethodError                no such method for this resource
+        ├── MisdirectedError           for a host that this is not
+        ├── ForeignError               a browser sends it for a page of somebody else
         ├── NotFoundError
         ├── ConflictError              the resource is not in a state to be asked this
         ├── GoneError                  it was there, and is kept no longer
@@ -25,9 +28,12 @@ __all__ = [
     "BodyTooLargeError",
     "BusyError",
     "ConflictError",
+    "ForeignError",
     "GoneError",
     "IdempotencyError",
     "MalformedError",
+    "MethodError",
+    "MisdirectedError",
     "NotAcceptableError",
     "NotFoundError",
     "ServiceError",
@@ -50,7 +56,29 @@ class BodyTooLargeError(ServiceError):
 
 
 class UnsupportedMediaTypeError(ServiceError):
-    """The body is declared to be something else than JSON."""
+    """The body does not say that it is JSON in UTF-8, or says that it is something else."""
+
+
+class MethodError(ServiceError):
+    """The resource does not take this method.
+
+    Attributes
+    ----------
+    allow : str
+        Those that it takes, as in the header.
+    """
+
+    def __init__(self, message: str, allow: str) -> None:
+        super().__init__(message)
+        self.allow = allow
+
+
+class MisdirectedError(ServiceError):
+    """The request is for a host of another name."""
+
+
+class ForeignError(ServiceError):
+    """A browser sends the request for a page that is not of this host."""
 
 
 class NotFoundError(ServiceError):

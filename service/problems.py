@@ -7,12 +7,15 @@ InvalidInputError          422    JSON that breaks a rule; ``errors`` names ever
 RefusedError               422    valid input for which no honest answer exists
 IdempotencyError           422    the key came before with another request
 MalformedError             400    not JSON, or an unreadable header or query parameter
+ForeignError               403    a page of another origin asks
 NotFoundError              404
+MethodError                405    with ``Allow``
 NotAcceptableError         406    no form that ``Accept`` names
 ConflictError              409    not in a state to be asked this
 GoneError                  410    was there, and is kept no longer
 BodyTooLargeError          413
-UnsupportedMediaTypeError  415
+UnsupportedMediaTypeError  415    with what is accepted
+MisdirectedError           421    ``Host`` is not one of the service's names
 BusyError                  503    with ``Retry-After``
 StoreError                 503    with ``Retry-After``; nothing that was accepted is lost
 WorkerDiedError            500    of a job: a chunk of it ended every process that ran it
@@ -38,9 +41,12 @@ from service.errors import (
     BodyTooLargeError,
     BusyError,
     ConflictError,
+    ForeignError,
     GoneError,
     IdempotencyError,
     MalformedError,
+    MethodError,
+    MisdirectedError,
     NotAcceptableError,
     NotFoundError,
     StoreError,
@@ -56,6 +62,7 @@ __all__ = [
     "describe",
     "install",
     "problem_responses",
+    "response_of",
 ]
 
 MEDIA_TYPE = "application/problem+json"
@@ -89,6 +96,9 @@ _KINDS: Mapping[type[HybridTofError], tuple[HTTPStatus, str, str]] = {
     RefusedError: (HTTPStatus(422), "refused", "There is no honest answer to this input"),
     IdempotencyError: (HTTPStatus(422), "idempotency", "The idempotency key was used before"),
     MalformedError: (HTTPStatus.BAD_REQUEST, "malformed", "The request cannot be read"),
+    ForeignError: (HTTPStatus.FORBIDDEN, "foreign", "The request comes from somebody else's page"),
+    MethodError: (HTTPStatus(405), "method-not-allowed", "There is no such method here"),
+    MisdirectedError: (HTTPStatus(421), "misdirected", "The request is for another host"),
     NotFoundError: (HTTPStatus.NOT_FOUND, "not-found", "There is no such resource"),
     NotAcceptableError: (HTTPStatus(406), "not-acceptable", "There is no form that is accepted"),
     ConflictError: (HTTPStatus.CONFLICT, "conflict", "This cannot be asked now"),
@@ -155,13 +165,39 @@ def _response(details: Mapping[str, Any], headers: Mapping[str, str] | None = No
     return Response(body, details["status"], headers, MEDIA_TYPE)
 
 
+def _headers(error: HybridTofError) -> Mapping[str, str]:
+    if isinstance(error, BusyError | StoreError):
+        return {"Retry-After": "5"}
+    if isinstance(error, MethodError):
+        return {"Allow": error.allow}
+    if isinstance(error, UnsupportedMediaTypeError):
+        return {"Accept": "application/json", "Accept-Encoding": "identity"}
+    return {}
+
+
+def response_of(error: HybridTofError) -> Response:
+    """Return the answer to a request that met an exception.
+
+    Parameters
+    ----------
+    error : HybridTofError
+        Anything of the exception tree.
+
+    Returns
+    -------
+    Response
+        With what the status asks for in headers; 500, and a line in the log, where the error is
+        the service's own.
+    """
+    details = describe(error)
+    if details["status"] == HTTPStatus.INTERNAL_SERVER_ERROR:
+        return _internal(error)
+    return _response(details, _headers(error))
+
+
 async def _on_known(_: Request, error: Exception) -> Response:
     assert isinstance(error, HybridTofError)  # noqa: S101 (registered for this class alone)
-    details = describe(error)
-    headers = {"Retry-After": "5"} if isinstance(error, BusyError | StoreError) else None
-    if details["status"] == HTTPStatus.INTERNAL_SERVER_ERROR:
-        return await _on_unknown(_, error)
-    return _response(details, headers)
+    return response_of(error)
 
 
 async def _on_http(_: Request, error: Exception) -> Response:
@@ -185,6 +221,10 @@ async def _on_parameters(_: Request, error: Exception) -> Response:
 
 
 async def _on_unknown(_: Request, error: Exception) -> Response:
+    return _internal(error)
+
+
+def _internal(error: Exception) -> Response:
     reference = uuid.uuid4().hex
     _log.error("internal error %s", reference, exc_info=error)
     detail = f"an error of the service itself; its log has it under {reference}"

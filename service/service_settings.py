@@ -12,6 +12,16 @@ __all__ = ["PREFIX", "ServiceSettings"]
 
 PREFIX = "HYBRIDTOF_"
 Count = Annotated[int, pydantic.Field(ge=1)]
+Host = Annotated[
+    str, pydantic.Field(max_length=255, pattern=r"^(\*|[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?)$")
+]
+
+
+def _split(value: object) -> object:
+    """Return the parts of a list that is separated by commas."""
+    if isinstance(value, str):
+        return tuple(part.strip() for part in value.split(",") if part.strip())
+    return value
 
 
 class ServiceSettings(pydantic.BaseModel):
@@ -25,6 +35,9 @@ class ServiceSettings(pydantic.BaseModel):
         Threads for estimates and simulations.
     max_body_bytes : int
         Largest request body: a million frames of six columns need about 128 MiB.
+    allowed_hosts : tuple of str
+        Names by which the service may be called besides those of loopback, separated by commas in
+        the environment; ``*`` is any.
     database : str or None
         Address of the store of jobs, of an SQLite file or PostgreSQL; None: a file in the user's
         state folder.
@@ -43,6 +56,7 @@ class ServiceSettings(pydantic.BaseModel):
     workers: Count = pydantic.Field(default_factory=lambda: os.cpu_count() or 1)
     threads: Count = 2
     max_body_bytes: Count = 128 * 2**20
+    allowed_hosts: Annotated[tuple[Host, ...], pydantic.BeforeValidator(_split)] = ()
     database: str | None = None
     max_jobs: Count = 1000
     max_draws_bytes: Count = 2**30

@@ -49,6 +49,7 @@ ALLOWED: dict[str, str] = {
     "inference/tracking": f"{_POSTERIOR} inference.estimates",
     "service": "service inference simulator.optics",
     "service/answers": "service inference",
+    "service/border": "service",
     "service/commands": "service inference",
     "service/demo": "service inference",
     "service/exports": "service.fold inference",

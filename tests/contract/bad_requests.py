@@ -189,6 +189,7 @@ SPOILED: tuple[tuple[str, str, Any], ...] = (
     ("identifiability", "/scene/motion", "tangential"),
 )
 UNREADABLE = (b"", b"{", b"\xff\xfe", b"[" * 100, b"null", b"[]", b"NaN", b'{"a": 1, "a": 2}')
+JSON = {"Content-Type": "application/json"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -275,11 +276,13 @@ async def answers() -> dict[str, Any]:
     found: dict[str, Any] = {}
     async with (
         app.router.lifespan_context(app),
-        httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://test") as client,
+        httpx.AsyncClient(
+            transport=httpx.ASGITransport(app), base_url="http://localhost"
+        ) as client,
     ):
         for name, bad in requests().items():
             response = await client.request(
-                bad.method, bad.path, content=bad.content, headers=bad.headers
+                bad.method, bad.path, content=bad.content, headers=JSON | bad.headers
             )
             body = response.json()
             found[name] = {

@@ -75,7 +75,7 @@ async def test_over_http(recording: Recording, kind: str) -> None:
     }
     app = create_app(ServiceSettings(workers=1))
     async with httpx.AsyncClient(
-        transport=httpx.ASGITransport(app), base_url="http://test"
+        transport=httpx.ASGITransport(app), base_url="http://localhost"
     ) as client:
         response = await client.post("/v1/estimates", json=body)
     assert response.status_code == 200

@@ -68,7 +68,9 @@ async def test_over_http() -> None:
     app = create_app(ServiceSettings(workers=1))
     async with (
         app.router.lifespan_context(app),
-        httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://test") as client,
+        httpx.AsyncClient(
+            transport=httpx.ASGITransport(app), base_url="http://localhost"
+        ) as client,
     ):
         for name, (request, pointer) in BROKEN.items():
             response = await client.post("/v1/posteriors", json=request)

@@ -20,7 +20,7 @@ from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 from tests.service import fake_fold
-from tests.service.conftest import FRAMES, SCENE, SENSOR
+from tests.service.conftest import FRAMES, JSON, SCENE, SENSOR
 
 ROUTES = ("/v1/estimates", "/v1/identifiability", "/v1/posteriors", "/v1/simulations")
 SINE_WAVE = {
@@ -160,7 +160,8 @@ def http(loop: asyncio.Runner) -> Iterator[httpx.AsyncClient]:
     lifespan = app.router.lifespan_context(app)
     loop.run(lifespan.__aenter__())
     # an exception that is not answered fails the test with its own traceback
-    yield httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://test")
+    transport = httpx.ASGITransport(app)
+    yield httpx.AsyncClient(transport=transport, base_url="http://localhost", headers=JSON)
     loop.run(lifespan.__aexit__(None, None, None))
 
 

@@ -15,6 +15,7 @@ from service.answers.simulations import SimulationResponse
 from service.app import create_app
 from service.service_settings import ServiceSettings
 from tests.service import fake_fold
+from tests.service.conftest import JSON
 
 pytestmark = pytest.mark.anyio
 
@@ -203,6 +204,9 @@ async def test_media_type(client: httpx.AsyncClient, request_body: dict[str, Any
         "/v1/estimates", content=content, headers={"Content-Type": "text/csv"}
     )
     assert_problem(response, 415)
+    nameless = client.build_request("POST", "/v1/estimates", content=content)
+    del nameless.headers["Content-Type"]
+    assert_problem(await client.send(nameless), 415)
 
 
 async def test_unknown_path_and_method(client: httpx.AsyncClient) -> None:
@@ -210,13 +214,13 @@ async def test_unknown_path_and_method(client: httpx.AsyncClient) -> None:
     assert_problem(await client.get("/v1/estimates/"), 404)
     response = await client.delete("/v1/estimates")
     assert_problem(response, 405)
-    assert response.headers["allow"] == "POST"
+    assert response.headers["allow"] == "OPTIONS, POST"
 
 
 async def test_body_too_large(request_body: dict[str, Any]) -> None:
     app = create_app(ServiceSettings(workers=1, max_body_bytes=1000), fake_fold)
     transport = httpx.ASGITransport(app)
-    async with httpx.AsyncClient(transport=transport, base_url="http://test") as small:
+    async with httpx.AsyncClient(transport=transport, base_url="http://localhost", headers=JSON) as small:
         assert (await small.post("/v1/estimates", json=request_body)).status_code == 200
         request_body["frames"] |= {"w1": [0.5] * 1000}
         assert_problem(await small.post("/v1/estimates", json=request_body), 413)
@@ -261,7 +265,7 @@ async def test_health(client: httpx.AsyncClient) -> None:
 
 async def test_not_ready_before_the_start() -> None:
     transport = httpx.ASGITransport(create_app(ServiceSettings(workers=1), fake_fold))
-    async with httpx.AsyncClient(transport=transport, base_url="http://test") as http:
+    async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as http:
         assert (await http.get("/health/live")).status_code == 200
         response = await http.get("/health/ready")
         assert_problem(response, 503)
@@ -383,7 +387,7 @@ async def test_draws_that_were_dropped(request_body: dict[str, Any]) -> None:
     app = create_app(ServiceSettings(workers=1, max_draws_bytes=1), fake_fold)
     async with (
         app.router.lifespan_context(app),
-        httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://test") as http,
+        httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as http,
     ):
         location = (await http.post("/v1/posteriors", json=request_body)).headers["location"]
         assert (await ended(http, location))["status"] == "done"

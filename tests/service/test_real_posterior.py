@@ -49,7 +49,7 @@ async def test_over_http() -> None:
     transport = httpx.ASGITransport(app)
     async with (
         app.router.lifespan_context(app),
-        httpx.AsyncClient(transport=transport, base_url="http://test") as client,
+        httpx.AsyncClient(transport=transport, base_url="http://localhost") as client,
     ):
         response = await client.post("/v1/posteriors", json=request_body())
         assert response.status_code == 202, response.text
@@ -78,7 +78,7 @@ async def test_refusal_over_http() -> None:
     transport = httpx.ASGITransport(app)
     async with (
         app.router.lifespan_context(app),
-        httpx.AsyncClient(transport=transport, base_url="http://test") as client,
+        httpx.AsyncClient(transport=transport, base_url="http://localhost") as client,
     ):
         body = request_body()
         body["sensor"]["full_scale"] = [1e-9, 1e-9]

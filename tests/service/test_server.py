@@ -16,7 +16,7 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.service.conftest import FRAMES, SCENE, SENSOR
+from tests.service.conftest import FRAMES, JSON, SCENE, SENSOR
 
 pytestmark = pytest.mark.slow
 
@@ -134,7 +134,7 @@ def test_workers_end_with_a_killed_server(tmp_path: Path) -> None:
 
 def test_large_body_is_refused_over_a_socket() -> None:
     with server(*fake_server(1000)) as (_, address), client(address) as http:
-        response = http.post("/v1/estimates", content=b" " * 1001)
+        response = http.post("/v1/estimates", content=b" " * 1001, headers=JSON)
         assert response.status_code == 413
         assert response.headers["content-type"] == "application/problem+json"
 
@@ -144,7 +144,7 @@ def test_health_answers_while_a_large_batch_is_worked_on() -> None:
     content = json.dumps({"sensor": SENSOR, "scene": SCENE, "frames": columns}).encode()
     with server(*hybridtof("serve", "--port", "0")) as (_, address), client(address) as http:
         with ThreadPoolExecutor(1) as threads:
-            batch = threads.submit(http.post, "/v1/estimates", content=content)
+            batch = threads.submit(http.post, "/v1/estimates", content=content, headers=JSON)
             answered = 0
             while not batch.done():
                 assert http.get("/health/live").status_code == 200
