@@ -1,6 +1,7 @@
 # syntax=docker/dockerfile:1
 # docker build -t hybridtof .                          the service
 # docker build --target test .                         runs the suite
+# compose.yaml runs it: on loopback, with a key
 # docker build --build-arg BASE=my/debian-with-python  any base with python3 >= 3.11 and venv
 ARG BASE=python:3.13-slim
 
@@ -42,7 +43,9 @@ RUN useradd --uid 10001 --no-create-home --shell /usr/sbin/nologin hybridtof \
 COPY --from=build /opt/hybridtof /opt/hybridtof
 # machine code of the kernels: compiled at the first use, kept for as long as the volume
 # jobs: for as long as the volume, or where HYBRIDTOF_DATABASE says
+# keys: whoever reaches the container's network must have one; docker compose run hybridtof keys create NAME
 ENV NUMBA_CACHE_DIR=/var/cache/hybridtof \
+    HYBRIDTOF_API_KEYS=/var/lib/hybridtof/keys.json \
     HYBRIDTOF_DATABASE=sqlite:////var/lib/hybridtof/jobs.sqlite
 VOLUME /var/lib/hybridtof
 USER hybridtof

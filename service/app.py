@@ -12,6 +12,8 @@ from inference.posterior import fold as posterior_fold
 from service import openapi, problems
 from service.border import gate
 from service.border.authorities import Authorities
+from service.border.keys import KeyRing
+from service.border.traces import Traces
 from service.fold import Fold
 from service.jobs import Jobs
 from service.process_pool import ProcessPool
@@ -44,14 +46,16 @@ def create_app(
     Raises
     ------
     InvalidInputError
-        Where the database of the settings cannot be used.
+        Where the database or the keys of the settings cannot be used.
     """
     settings = settings or ServiceSettings()
     pool = ProcessPool(settings.workers)
     retention = Retention(settings.max_jobs, settings.max_draws_bytes, settings.keep_days * 86_400)
     store = SqlJobStore(settings.database or default_url(), retention)
     jobs = Jobs(fold, store, pool, running=settings.workers)
-    shared = Shared(settings, jobs, anyio.CapacityLimiter(settings.threads))
+    traces = Traces(store.counts)
+    shared = Shared(settings, jobs, anyio.CapacityLimiter(settings.threads), traces)
+    keys = None if settings.api_keys is None else KeyRing(settings.api_keys)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -76,5 +80,5 @@ def create_app(
     openapi.install(app, ROUTERS)
     for router in ROUTERS:
         app.include_router(router)
-    gate.install(app, ROUTERS, Authorities.of(settings.allowed_hosts))
+    gate.install(app, ROUTERS, Authorities.of(settings.allowed_hosts), keys, traces)
     return app

@@ -11,6 +11,7 @@
         ├── UnsupportedMediaTypeError
         ├── MethodError                no such method for this resource
         ├── MisdirectedError           for a host that this is not
+        ├── UnauthorizedError          without a key that is known
         ├── ForeignError               a browser sends it for a page of somebody else
         ├── NotFoundError
         ├── ConflictError              the resource is not in a state to be asked this
@@ -38,6 +39,7 @@ __all__ = [
     "NotFoundError",
     "ServiceError",
     "StoreError",
+    "UnauthorizedError",
     "UnsupportedMediaTypeError",
     "WorkerDiedError",
 ]
@@ -75,6 +77,10 @@ class MethodError(ServiceError):
 
 class MisdirectedError(ServiceError):
     """The request is for a host of another name."""
+
+
+class UnauthorizedError(ServiceError):
+    """The request has no API key, or none that is known."""
 
 
 class ForeignError(ServiceError):

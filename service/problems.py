@@ -7,6 +7,7 @@ InvalidInputError          422    JSON that breaks a rule; ``errors`` names ever
 RefusedError               422    valid input for which no honest answer exists
 IdempotencyError           422    the key came before with another request
 MalformedError             400    not JSON, or an unreadable header or query parameter
+UnauthorizedError          401    with ``WWW-Authenticate``
 ForeignError               403    a page of another origin asks
 NotFoundError              404
 MethodError                405    with ``Allow``
@@ -50,6 +51,7 @@ from service.errors import (
     NotAcceptableError,
     NotFoundError,
     StoreError,
+    UnauthorizedError,
     UnsupportedMediaTypeError,
     WorkerDiedError,
 )
@@ -61,6 +63,7 @@ __all__ = [
     "ProblemDetails",
     "describe",
     "install",
+    "internal",
     "problem_responses",
     "response_of",
 ]
@@ -96,6 +99,7 @@ _KINDS: Mapping[type[HybridTofError], tuple[HTTPStatus, str, str]] = {
     RefusedError: (HTTPStatus(422), "refused", "There is no honest answer to this input"),
     IdempotencyError: (HTTPStatus(422), "idempotency", "The idempotency key was used before"),
     MalformedError: (HTTPStatus.BAD_REQUEST, "malformed", "The request cannot be read"),
+    UnauthorizedError: (HTTPStatus.UNAUTHORIZED, "unauthorized", "A key is needed"),
     ForeignError: (HTTPStatus.FORBIDDEN, "foreign", "The request comes from somebody else's page"),
     MethodError: (HTTPStatus(405), "method-not-allowed", "There is no such method here"),
     MisdirectedError: (HTTPStatus(421), "misdirected", "The request is for another host"),
@@ -168,6 +172,8 @@ def _response(details: Mapping[str, Any], headers: Mapping[str, str] | None = No
 def _headers(error: HybridTofError) -> Mapping[str, str]:
     if isinstance(error, BusyError | StoreError):
         return {"Retry-After": "5"}
+    if isinstance(error, UnauthorizedError):
+        return {"WWW-Authenticate": 'Bearer realm="hybridtof"'}
     if isinstance(error, MethodError):
         return {"Allow": error.allow}
     if isinstance(error, UnsupportedMediaTypeError):
@@ -191,7 +197,7 @@ def response_of(error: HybridTofError) -> Response:
     """
     details = describe(error)
     if details["status"] == HTTPStatus.INTERNAL_SERVER_ERROR:
-        return _internal(error)
+        return internal(error)
     return _response(details, _headers(error))
 
 
@@ -221,10 +227,17 @@ async def _on_parameters(_: Request, error: Exception) -> Response:
 
 
 async def _on_unknown(_: Request, error: Exception) -> Response:
-    return _internal(error)
+    return internal(error)
 
 
-def _internal(error: Exception) -> Response:
+def internal(error: Exception) -> Response:
+    """Return the answer to a request that met a fault of the service, and write it down.
+
+    Parameters
+    ----------
+    error : Exception
+        The fault, of which the answer tells nothing but where the log has it.
+    """
     reference = uuid.uuid4().hex
     _log.error("internal error %s", reference, exc_info=error)
     detail = f"an error of the service itself; its log has it under {reference}"

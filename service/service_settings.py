@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated
 
 import pydantic
@@ -35,6 +36,9 @@ class ServiceSettings(pydantic.BaseModel):
         Threads for estimates and simulations.
     max_body_bytes : int
         Largest request body: a million frames of six columns need about 128 MiB.
+    api_keys : Path or None
+        File of the keys of those who may use the service (``hybridtof keys``); None: everybody who
+        can reach it.
     allowed_hosts : tuple of str
         Names by which the service may be called besides those of loopback, separated by commas in
         the environment; ``*`` is any.
@@ -56,6 +60,7 @@ class ServiceSettings(pydantic.BaseModel):
     workers: Count = pydantic.Field(default_factory=lambda: os.cpu_count() or 1)
     threads: Count = 2
     max_body_bytes: Count = 128 * 2**20
+    api_keys: Path | None = None
     allowed_hosts: Annotated[tuple[Host, ...], pydantic.BeforeValidator(_split)] = ()
     database: str | None = None
     max_jobs: Count = 1000

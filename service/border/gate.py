@@ -1,14 +1,17 @@
-"""The outermost application: it lets requests in, and dresses what goes out."""
+"""The outermost application: it lets requests in, dresses what goes out, and tells of both."""
 
-from collections.abc import Awaitable, Callable, Sequence
+import time
+from collections.abc import Sequence
 
 from fastapi import APIRouter, FastAPI
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.border.authorities import Authorities
+from service.border.keys import KeyRing
 from service.border.methods import Methods
-from service.problems import response_of
+from service.border.traces import REQUEST_ID, Told, Traces, request_id
+from service.problems import internal, response_of
 from simulator.errors import HybridTofError
 
 __all__ = ["Gate", "install"]
@@ -21,6 +24,8 @@ _HEADERS = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
 }
+# who starts and stops the service must see whether it lives, and has no key
+_WITHOUT_KEY = frozenset({"/health/live", "/health/ready"})
 
 
 class Gate:
@@ -32,43 +37,82 @@ class Gate:
         Which answers what is let in.
     authorities : Authorities
         By which names, and from whose pages, it may be asked.
+    keys : KeyRing or None
+        Who may ask; None: everybody who can reach it.
+    traces : Traces
+        Is told of every request.
     """
 
-    def __init__(self, app: ASGIApp, authorities: Authorities) -> None:
+    def __init__(
+        self, app: ASGIApp, authorities: Authorities, keys: KeyRing | None, traces: Traces
+    ) -> None:
         self._app = app
         self._authorities = authorities
+        self._keys = keys
+        self._traces = traces
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request, or refuse it."""
-        if scope["type"] not in ("http", "websocket"):
+        if scope["type"] == "http":
+            await self._request(scope, receive, send)
+        elif scope["type"] == "websocket":
+            try:
+                self._let_in(scope)
+            except HybridTofError:
+                await send({"type": "websocket.close", "code": 1008})
+            else:
+                await self._app(scope, receive, send)
+        else:
             await self._app(scope, receive, send)
-            return
+
+    def _let_in(self, scope: Scope) -> None:
+        """Refuse a request, or note whose it is."""
+        headers = Headers(scope=scope)
+        self._authorities.check(headers)
+        if self._keys is not None and scope["path"] not in _WITHOUT_KEY:
+            given = headers.getlist("authorization")
+            scope["hybridtof.client"] = self._keys.owner(given[0] if len(given) == 1 else None)
+
+    async def _request(self, scope: Scope, receive: Receive, send: Send) -> None:
+        name = request_id(Headers(scope=scope).get("x-request-id"))
+        before = REQUEST_ID.set(name)
+        began, status, sent = time.perf_counter(), None, 0
 
         async def send_dressed(message: Message) -> None:
+            nonlocal status, sent
             if message["type"] == "http.response.start":
+                status = message["status"]
                 headers = MutableHeaders(scope=message)
-                for name, value in _HEADERS.items():
-                    headers.setdefault(name, value)
+                headers["X-Request-ID"] = name
+                for header, value in _HEADERS.items():
+                    headers.setdefault(header, value)
+            else:
+                sent += len(message.get("body", b""))
             await send(message)
 
+        self._traces.open.inc()
         try:
-            self._authorities.check(Headers(scope=scope))
+            self._let_in(scope)
             await self._app(scope, receive, send_dressed)
         except HybridTofError as error:  # of the border: those of the routes are answered there
-            await _refuse(error)(scope, receive, send_dressed)
+            await response_of(error)(scope, receive, send_dressed)
+        except Exception as error:
+            # Starlette has answered, where it could, and written it down: the server need not again
+            if status is None:
+                await internal(error)(scope, receive, send_dressed)
+        finally:
+            self._traces.open.dec()
+            self._traces.tell(scope, Told(status, sent, time.perf_counter() - began))
+            REQUEST_ID.reset(before)
 
 
-def _refuse(error: HybridTofError) -> Callable[[Scope, Receive, Send], Awaitable[None]]:
-    async def refusal(scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] == "websocket":
-            await send({"type": "websocket.close", "code": 1008})
-        else:
-            await response_of(error)(scope, receive, send)
-
-    return refusal
-
-
-def install(app: FastAPI, routers: Sequence[APIRouter], authorities: Authorities) -> None:
+def install(
+    app: FastAPI,
+    routers: Sequence[APIRouter],
+    authorities: Authorities,
+    keys: KeyRing | None,
+    traces: Traces,
+) -> None:
     """Put the gate before an application: outside of all that FastAPI answers by itself.
 
     Parameters
@@ -77,13 +121,13 @@ def install(app: FastAPI, routers: Sequence[APIRouter], authorities: Authorities
         The application.
     routers : sequence of APIRouter
         Its routers.
-    authorities : Authorities
+    authorities, keys, traces
         See `Gate`.
     """
     build = app.build_middleware_stack
     routes = [*app.routes, *(route for router in routers for route in router.routes)]
 
     def built() -> ASGIApp:
-        return Gate(Methods(build(), routes), authorities)
+        return Gate(Methods(build(), routes), authorities, keys, traces)
 
     app.build_middleware_stack = built  # type: ignore[method-assign]  # nothing is outside of it

@@ -7,7 +7,7 @@ import argparse
 from collections.abc import Callable
 
 from service import reproduce
-from service.commands import estimate, identifiability, infer, schema, serve, simulate, track
+from service.commands import estimate, identifiability, infer, keys, schema, serve, simulate, track
 from service.commands.command import Subparsers
 from service.demo import command as demo
 from service.report import command as report
@@ -23,6 +23,7 @@ COMMANDS: tuple[AddParser, ...] = (
     infer.add_parser,
     track.add_parser,
     identifiability.add_parser,
+    keys.add_parser,
     schema.add_parser,
     reproduce.add_parser,
     demo.add_parser,

@@ -4,6 +4,7 @@ import argparse
 import os
 
 from service.commands.command import Subparsers, add_command
+from simulator.errors import InvalidInputError
 
 __all__ = ["add_parser"]
 
@@ -16,13 +17,15 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
         _run,
         brief="serve over HTTP until SIGTERM",
         description="Serve over HTTP. Posteriors are kept in an SQLite file in the user's state "
-        "folder, or where HYBRIDTOF_DATABASE says. Other environment variables are optional: "
+        "folder, or where HYBRIDTOF_DATABASE says. Beyond loopback it needs HYBRIDTOF_API_KEYS, a "
+        "file that hybridtof keys makes, and HYBRIDTOF_ALLOWED_HOSTS, its names there. Other "
+        "environment variables are optional: "
         "HYBRIDTOF_WORKERS, HYBRIDTOF_THREADS, HYBRIDTOF_MAX_BODY_BYTES, HYBRIDTOF_MAX_JOBS, "
         "HYBRIDTOF_MAX_DRAWS_BYTES, HYBRIDTOF_KEEP_DAYS, HYBRIDTOF_SHUTDOWN_S.",
         examples="""
             hybridtof serve
             hybridtof serve --port 8080
-            HYBRIDTOF_WORKERS=2 hybridtof serve --host 0.0.0.0
+            HYBRIDTOF_API_KEYS=keys.json hybridtof serve --host 0.0.0.0
         """,
     )
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (%(default)s)")
@@ -41,18 +44,26 @@ def _run(args: argparse.Namespace) -> int:
     import uvicorn
 
     from service.app import create_app
+    from service.border.authorities import is_loopback
+    from service.border.keys import POINTER
+    from service.logs import log_config
     from service.service_settings import ServiceSettings
 
     settings = ServiceSettings.from_environment(os.environ)
+    if settings.api_keys is None and not is_loopback(args.host):
+        raise InvalidInputError.at(
+            POINTER,
+            f"is needed to listen on {args.host}, where others can ask: hybridtof keys create NAME",
+        )
     config = uvicorn.Config(
         create_app(settings),
         host=args.host,
         port=args.port,
-        # a line a request goes to standard output, which is for results
+        # requests have a line of their own, on standard error: standard output is for results
         access_log=False,
         # an open connection must not hold up the end
         timeout_graceful_shutdown=round(settings.shutdown_s),
-        log_level="warning" if args.quiet else "info",
+        log_config=log_config("warning" if args.quiet else "info"),
     )
     server = uvicorn.Server(config)
     try:

@@ -6,6 +6,7 @@ from service.routes import (
     estimates,
     health,
     identifiability,
+    metrics,
     posteriors,
     simulations,
     techniques,
@@ -20,4 +21,5 @@ ROUTERS: tuple[APIRouter, ...] = (
     simulations.router,
     techniques.router,
     health.router,
+    metrics.router,
 )

@@ -19,7 +19,7 @@ from service.exports import EXPORTS
 from service.exports.negotiation import accepted_export
 from service.problems import problem_responses
 from service.requests import PosteriorRequest
-from service.shared import shared_of
+from service.shared import client_of, shared_of
 from service.store.record import FINISHED, JobRecord
 
 __all__ = ["router"]
@@ -55,7 +55,9 @@ async def create(
         checked_frames, asked.sensor, asked.scene, asked.frames, limiter=shared.threads
     )
     digest = hashlib.sha256(raw).hexdigest()
-    record = await shared.jobs.submit(*checked, asked.sampler, key=key, digest=digest)
+    record = await shared.jobs.submit(
+        *checked, asked.sampler, key=key, digest=digest, client=client_of(request)
+    )
     return JSONResponse(full(record), 202, {"Location": f"/v1/posteriors/{record.id}"})
 
 
@@ -73,7 +75,7 @@ async def page(
     if cursor is not None and not re.fullmatch(r"[0-9]{1,18}", cursor):
         raise MalformedError("the cursor is not one that this service gave")
     after = None if cursor is None else int(cursor)
-    records = await shared_of(request).jobs.page(after, limit + 1)
+    records = await shared_of(request).jobs.page(after, limit + 1, client_of(request))
     more = str(records[limit - 1].sequence) if len(records) > limit else None
     return JSONResponse({"items": [brief(r) for r in records[:limit]], "next_cursor": more})
 
@@ -85,7 +87,7 @@ async def page(
 )
 async def get(request: Request, job_id: str) -> Response:
     """Return a posterior as it stands."""
-    return JSONResponse(full(await shared_of(request).jobs.get(job_id)))
+    return JSONResponse(full(await shared_of(request).jobs.get(job_id, client_of(request))))
 
 
 async def _followed(
@@ -97,10 +99,10 @@ async def _followed(
     known = last_event_id or ""
     after = int(known) if re.fullmatch(r"[0-9]{1,9}", known) else 0
     jobs = shared_of(request).jobs
-    record = await jobs.get(job_id)
+    record = await jobs.get(job_id, client_of(request))
     if record.status in FINISHED and record.revision <= after:
         raise HTTPException(204)  # so that a browser asks no more
-    return jobs.follow(job_id, after)
+    return jobs.follow(job_id, after, client_of(request))
 
 
 @router.get(
@@ -137,7 +139,7 @@ async def draws(request: Request, job_id: str) -> Response:
     if form is None:
         names = " or ".join(form.media_type for form in EXPORTS)
         raise NotAcceptableError(f"draws come as {names}")
-    data = await shared_of(request).jobs.draws(job_id, form.media_type)
+    data = await shared_of(request).jobs.draws(job_id, form.media_type, client_of(request))
     name = f'attachment; filename="{job_id}{form.suffix}"'
     headers = {"Content-Disposition": name, "Vary": "Accept"}
     return Response(data, headers=headers, media_type=form.media_type)
@@ -151,11 +153,11 @@ async def draws(request: Request, job_id: str) -> Response:
 )
 async def cancel(request: Request, job_id: str) -> Response:
     """End a posterior after the chunk that runs; it keeps what it has. One that ended stays."""
-    return JSONResponse(full(await shared_of(request).jobs.cancel(job_id)), 202)
+    return JSONResponse(full(await shared_of(request).jobs.cancel(job_id, client_of(request))), 202)
 
 
 @router.delete("/{job_id}", status_code=204, response_model=None, responses=problem_responses(404))
 async def delete(request: Request, job_id: str) -> Response:
     """Forget a posterior, running or not."""
-    await shared_of(request).jobs.delete(job_id)
+    await shared_of(request).jobs.delete(job_id, client_of(request))
     return Response(status_code=204)

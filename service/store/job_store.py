@@ -40,6 +40,10 @@ class JobStore(Protocol):
         """Return up to ``limit`` jobs of a client, newest first, from before sequence ``after``."""
         ...
 
+    def counts(self) -> dict[str, int]:
+        """Return how many jobs have each status."""
+        ...
+
     def claim(self, holder: str) -> Claimed | None:
         """Take the oldest unfinished job that nobody holds; None where there is none."""
         ...

@@ -182,6 +182,12 @@ class SqlJobStore:
             rows = connection.execute(query.order_by(JOB.c.sequence.desc()).limit(limit)).all()
         return [_record(row) for row in rows]
 
+    def counts(self) -> dict[str, int]:
+        """See `JobStore.counts`."""
+        query = sa.select(JOB.c.status, sa.func.count()).group_by(JOB.c.status)
+        with self._read() as connection:
+            return {row.status: row[1] for row in connection.execute(query)}
+
     def claim(self, holder: str) -> Claimed | None:
         """See `JobStore.claim`."""
         now = self._clock()

@@ -77,3 +77,12 @@ async def told(address: str, *lines: str, body: bytes = b"") -> tuple[int, dict[
     first, *rest = head.decode("latin-1").split("\r\n")
     pairs = (line.split(": ", 1) for line in rest)
     return int(first.split()[1]), {name.lower(): value for name, value in pairs}, content
+
+
+def speaking(address: str, headers: dict[str, str] | None = None) -> httpx.AsyncClient:
+    """A client that waits for as long as the server lives."""
+    return httpx.AsyncClient(
+        base_url=address,
+        headers=headers,
+        timeout=None,  # noqa: S113  (a clock knows no load)
+    )

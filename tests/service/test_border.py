@@ -1,18 +1,20 @@
 """What is let in, and how answers are dressed: over a socket."""
 
 import json
+import logging
+import re
 from collections.abc import AsyncIterator
 from typing import Any
 
-import httpx
 import pytest
 
 from service.app import create_app
 from service.border.authorities import is_loopback
+from service.logs import JsonLines
 from service.service_settings import ServiceSettings
 from simulator.errors import InvalidInputError
 from tests.service import fake_fold
-from tests.service.conftest import JSON, listening, told
+from tests.service.conftest import JSON, listening, speaking, told
 
 pytestmark = pytest.mark.anyio
 
@@ -97,7 +99,7 @@ async def test_what_the_body_is(
 
 async def test_head(address: str, request_body: dict[str, Any]) -> None:
     """Where GET is, with its headers, and with an end where GET has none."""
-    async with httpx.AsyncClient(base_url=f"http://{address}") as http:
+    async with speaking(f"http://{address}") as http:
         made = (await http.post("/v1/posteriors", json=request_body)).headers["location"]
         for path in ("/health/live", "/v1/techniques", "/v1/posteriors", "/openapi.json"):
             got, head = await http.get(path), await http.head(path)
@@ -114,7 +116,7 @@ async def test_head(address: str, request_body: dict[str, Any]) -> None:
 
 
 async def test_every_answer_is_dressed(address: str) -> None:
-    async with httpx.AsyncClient(base_url=f"http://{address}") as http:
+    async with speaking(f"http://{address}") as http:
         answers = [
             await http.get("/health/live"),
             await http.get("/v1/nothing"),
@@ -144,3 +146,38 @@ def test_loopback(name: str, own: bool) -> None:
 def test_hosts_that_are_none(text: str) -> None:
     with pytest.raises(InvalidInputError, match="HYBRIDTOF_ALLOWED_HOSTS"):
         ServiceSettings.from_environment({"HYBRIDTOF_ALLOWED_HOSTS": text})
+
+
+async def test_traces(address: str, request_body: dict[str, Any]) -> None:
+    """A line and a count for every request, and nothing in them of what was said."""
+    records: list[logging.LogRecord] = []
+
+    class Kept(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            records.append(record)
+
+    handler = Kept()
+    log = logging.getLogger("hybridtof.requests")
+    log.addHandler(handler)
+    log.setLevel(logging.INFO)
+    word = {"Authorization": "Bearer secret-word", "X-Request-ID": "mine-7"}
+    async with speaking(f"http://{address}") as http:
+        answer = await http.get("/v1/posteriors?cursor=secret-word", headers=word)
+        assert answer.headers["x-request-id"] == "mine-7"
+        odd = await http.get("/v1/posteriors/secret-word", headers={"X-Request-ID": 'a"b'})
+        assert len(odd.headers["x-request-id"]) == 32
+        await http.request("SECRET-WORD", "/secret-word")
+        assert (await http.post("/v1/posteriors", json=request_body)).status_code == 202
+        counts = (await http.get("/metrics")).text
+    log.removeHandler(handler)
+    lines = [JsonLines().format(record) for record in records]
+    assert [json.loads(line)["status"] for line in lines] == [400, 404, 404, 202, 200]
+    assert "secret-word" not in "".join(lines).lower() + counts.lower()
+    for line in (
+        'hybridtof_requests_total{method="GET",route="/v1/posteriors/{job_id}",status="404"} 1.0',
+        'hybridtof_requests_total{method="other",route="none",status="404"} 1.0',
+        'hybridtof_request_seconds_count{route="/v1/posteriors"} 2.0',
+        "hybridtof_requests_open 1.0",
+    ):
+        assert line in counts
+    assert re.search(r'hybridtof_posteriors\{status="[a-z]+"\} 1.0', counts)

@@ -220,7 +220,8 @@ async def test_unknown_path_and_method(client: httpx.AsyncClient) -> None:
 async def test_body_too_large(request_body: dict[str, Any]) -> None:
     app = create_app(ServiceSettings(workers=1, max_body_bytes=1000), fake_fold)
     transport = httpx.ASGITransport(app)
-    async with httpx.AsyncClient(transport=transport, base_url="http://localhost", headers=JSON) as small:
+    address = "http://localhost"
+    async with httpx.AsyncClient(transport=transport, base_url=address, headers=JSON) as small:
         assert (await small.post("/v1/estimates", json=request_body)).status_code == 200
         request_body["frames"] |= {"w1": [0.5] * 1000}
         assert_problem(await small.post("/v1/estimates", json=request_body), 413)
