@@ -94,8 +94,12 @@ class Cell:
 
     @functools.cached_property
     def scene(self) -> Scene:
-        """The scene, whose unknowns have moderately informative priors."""
-        return parse_scene({"object": OBJECT, "range_m": RANGES, **SCENES[self.scene_name]})
+        """The scene, whose unknowns have moderately informative priors.
+
+        Its model is exact, as that of the simulated readings is.
+        """
+        stated = {"object": OBJECT, "range_m": RANGES, "discrepancy": 0}
+        return parse_scene(stated | SCENES[self.scene_name])
 
 
 def _cells() -> Mapping[str, Cell]:

@@ -60,11 +60,12 @@ def test_progress_ends_where_the_job_ends() -> None:
     assert after.ess >= 50
 
 
-def test_stopped_before_the_first_chunk_there_is_still_an_answer() -> None:
+def test_stopped_before_the_first_chunk_nothing_was_drawn_and_no_interval_is_given() -> None:
     job = fold.prepare(*example("pulsed", crosstalk=False), QUICK)
     posterior = fold.summarise(job, fold.start(job), 0.0, 0.0)
     assert not posterior.verdict.converged
-    assert np.isfinite(posterior.range_m.q50).all()
+    assert not posterior.drawn
+    assert np.isnan(posterior.range_m.q50).all()
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,8 @@ def test_stopped_before_any_draw_it_says_so(job: Job, begun: Checkpoint) -> None
     assert not posterior.verdict.converged
     assert "no steps were made" in posterior.verdict.reasons
     assert progress(job, begun).steps == 0
-    assert np.isfinite(posterior.range_m.q50).all()
+    assert not posterior.drawn
+    assert np.isnan(posterior.range_m.q50).all()
 
 
 def test_it_converges_to_the_truth(job: Job, begun: Checkpoint, simulation: Simulation) -> None:

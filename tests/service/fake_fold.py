@@ -170,6 +170,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
     summary: dict[str, Any] = {
         "mean": checkpoint.sums[0],
         "sd": 1.0,
+        "sd_parts": {"noise": 1.0, "scene": 0.0, "model": 0.0},
         "q05": 0.0,
         "q50": 0.0,
         "q95": 0.0,
@@ -186,7 +187,8 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
             },
             "parameters": {"object.c0": summary},
             "modes": [],
-            "range_m": {key: [] for key in (*job.orders["columns"], "near_fold", "modes")},
+            "range_m": {key: [] for key in (*job.orders["columns"], "near_fold", "modes")}
+            | {"sd_parts": {"noise": [], "scene": [], "model": []}},
             "identifiability": [],
             "fit": {
                 "p_value": 0.5,
