@@ -1,11 +1,11 @@
 """The application: routes, shared state, start and end."""
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.metadata import version
 from typing import Any
 
-import anyio
 from fastapi import FastAPI
 
 from inference.posterior import fold as posterior_fold
@@ -16,6 +16,7 @@ from service.border.keys import KeyRing
 from service.border.traces import Traces
 from service.fold import Fold
 from service.jobs import Jobs
+from service.lanes import Processes, Threads
 from service.process_pool import ProcessPool
 from service.routes import ROUTERS
 from service.service_settings import ServiceSettings
@@ -54,7 +55,9 @@ def create_app(
     store = SqlJobStore(settings.database or default_url(), retention)
     jobs = Jobs(fold, store, pool, running=settings.workers)
     traces = Traces(store.counts)
-    shared = Shared(settings, jobs, anyio.CapacityLimiter(settings.threads), traces)
+    parsing, threads = (Threads(settings.threads, settings.queue) for _ in range(2))
+    processes = Processes(settings.threads, settings.queue, settings.request_s)
+    shared = Shared(settings, jobs, parsing, threads, processes, traces)
     keys = None if settings.api_keys is None else KeyRing(settings.api_keys)
 
     @asynccontextmanager
@@ -63,6 +66,7 @@ def create_app(
         try:
             yield
         finally:
+            await asyncio.to_thread(processes.close)
             await jobs.close()
 
     app = FastAPI(

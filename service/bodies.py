@@ -5,7 +5,6 @@ from collections.abc import AsyncIterator
 from email.message import Message
 from typing import Generic, TypeVar
 
-import anyio.to_thread
 from fastapi import Request
 from starlette.datastructures import Headers
 
@@ -145,7 +144,5 @@ class BodyOf(Generic[T]):
         raw = await read_limited(
             request.stream(), request.headers.get("content-length"), shared.settings.max_body_bytes
         )
-        parsed = await anyio.to_thread.run_sync(
-            parse_document, self.model, raw, limiter=shared.threads
-        )
+        parsed = await shared.parsing.run(request, parse_document, self.model, raw)
         return parsed, raw

@@ -18,6 +18,8 @@
         ├── GoneError                  it was there, and is kept no longer
         ├── NotAcceptableError         no form that the client accepts
         ├── IdempotencyError           a key was used before with another request
+        ├── OverdueError               it takes longer than the service has for it
+        ├── ClientGoneError            nobody waits for the answer
         ├── BusyError                  the service takes no more work now
         ├── StoreError                 the store of jobs is locked, full or does not answer
         └── WorkerDiedError            a task killed every worker that ran it
@@ -28,6 +30,7 @@ from simulator.errors import HybridTofError
 __all__ = [
     "BodyTooLargeError",
     "BusyError",
+    "ClientGoneError",
     "ConflictError",
     "ForeignError",
     "GoneError",
@@ -37,6 +40,7 @@ __all__ = [
     "MisdirectedError",
     "NotAcceptableError",
     "NotFoundError",
+    "OverdueError",
     "ServiceError",
     "StoreError",
     "UnauthorizedError",
@@ -105,6 +109,14 @@ class NotAcceptableError(ServiceError):
 
 class IdempotencyError(ServiceError):
     """An idempotency key came before with another request."""
+
+
+class OverdueError(ServiceError):
+    """The computation takes longer than the service has for an answer at once."""
+
+
+class ClientGoneError(ServiceError):
+    """The client hung up; what it asked for was given up."""
 
 
 class BusyError(ServiceError):

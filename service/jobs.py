@@ -241,7 +241,11 @@ class Jobs(Generic[J, C, T, P]):
         future = self._workers.submit_within(
             _DRAWS_LIMIT_S, *call, self._fold.draw, media_type, kept.job, kept.pieces
         )
-        return await asyncio.wrap_future(future)
+        try:
+            return await asyncio.wrap_future(future)
+        finally:
+            if not future.done():
+                self._workers.abandon(future)
 
     async def cancel(self, job_id: str, client: str = "") -> JobRecord:
         """End a job after the chunk that runs; one that has ended is left as it is.

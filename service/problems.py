@@ -5,7 +5,9 @@ exception                  status meaning
 ========================== ====== =====================================================
 InvalidInputError          422    JSON that breaks a rule; ``errors`` names every field
 RefusedError               422    valid input for which no honest answer exists
+OverdueError               422    valid input that takes longer than a request may
 IdempotencyError           422    the key came before with another request
+ClientGoneError            400    which nobody reads
 MalformedError             400    not JSON, or an unreadable header or query parameter
 UnauthorizedError          401    with ``WWW-Authenticate``
 ForeignError               403    a page of another origin asks
@@ -41,6 +43,7 @@ from starlette.exceptions import HTTPException
 from service.errors import (
     BodyTooLargeError,
     BusyError,
+    ClientGoneError,
     ConflictError,
     ForeignError,
     GoneError,
@@ -50,6 +53,7 @@ from service.errors import (
     MisdirectedError,
     NotAcceptableError,
     NotFoundError,
+    OverdueError,
     StoreError,
     UnauthorizedError,
     UnsupportedMediaTypeError,
@@ -97,6 +101,8 @@ class ProblemDetails(BaseModel):
 _KINDS: Mapping[type[HybridTofError], tuple[HTTPStatus, str, str]] = {
     InvalidInputError: (HTTPStatus(422), "invalid-input", "The input breaks a rule"),
     RefusedError: (HTTPStatus(422), "refused", "There is no honest answer to this input"),
+    OverdueError: (HTTPStatus(422), "overdue", "It takes longer than a request may"),
+    ClientGoneError: (HTTPStatus(400), "gone-client", "The client hung up"),
     IdempotencyError: (HTTPStatus(422), "idempotency", "The idempotency key was used before"),
     MalformedError: (HTTPStatus.BAD_REQUEST, "malformed", "The request cannot be read"),
     UnauthorizedError: (HTTPStatus.UNAUTHORIZED, "unauthorized", "A key is needed"),

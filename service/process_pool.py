@@ -13,7 +13,7 @@ from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from typing import Any, ParamSpec, TypeVar
 
-from service.errors import WorkerDiedError
+from service.errors import OverdueError, WorkerDiedError
 from service.worker_process import DiedError, Watch, WorkerProcess
 
 __all__ = ["ProcessPool"]
@@ -106,6 +106,9 @@ class ProcessPool(Executor):
         fn, *args
             As of `submit`.
         """
+        return self._submit(Watch(limit_s, self._stall_s), fn, *args)
+
+    def _submit(self, watch: Watch, fn: Callable[..., R], /, *args: Any) -> Future[R]:
         future: Future[R] = Future()
         with self._lock:
             if self._closed.is_set():
@@ -114,8 +117,15 @@ class ProcessPool(Executor):
                 self._started = True
                 for thread in self._threads:
                     thread.start()
-            self._tasks.put((future, Watch(limit_s, self._stall_s), fn, args))
+            self._tasks.put((future, watch, fn, args))
         return future
+
+    def submit_once(self, limit_s: float, fn: Callable[..., R], /, *args: Any) -> Future[R]:
+        """Hand over a task as `submit_within` does, whose future raises `OverdueError` beyond it.
+
+        The first task of a process has some seconds more, for its imports.
+        """
+        return self._submit(Watch(limit_s, self._stall_s, again=False), fn, *args)
 
     def compiling(self, future: Future[Any]) -> bool:
         """Tell whether machine code is being made for a task."""
@@ -202,6 +212,8 @@ class ProcessPool(Executor):
                     self._workers.pop(index, None)
                 if future in self._unwanted or self._closed.is_set():
                     break
+                if error.overdue and not watch.again:
+                    return False, OverdueError(f"it takes {error}")
                 own, deaths = own + error.own, deaths + 1
                 _log.warning("a worker died (%s); its task is run again", error)
                 if own >= _OWN_DEATHS or deaths >= _DEATHS:

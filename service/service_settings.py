@@ -34,6 +34,16 @@ class ServiceSettings(pydantic.BaseModel):
         Processes for posteriors, each of one thread.
     threads : int
         Threads for estimates and simulations.
+    queue : int
+        Requests that may wait for a thread, and as many for a process; more get 503.
+    request_s : float
+        Processor time of one request [s]: of a fit over many frames, of a large batch.
+    max_fit_frames : int
+        Most frames of a fit that is answered at once.
+    max_trajectory : int
+        Most frames of a simulation.
+    max_seconds, max_target_ess, max_ensembles
+        Most that a posterior may ask for.
     max_body_bytes : int
         Largest request body: a million frames of six columns need about 128 MiB.
     api_keys : Path or None
@@ -59,6 +69,13 @@ class ServiceSettings(pydantic.BaseModel):
 
     workers: Count = pydantic.Field(default_factory=lambda: os.cpu_count() or 1)
     threads: Count = 2
+    queue: Count = 256
+    request_s: Annotated[float, pydantic.Field(gt=0)] = 10.0
+    max_fit_frames: Count = 10_000
+    max_trajectory: Count = 200_000
+    max_seconds: Annotated[float, pydantic.Field(gt=0)] = 86_400.0
+    max_target_ess: Annotated[int, pydantic.Field(ge=10)] = 1_000_000
+    max_ensembles: Annotated[int, pydantic.Field(ge=2)] = 32
     max_body_bytes: Count = 128 * 2**20
     api_keys: Path | None = None
     allowed_hosts: Annotated[tuple[Host, ...], pydantic.BeforeValidator(_split)] = ()

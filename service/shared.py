@@ -3,14 +3,17 @@
 import dataclasses
 from typing import Any, cast
 
-import anyio
 from fastapi import Request
 
 from service.border.traces import Traces
 from service.jobs import Jobs
+from service.lanes import Processes, Threads
 from service.service_settings import ServiceSettings
 
-__all__ = ["Shared", "client_of", "shared_of"]
+__all__ = ["SMALL", "Shared", "client_of", "shared_of"]
+
+SMALL = 10_000
+"""Frames of which an answer is made in milliseconds."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -23,16 +26,24 @@ class Shared:
         What the operator chose.
     jobs : Jobs
         Posteriors that run or have run.
-    threads : anyio.CapacityLimiter
-        Bounds the threads of estimates and simulations.
+    parsing, threads : Threads
+        For bodies, and for answers that are small.
+    processes : Processes
+        For answers that may take long.
     traces : Traces
         Counts of requests.
     """
 
     settings: ServiceSettings
     jobs: Jobs[Any, Any, Any, Any]  # whatever they compute
-    threads: anyio.CapacityLimiter
+    parsing: Threads
+    threads: Threads
+    processes: Processes
     traces: Traces
+
+    def lane(self, frames: int) -> Threads | Processes:
+        """Return where an answer about so many frames is made: of few, at once in a thread."""
+        return self.threads if frames <= SMALL else self.processes
 
 
 def shared_of(request: Request) -> Shared:

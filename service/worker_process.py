@@ -16,6 +16,8 @@ from service.worker import COMPILING, THREAD_VARIABLES, work
 __all__ = ["DiedError", "Watch", "WorkerProcess"]
 
 _LOOK_S = 0.5
+# what the first task of a process may take beyond its limit: it imports what it needs
+_IMPORTS_S = 15.0
 _environment_lock = threading.Lock()
 
 
@@ -26,11 +28,14 @@ class DiedError(Exception):
     ----------
     own : bool
         Whether it was the task's doing.
+    overdue : bool
+        Whether it was ended because the task took too long.
     """
 
-    def __init__(self, message: str, own: bool) -> None:
+    def __init__(self, message: str, own: bool, overdue: bool = False) -> None:
         super().__init__(message)
         self.own = own
+        self.overdue = overdue
 
 
 class Watch:
@@ -44,15 +49,19 @@ class Watch:
         Time without any processor time after which it is ended [s]: it was stopped, or waits for
         what never comes.
 
+    again : bool
+        Whether a task that took too long is run again.
+
     Attributes
     ----------
     compiling : bool
         Whether machine code is being made.
     """
 
-    def __init__(self, limit_s: float, stall_s: float) -> None:
+    def __init__(self, limit_s: float, stall_s: float, again: bool = True) -> None:
         self.limit_s = limit_s
         self.stall_s = stall_s
+        self.again = again
         self.compiling = False
 
 
@@ -88,6 +97,7 @@ class WorkerProcess:
         with _one_thread_each():
             self.process.start()
         far.close()  # so that the process's death is the end of the pipe
+        self._fresh = True
 
     @property
     def pid(self) -> int:
@@ -118,12 +128,14 @@ class WorkerProcess:
             raise DiedError(f"exit code {self.process.exitcode}", own) from None
         finally:
             watch.compiling = False
+            self._fresh = False
 
     def _await(self, watch: Watch) -> None:
         """Return when there is something to receive.
 
         On a loaded machine wall time tells nothing: what runs at all takes processor time.
         """
+        limit_s = watch.limit_s + (_IMPORTS_S if self._fresh else 0.0)
         began = self._clock()
         seen, since = began, time.monotonic()
         while not self.pipe.poll(_LOOK_S):
@@ -132,9 +144,10 @@ class WorkerProcess:
                 seen, since = used, now
             if watch.compiling:
                 began = used
-            if used - began > watch.limit_s:
+            if used - began > limit_s:
                 self.end(kill=True)
-                raise DiedError(f"more than {watch.limit_s:.0f} s of processor time", own=True)
+                message = f"more than {watch.limit_s:.0f} s of processor time"
+                raise DiedError(message, own=True, overdue=True)
             if now - since > watch.stall_s:
                 self.end(kill=True)
                 raise DiedError(f"stood still for {watch.stall_s:.0f} s", own=False)

@@ -2,19 +2,23 @@
 
 from typing import Annotated
 
-import anyio.to_thread
 from fastapi import APIRouter, Depends, Request
 from fastapi.responses import Response
 
 from inference.estimate import estimate
+from inference.fits.techniques.registry import FITS
+from inference.plan import plan
 from service.answers.estimates import EstimatesResponse, encode_estimates
 from service.bodies import BodyOf
 from service.checked_system import checked_frames
+from service.errors import OverdueError
 from service.problems import problem_responses
 from service.requests import EstimateRequest
-from service.shared import shared_of
+from service.service_settings import ServiceSettings
+from service.shared import SMALL, shared_of
+from simulator.errors import InvalidInputError
 
-__all__ = ["answer", "router"]
+__all__ = ["answer", "quick_answer", "router"]
 
 router = APIRouter(prefix="/v1/estimates", tags=["estimates"])
 Body = Annotated[tuple[EstimateRequest, bytes], Depends(BodyOf(EstimateRequest))]
@@ -42,13 +46,53 @@ def answer(request: EstimateRequest) -> bytes:
     return encode_estimates(estimate(sensor, scene, frames, request.techniques))
 
 
+def quick_answer(request: EstimateRequest, settings: ServiceSettings) -> bytes | None:
+    """Estimate and encode where that is a matter of milliseconds.
+
+    Parameters
+    ----------
+    request : EstimateRequest
+        As of `answer`.
+    settings : ServiceSettings
+        How many frames a fit may have.
+
+    Returns
+    -------
+    bytes or None
+        As of `answer`; None where a fit over many frames is asked for, or many frames are sent.
+
+    Raises
+    ------
+    InvalidInputError
+        As of `answer`, and for a fit of too many frames.
+    """
+    sensor, scene, frames = checked_frames(request.sensor, request.scene, request.frames)
+    names = request.techniques
+    if names is None:
+        names = [name for name in (plan(sensor, scene, frames).chosen,) if name is not None]
+    most = settings.max_fit_frames
+    if FITS.keys() & set(names):
+        if len(frames) > most:
+            message = f"a fit over frames takes at most {most} of them here: ask for a posterior"
+            raise InvalidInputError.at("/frames", message)
+        return None
+    if len(frames) > SMALL:
+        return None
+    return encode_estimates(estimate(sensor, scene, frames, request.techniques))
+
+
 @router.post(
     "",
     response_model=None,
-    responses={200: {"model": EstimatesResponse}, **problem_responses(400, 413, 415, 422)},
+    responses={200: {"model": EstimatesResponse}, **problem_responses(400, 413, 415, 422, 503)},
 )
 async def create(request: Request, body: Body) -> Response:
     """Return all physical roots of every frame."""
-    limiter = shared_of(request).threads
-    content = await anyio.to_thread.run_sync(answer, body[0], limiter=limiter)
+    shared = shared_of(request)
+    content = await shared.threads.run(request, quick_answer, body[0], shared.settings)
+    if content is None:
+        try:
+            content = await shared.processes.run(request, answer, body[0])
+        except OverdueError as error:
+            raise OverdueError(f"{error}: ask for a posterior, or send fewer frames") from None
     return Response(content, media_type="application/json")

@@ -5,7 +5,6 @@ import re
 from collections.abc import AsyncIterable, AsyncIterator
 from typing import Annotated
 
-import anyio.to_thread
 from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.responses import JSONResponse, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
@@ -13,10 +12,12 @@ from starlette.exceptions import HTTPException
 
 from service.answers.posteriors import PosteriorPage, PosteriorResponse, brief, full
 from service.bodies import BodyOf
+from service.caps import capped
 from service.checked_system import checked_frames
 from service.errors import MalformedError, NotAcceptableError
 from service.exports import EXPORTS
 from service.exports.negotiation import accepted_export
+from service.lanes import while_wanted
 from service.problems import problem_responses
 from service.requests import PosteriorRequest
 from service.shared import client_of, shared_of
@@ -51,12 +52,13 @@ async def create(
     key = _key(idempotency_key)
     asked, raw = body
     shared = shared_of(request)
-    checked = await anyio.to_thread.run_sync(
-        checked_frames, asked.sensor, asked.scene, asked.frames, limiter=shared.threads
+    sampler = capped(shared.settings, asked.sampler)
+    checked = await shared.threads.run(
+        request, checked_frames, asked.sensor, asked.scene, asked.frames
     )
     digest = hashlib.sha256(raw).hexdigest()
     record = await shared.jobs.submit(
-        *checked, asked.sampler, key=key, digest=digest, client=client_of(request)
+        *checked, sampler, key=key, digest=digest, client=client_of(request)
     )
     return JSONResponse(full(record), 202, {"Location": f"/v1/posteriors/{record.id}"})
 
@@ -139,7 +141,8 @@ async def draws(request: Request, job_id: str) -> Response:
     if form is None:
         names = " or ".join(form.media_type for form in EXPORTS)
         raise NotAcceptableError(f"draws come as {names}")
-    data = await shared_of(request).jobs.draws(job_id, form.media_type, client_of(request))
+    making = shared_of(request).jobs.draws(job_id, form.media_type, client_of(request))
+    data = await while_wanted(request, making)
     name = f'attachment; filename="{job_id}{form.suffix}"'
     headers = {"Content-Disposition": name, "Vary": "Accept"}
     return Response(data, headers=headers, media_type=form.media_type)
