@@ -5,6 +5,7 @@ a chunk that was lost with its process is computed again, to the same last bit.
 """
 
 import asyncio
+import contextlib
 import dataclasses
 import logging
 import math
@@ -36,6 +37,10 @@ _FIRST_LIMIT_S = 900.0
 _LIMIT_S = 60.0
 _TIMES = 20.0
 _LONGEST_PAUSE_S = 5.0
+
+
+class _TurnError(Exception):
+    """The job has had its turn, and others wait."""
 
 
 class Workers(Protocol):
@@ -95,6 +100,10 @@ class Runner(Generic[J, C, T, P]):
         Names the format of jobs and checkpoints: those of another one are computed anew.
     announce : callable
         Is called when a job has changed.
+    holder : str
+        Under which name this process holds jobs.
+    slice_s : float
+        Processor time of a turn [s].
     """
 
     fold: Fold[J, C, T, P]
@@ -102,9 +111,13 @@ class Runner(Generic[J, C, T, P]):
     workers: Workers
     version: str
     announce: Callable[[], None]
+    holder: str
+    slice_s: float
 
     async def run(self, claimed: Claimed) -> None:
         """Fold until finished, cancelled, out of time or deleted; then summarise.
+
+        Where others wait, it ends after a turn, and the job goes on with another.
 
         Parameters
         ----------
@@ -131,6 +144,8 @@ class _Run(Generic[J, C, T, P]):
             await self._compute()
         except _LostError:
             return
+        except _TurnError:
+            await self._let_go()
         except Exception as error:
             known = error if isinstance(error, HybridTofError) else None
             if known is None:
@@ -165,14 +180,15 @@ class _Run(Generic[J, C, T, P]):
                 (first,) = await self._execute((fold.start, self.job))
                 await self._keep(first)
             while self.checkpoint is not None and not self.record.cancel_requested:
-                wall_s = self.record.wall_s
-                tasks = await asyncio.to_thread(fold.tasks, self.job, self.checkpoint, wall_s)
+                tasks = await asyncio.to_thread(fold.tasks, self.job, self.checkpoint, self.cpu_s)
                 if not tasks:
                     break
                 pieces = await self._execute(*((fold.run, task) for task in tasks))
                 merged, spent = await asyncio.to_thread(self._merged, self.checkpoint, pieces)
                 self.cpu_s += spent
                 await self._keep(merged)
+                if self.cpu_s - self.claimed.record.cpu_s >= self.runner.slice_s:
+                    await self._see_to_others()
         except _CancelledError:
             pass
         finished = False
@@ -181,6 +197,18 @@ class _Run(Generic[J, C, T, P]):
         cancelled = self.record.cancel_requested and not finished
         result = await self._summarise()
         await self._finish("cancelled" if cancelled else "done", result)
+
+    async def _see_to_others(self) -> None:
+        """End the turn, where others wait for theirs."""
+        if self.record.cancel_requested:
+            return
+        with contextlib.suppress(StoreError):
+            if await asyncio.to_thread(self.runner.store.waits):
+                raise _TurnError
+
+    async def _let_go(self) -> None:
+        with contextlib.suppress(StoreError):  # the lease runs out by itself
+            await asyncio.to_thread(self.runner.store.release, self.runner.holder, self.record.id)
 
     def _merged(self, checkpoint: C, pieces: Sequence[P]) -> tuple[C, float]:
         before = time.thread_time()
@@ -192,13 +220,15 @@ class _Run(Generic[J, C, T, P]):
         if self.checkpoint is None:
             return None
         await self._tell("summarising")
-        spent = self.record.wall_s, self.cpu_s
+        # the time that was given to `Fold.tasks` is that of the processor
+        spent = self.cpu_s, self.cpu_s
         call = _summary, self.runner.fold.summarise, self.job, self.checkpoint, *spent
         try:
             (result,) = await self._execute(call, wanted=True)
         except _CancelledError:
             raise AssertionError("what is wanted is not given up") from None
-        return dict(result)
+        found = dict(result)
+        return found | {"runtime": found["runtime"] | {"wall_s": self.record.wall_s}}
 
     async def _fail(self, problem: dict[str, Any]) -> None:
         """End the job, with what was drawn before it failed."""

@@ -45,9 +45,11 @@ class Jobs(Generic[J, C, T, P]):
     workers : Workers
         Where chunks run.
     running : int
-        How many jobs run at a time; the others wait in the order of their arrival.
+        How many jobs run at a time; the others wait for their turn.
     look_s : float
         How often it is looked whether other processes have left or changed something [s].
+    slice_s : float
+        Processor time after which a job lets others have a turn, where any wait [s].
     """
 
     def __init__(
@@ -57,6 +59,7 @@ class Jobs(Generic[J, C, T, P]):
         workers: Workers,
         running: int,
         look_s: float = 1.0,
+        slice_s: float = 5.0,
     ) -> None:
         self._fold = fold
         self._store = store
@@ -64,8 +67,10 @@ class Jobs(Generic[J, C, T, P]):
         self._running = running
         self._look_s = look_s
         self._version = f"{version('hybridtof')} {fold.FORMAT}"
-        self._runner = Runner(fold, store, workers, self._version, self._announce)
         self._holder = holder_name()
+        self._runner = Runner(
+            fold, store, workers, self._version, self._announce, self._holder, slice_s
+        )
         self._tasks: list[asyncio.Task[None]] = []
         self._held: set[str] = set()
         self._news = asyncio.Event()
@@ -276,7 +281,7 @@ class Jobs(Generic[J, C, T, P]):
         self._announce()
 
     async def _serve(self) -> None:
-        """Run one job after the other."""
+        """Run one job after the other, a turn of each."""
         while self._open:
             news = self._news
             try:
@@ -289,7 +294,7 @@ class Jobs(Generic[J, C, T, P]):
             await self._wait(news)
 
     async def _serve_one(self) -> bool:
-        """Run a job that nobody holds; whether there was one."""
+        """Run a job that nobody holds, for a turn; whether there was one."""
         claimed = await asyncio.to_thread(self._store.claim, self._holder)
         if claimed is None:
             return False

@@ -16,7 +16,8 @@ from service.worker import COMPILING, THREAD_VARIABLES, work
 __all__ = ["DiedError", "Watch", "WorkerProcess"]
 
 _LOOK_S = 0.5
-# what the first task of a process may take beyond its limit: it imports what it needs
+# what the first task of a process may take beyond its limit, where it has one try: it imports what
+# it needs
 _IMPORTS_S = 15.0
 _environment_lock = threading.Lock()
 
@@ -135,7 +136,7 @@ class WorkerProcess:
 
         On a loaded machine wall time tells nothing: what runs at all takes processor time.
         """
-        limit_s = watch.limit_s + (_IMPORTS_S if self._fresh else 0.0)
+        limit_s = watch.limit_s + (_IMPORTS_S if self._fresh and not watch.again else 0.0)
         began = self._clock()
         seen, since = began, time.monotonic()
         while not self.pipe.poll(_LOOK_S):

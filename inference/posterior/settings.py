@@ -22,7 +22,8 @@ class SamplerSettings(Validated):
     target_ess : int
         Effective sample size wanted for every parameter.
     max_seconds : float
-        Wall time [s] after which no chunk begins and an unfinished run is summarised as it is. What
+        Wall time [s], over HTTP processor time of the chunks [s], after which no chunk begins and
+        an unfinished run is summarised as it is. What
         has begun is ended first: a chunk of about a second, importance sampling of ten seconds at
         most, or the search for starting points, which takes a second of processor time for 100
         frames and half a minute for the most frames and nine unknowns, and several times as long

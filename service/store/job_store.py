@@ -45,15 +45,23 @@ class JobStore(Protocol):
         ...
 
     def claim(self, holder: str) -> Claimed | None:
-        """Take the oldest unfinished job that nobody holds; None where there is none."""
+        """Take an unfinished job that nobody holds; None where there is none.
+
+        Those to be cancelled come first; then the turn goes round the clients, and among the jobs
+        of each. Several processes that claim keep to the same turns.
+        """
+        ...
+
+    def waits(self) -> bool:
+        """Tell whether there is an unfinished job that nobody holds."""
         ...
 
     def renew(self, holder: str, job_ids: Collection[str]) -> None:
         """Go on holding jobs."""
         ...
 
-    def release(self, holder: str) -> None:
-        """Let go of all jobs: another process may take them at once."""
+    def release(self, holder: str, job_id: str | None = None) -> None:
+        """Let go of one job, or of all: another process may take them at once."""
         ...
 
     def advance(

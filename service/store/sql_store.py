@@ -16,7 +16,7 @@ from service.errors import BusyError, IdempotencyError, StoreError
 from service.store.database import brief, engine_of, is_sqlite, ready
 from service.store.holder import has_ended
 from service.store.record import FINISHED, QUEUED, Claimed, JobRecord, NewJob, Status
-from service.store.tables import CHECKPOINT, JOB
+from service.store.tables import CHECKPOINT, JOB, SERVED
 
 __all__ = ["Retention", "SqlJobStore"]
 
@@ -191,21 +191,22 @@ class SqlJobStore:
     def claim(self, holder: str) -> Claimed | None:
         """See `JobStore.claim`."""
         now = self._clock()
-        unfinished = JOB.c.status.in_(("queued", "running"))
+        query = self._next(now)
         with self._read() as connection:
-            holders = connection.scalars(
-                sa.select(JOB.c.holder).where(unfinished, JOB.c.held_until > now).distinct()
-            ).all()
-        ended = [name for name in holders if name is not None and has_ended(name)]
-        free = sa.or_(JOB.c.held_until <= now, JOB.c.holder.in_(ended))
-        query = sa.select(JOB.c.id).where(unfinished, free).order_by(JOB.c.sequence).limit(1)
-        with self._read() as connection:
-            if connection.scalar(query) is None:  # most often: nothing need be locked to see it
+            if connection.execute(query).first() is None:  # most often: nothing need be locked
                 return None
         with self._write() as connection:
-            job_id = connection.scalar(query.with_for_update(skip_locked=True))
-            if job_id is None:
+            row = connection.execute(query.with_for_update(skip_locked=True, of=JOB)).first()
+            if row is None:
                 return None
+            job_id = row.id
+            last = connection.scalar(sa.select(sa.func.max(SERVED.c.turn))) or 0
+            served = self._insert(SERVED).values(client=row.client, turn=last + 1)
+            connection.execute(
+                served.on_conflict_do_update(
+                    index_elements=[SERVED.c.client], set_={"turn": last + 1}
+                )
+            )
             connection.execute(
                 sa.update(JOB)
                 .where(JOB.c.id == job_id)
@@ -213,10 +214,35 @@ class SqlJobStore:
                     status="running",
                     holder=holder,
                     held_until=now + _LEASE_S,
+                    turn=last + 1,
                     revision=JOB.c.revision + 1,
                 )
             )
             return self._claimed(connection, job_id)
+
+    def waits(self) -> bool:
+        """See `JobStore.waits`."""
+        query = self._next(self._clock())
+        with self._read() as connection:
+            return connection.execute(query).first() is not None
+
+    def _next(self, now: float) -> sa.Select[Any]:
+        """Return a query for the job whose turn it is, of those that nobody holds."""
+        unfinished = JOB.c.status.in_(("queued", "running"))
+        with self._read() as connection:
+            holders = connection.scalars(
+                sa.select(JOB.c.holder).where(unfinished, JOB.c.held_until > now).distinct()
+            ).all()
+        ended = [name for name in holders if name is not None and has_ended(name)]
+        free = sa.or_(JOB.c.held_until <= now, JOB.c.holder.in_(ended))
+        turn = sa.func.coalesce(SERVED.c.turn, 0)
+        return (
+            sa.select(JOB.c.id, JOB.c.client)
+            .outerjoin(SERVED, SERVED.c.client == JOB.c.client)
+            .where(unfinished, free)
+            .order_by(JOB.c.cancel_requested.desc(), turn, JOB.c.turn, JOB.c.sequence)
+            .limit(1)
+        )
 
     @staticmethod
     def _claimed(connection: sa.Connection, job_id: str) -> Claimed | None:
@@ -239,11 +265,14 @@ class SqlJobStore:
             until = self._clock() + _LEASE_S
             connection.execute(sa.update(JOB).where(held).values(held_until=until))
 
-    def release(self, holder: str) -> None:
+    def release(self, holder: str, job_id: str | None = None) -> None:
         """See `JobStore.release`."""
+        held = JOB.c.holder == holder
+        if job_id is not None:
+            held = sa.and_(held, JOB.c.id == job_id)
         with self._write() as connection:
             free = {"holder": None, "held_until": 0.0}
-            connection.execute(sa.update(JOB).where(JOB.c.holder == holder).values(**free))
+            connection.execute(sa.update(JOB).where(held).values(**free))
 
     def _follow(
         self, connection: sa.Connection, record: JobRecord, **values: Any

@@ -2,7 +2,7 @@
 
 import sqlalchemy as sa
 
-__all__ = ["CHECKPOINT", "JOB", "METADATA"]
+__all__ = ["CHECKPOINT", "JOB", "METADATA", "SERVED"]
 
 METADATA = sa.MetaData()
 
@@ -32,9 +32,17 @@ JOB = sa.Table(
     sa.Column("ended", sa.Double),
     sa.Column("holder", sa.String(128)),
     sa.Column("held_until", sa.Double, nullable=False),
+    sa.Column("turn", sa.BigInteger, nullable=False, server_default="0"),
     sa.UniqueConstraint("client", "key", name="job_client_key"),
     sa.Index("job_status", "status"),
     sqlite_autoincrement=True,
+)
+
+SERVED = sa.Table(
+    "served",
+    METADATA,
+    sa.Column("client", sa.String(64), primary_key=True),
+    sa.Column("turn", sa.BigInteger, nullable=False),
 )
 
 CHECKPOINT = sa.Table(

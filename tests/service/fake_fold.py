@@ -28,7 +28,8 @@ STEPS = 10
 @dataclasses.dataclass(frozen=True)
 class Job:
     settings: SamplerSettings
-    # directives of a test: {"sleep": seconds a piece, "hold": path of a mark without which no chunk
+    # directives of a test: {"sleep": seconds a piece, "burn": seconds
+    # of processor time a piece, "hold": path of a mark without which no chunk
     # but the first is computed, "die": path of a mark, "signal": which, "fail": message,
     # "outlive": path of a mark that a piece leaves if it is still computed when its parent has been
     # gone for long}
@@ -112,8 +113,8 @@ def start(job: Job) -> Checkpoint:
     return Checkpoint(0, (0.0,) * job.settings.ensembles)
 
 
-def tasks(job: Job, checkpoint: Checkpoint, wall_s: float) -> tuple[Task, ...]:
-    if checkpoint.chunk == CHUNKS or wall_s >= job.settings.max_seconds:
+def tasks(job: Job, checkpoint: Checkpoint, spent_s: float) -> tuple[Task, ...]:
+    if checkpoint.chunk == CHUNKS or spent_s >= job.settings.max_seconds:
         return ()
     assert job.settings.seed is not None
     return tuple(
@@ -124,6 +125,9 @@ def tasks(job: Job, checkpoint: Checkpoint, wall_s: float) -> tuple[Task, ...]:
 
 def run(task: Task) -> float:
     time.sleep(task.orders.get("sleep", 0.0))
+    until = time.process_time() + task.orders.get("burn", 0.0)
+    while time.process_time() < until:
+        pass
     if "hold" in task.orders and task.chunk > 0:
         while not Path(task.orders["hold"]).exists():
             time.sleep(0.005)
@@ -164,9 +168,9 @@ def progress(_: Job, checkpoint: Checkpoint) -> Progress:
     return Progress(phase, done * STEPS, CHUNKS * STEPS, 10.0 * done, rhat, done == CHUNKS)
 
 
-def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> Posterior:
+def summarise(job: Job, checkpoint: Checkpoint, spent_s: float, cpu_s: float) -> Posterior:
     finished = checkpoint.chunk == CHUNKS
-    reason = "too few steps" if wall_s < job.settings.max_seconds else "out of time"
+    reason = "too few steps" if spent_s < job.settings.max_seconds else "out of time"
     summary: dict[str, Any] = {
         "mean": checkpoint.sums[0],
         "sd": 1.0,
@@ -200,7 +204,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
                 "outliers": [],
             },
             "left_out": [],
-            "runtime": {"wall_s": wall_s, "cpu_s": cpu_s, "likelihood_calls": 1, "k_hat": None},
+            "runtime": {"wall_s": spent_s, "cpu_s": cpu_s, "likelihood_calls": 1, "k_hat": None},
         }
     )
 

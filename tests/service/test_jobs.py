@@ -175,7 +175,8 @@ async def test_cancel_while_waiting_is_at_once(tmp_path: Path, store: SqlJobStor
 
 
 async def test_time_limit(store: SqlJobStore) -> None:
-    fake_fold.order(sleep=0.1)
+    """It is the processor time of the chunks: two pieces, each of 0.1 s."""
+    fake_fold.order(burn=0.1)
     async with running(store) as (jobs, _):
         limited = SETTINGS.model_copy(update={"max_seconds": 0.15})
         record = await ended(jobs, (await jobs.submit(*system(), limited)).id)
@@ -184,6 +185,31 @@ async def test_time_limit(store: SqlJobStore) -> None:
     verdict = record.result["verdict"]
     assert verdict["converged"] is False
     assert verdict["reasons"] == ["out of time"]
+    assert record.progress["steps"] == 10
+
+
+async def test_turns_go_round_clients(store: SqlJobStore) -> None:
+    """A client with one job among three greedy ones does not wait for theirs to end."""
+    expected = undisturbed()
+    fake_fold.order()
+    pool = ProcessPool(1)
+    jobs: FakeJobs = Jobs(fake_fold, store, pool, running=1, look_s=0.05, slice_s=0.0)
+    await jobs.start()
+    try:
+        greedy = [await jobs.submit(*system(), SETTINGS, client="greedy") for _ in range(3)]
+        modest = await jobs.submit(*system(), SETTINGS, client="modest")
+        async for _ in jobs.follow(modest.id, client="modest"):
+            pass
+        steps = [(await jobs.get(job.id, "greedy")).progress["steps"] for job in greedy]
+        assert (await jobs.get(modest.id, "modest")).status == "done"
+        # a chunk of modest's for one of greedy's, before modest came perhaps a few more
+        assert sum(steps) < 3 * 60
+        for job in greedy:
+            async for _ in jobs.follow(job.id, client="greedy"):
+                pass
+            assert mean_of(await jobs.get(job.id, "greedy")) == expected
+    finally:
+        await jobs.close()
 
 
 async def test_deleted_while_running(tmp_path: Path, store: SqlJobStore) -> None:

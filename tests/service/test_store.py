@@ -50,6 +50,29 @@ def advanced(store: SqlJobStore, record: JobRecord, data: bytes, whole: bool) ->
     return store.advance(record, data, whole, {"phase": "sampling"}, 1.0, 2.0)
 
 
+def test_turns(tmp_path: Path) -> None:
+    """Round the clients, and round the jobs of each; what is to be cancelled comes first."""
+    store = store_at(tmp_path)
+    for name, client in (("a1", "a"), ("a2", "a"), ("a3", "a"), ("b1", "b")):
+        store.add(new(name, client=client))
+    holder = holder_name()
+
+    def turn() -> str:
+        claimed = store.claim(holder)
+        assert claimed is not None
+        assert store.waits()
+        store.release(holder, claimed.record.id)
+        return claimed.record.id
+
+    order = [turn() for _ in range(8)]
+    assert order == ["a1", "b1", "a2", "b1", "a3", "b1", "a1", "b1"]
+    store.cancel("a1")
+    assert [turn() for _ in range(2)] == ["a1", "a1"]
+    while store.claim(holder):
+        pass
+    assert not store.waits()
+
+
 def test_pieces_come_back_in_order_and_a_whole_one_replaces_them(tmp_path: Path) -> None:
     store = store_at(tmp_path)
     record: JobRecord | None = begun(store, "a")
