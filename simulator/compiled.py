@@ -1,135 +1,193 @@
-"""One way to compile a numerical kernel.
+"""One way to compile a numerical kernel, and to do without where compiling takes longer.
 
-Kernels call one another across files, but numba's own cache looks at the caller's file alone: after
-an edit of the callee it would go on running the old machine code. The cache directory of a file is
-therefore named by a digest of it and of every file of kernels that it uses, directly or not.
+A kernel is machine code made by numba (`simulator.machine_code`), kept in a folder of exactly its
+sources (`simulator.kernel_cache`). Until there is machine code for the arguments of a call, the
+interpreter answers (`simulator.uncompiled`), with the same bits, for as long in all as making or
+loading that code would take: the first few frames need no compiler, and no kind of work takes much
+more than twice of what it must. `HYBRIDTOF_COMPILE=always` compiles at the first call.
 """
 
 import functools
-import hashlib
 import os
-import re
+import threading
 from collections.abc import Callable
 from pathlib import Path
+from types import FunctionType
 from typing import Any, ParamSpec, TypeVar, cast
 
-import numba
+from simulator.kernel_cache import CacheFolder, folder_of
 
-__all__ = ["compiled", "compiled_for_both"]
+__all__ = ["Kernel", "compiled", "compiled_for_both", "when_compiling"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_config: Any = numba.config  # its attributes are made at import, out of a type checker's sight
-_njit: Any = numba.njit  # its stubs know a part of its options
-_ROOT = Path(__file__).resolve().parents[1]
-_MARK = b"from simulator.compiled import compiled"
-_IMPORT = re.compile(rb"^from ((?:simulator|inference)[\w.]*) import ", re.MULTILINE)
+# what making machine code takes, about: to import numba and start it, for each function that a
+# kernel is made of, and to read from the disk what was made before [s]
+_START_S, _MAKE_S, _LOAD_S = 0.4, 0.1, 0.04
+# more elements than the interpreter gets through in such times
+_MANY = 100_000
+_lock = threading.RLock()
+_waiting: list[Callable[[], None]] = []
+_machine: list[Any] = []
 
 
-@functools.cache
-def _read(path: Path) -> tuple[bytes, tuple[Path, ...]]:
-    """Return the source of a file of kernels and the files that it imports; neither of others."""
-    if not path.is_file():
-        return b"", ()
-    source = path.read_bytes()
-    if _MARK not in source:
-        return b"", ()
-    used: list[Path] = []
-    for name in _IMPORT.findall(source):
-        there = _ROOT.joinpath(*name.decode().split("."))
-        # of a package any module may be meant
-        used += sorted(there.glob("*.py")) if there.is_dir() else [there.with_suffix(".py")]
-    return source, tuple(used)
+def when_compiling(action: Callable[[], None]) -> Callable[[], None]:
+    """Have something done before the first kernel is compiled: what needs numba itself."""
+    with _lock:
+        if _machine:
+            action()
+        else:
+            _waiting.append(action)
+    return action
 
 
-@functools.cache
-def _digest(path: Path) -> str:
-    """Return a digest of a file and of every file of kernels that it uses, directly or not."""
-    seen: set[Path] = set()
-    ahead = [path]
-    while ahead:
-        here = ahead.pop()
-        if here not in seen:
-            seen.add(here)
-            ahead += _read(here)[1]
-    digest = hashlib.sha256(path.read_bytes())
-    for one in sorted(seen):
-        source, _ = _read(one)
-        if source:
-            digest.update(os.path.relpath(one, _ROOT).encode())
-            digest.update(source)
-    return digest.hexdigest()[:16]
+def _compiler() -> Any:
+    """Return `simulator.machine_code`; only now numba is imported."""
+    with _lock:
+        if not _machine:
+            from simulator import machine_code
+
+            _machine.append(machine_code)
+            for action in _waiting:
+                action()
+            _waiting.clear()
+    return _machine[0]
 
 
-def _cache_directory(path: Path) -> str | None:
-    """Directory for machine code of exactly these sources; None where nothing can be written."""
-    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
-    try:
-        directory = (Path(base) if base else Path.home() / ".cache") / "hybridtof"
-        directory = directory / _digest(path)
-        directory.mkdir(parents=True, exist_ok=True)
-    except (OSError, RuntimeError):  # no home, or a read-only one: compile in memory
-        return None
-    return str(directory) if os.access(directory, os.W_OK) else None
+class Kernel:
+    """A pure function of numbers, tuples and arrays, called as any function.
 
-
-def _dispatcher(
-    function: Callable[P, R], directory: str | None, **options: bool
-) -> Any:  # numba's classes carry no types
-    """Return numba's dispatcher of a function, with its machine code in a directory of its own."""
-    previous = _config.CACHE_DIR
-    _config.CACHE_DIR = directory or previous
-    try:
-        return _njit(
-            cache=directory is not None,
-            nogil=True,
-            error_model="numpy",
-            fastmath=False,
-            no_cfunc_wrapper=True,  # nothing here is called from C
-            **options,
-        )(function)
-    finally:
-        _config.CACHE_DIR = previous
-
-
-def _answer_calls(kernel: Any, called: Any) -> None:
-    """Let the machine code of one dispatcher answer the calls of kernels to another.
-
-    A number that a caller writes out is one of its type there: as numba has it, a type of its own,
-    a kernel is compiled anew for every 0 and 1.
+    Attributes
+    ----------
+    options : dict of str to bool
+        For numba; to be set before the first call.
     """
-    template: Any = called.get_call_template
-    unliteral: Any = numba.types.unliteral
 
-    def of_types(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
-        kinds = {name: unliteral(kind) for name, kind in kws.items()}
-        return template(tuple(map(unliteral, args)), kinds)
+    def __init__(self, function: FunctionType, for_both: bool) -> None:
+        functools.update_wrapper(self, function)
+        self.options: dict[str, bool] = {}
+        self._function, self._for_both = function, for_both
+        self._dispatcher: Any = None
+        self._below: Any = None
+        self._spent_s: dict[Any, float] = {}
 
-    kernel.get_call_template, kernel.get_overload = of_types, called.get_overload
+    def __reduce__(self) -> str:
+        return self._function.__qualname__
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Answer a call, by machine code where there is any."""
+        dispatcher = self._dispatcher
+        if dispatcher is not None:
+            return dispatcher(*args, **kwargs)
+        return self._answer(*args, **kwargs)
+
+    @property
+    def dispatcher(self) -> Any:
+        """Dispatcher of numba that answers calls by Python."""
+        with _lock:
+            if self._dispatcher is None:
+                compiler = _compiler()
+                made = compiler.dispatcher(self._function, self._folder, self.options)
+                if self._for_both:
+                    self._answer_calls(made)
+                    self._below = made
+                compile_now, made.compile_now = made._compile_for_args, made._compile_for_args
+                # asked where there is no machine code for the types of a call
+                made._compile_for_args = lambda *args: (
+                    self._answer if self._may_try(args) else compile_now(*args)
+                )
+                self._dispatcher = made
+        return self._dispatcher
+
+    @property
+    def called(self) -> Any:
+        """Dispatcher of numba that answers calls by kernels.
+
+        A kernel that another kernel calls needs no way in from Python, whose opening of named
+        tuples takes a sixth of the whole time of compiling: kernels call a twin without it.
+        """
+        with _lock:
+            if self._for_both:
+                return self.dispatcher
+            if self._below is None:
+                folder = self._folder
+                below = folder and CacheFolder(folder.path / "called", folder.writable)
+                options = self.options | {"no_cpython_wrapper": True}
+                self._below = _compiler().dispatcher(self._function, below, options)
+                self._answer_calls(self._below)
+        return self._below
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba takes a kernel for that a kernel calls."""
+        return self.called._numba_type_
+
+    @functools.cached_property
+    def _folder(self) -> CacheFolder | None:
+        return folder_of(Path(self._function.__code__.co_filename).resolve())
+
+    @staticmethod
+    def _answer_calls(called: Any) -> None:
+        """Let a number that a caller writes out be one of its type.
+
+        As numba has it, a type of its own, a kernel is compiled anew for every 0 and 1.
+        """
+        template: Any = called.get_call_template
+        unliteral: Any = _compiler().unliteral
+
+        def of_types(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+            kinds = {name: unliteral(kind) for name, kind in kws.items()}
+            return template(tuple(map(unliteral, args)), kinds)
+
+        called.get_call_template = of_types
+
+    @functools.cached_property
+    def _cost_s(self) -> float:
+        """What machine code for a call would take [s]."""
+        from simulator.uncompiled import reach
+
+        folder = self._folder
+        name = self._function.__qualname__
+        there = folder is not None and any(folder.path.glob(f"*.{name}-*.nbi"))
+        start = 0.0 if _machine else _START_S
+        return start + (_LOAD_S if there else _MAKE_S * reach(self._function))
+
+    def _may_try(self, args: tuple[Any, ...]) -> bool:
+        """Tell whether the interpreter may answer a call."""
+        from simulator import uncompiled
+
+        if os.environ.get("HYBRIDTOF_COMPILE") == "always" or uncompiled.size(args) > _MANY:
+            return False
+        return self._spent_s.get(uncompiled.kind_of(args), 0.0) < self._cost_s
+
+    def _answer(self, *args: Any, **kwargs: Any) -> Any:
+        """Answer a call for which there is no machine code, as far as is known."""
+        from simulator import uncompiled
+
+        if kwargs or not self._may_try(args):
+            return self.dispatcher(*args, **kwargs)
+        kind = uncompiled.kind_of(args)
+        spent_s = self._spent_s.get(kind, 0.0)
+        try:
+            answer, took_s = uncompiled.run(self._function, args, self._cost_s - spent_s)
+        except uncompiled.NotSoError:
+            self._spent_s[kind] = float("inf")
+            dispatcher = self.dispatcher
+            return dispatcher(*args)
+        self._spent_s[kind] = spent_s + took_s
+        return answer
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a pure function of numbers, tuples and arrays to machine code.
 
     An argument that is None is known to be None at compile time, so that ``if background is not
-    None`` costs nothing: a term that a scene lacks is absent from the machine code. Division by
-    zero gives inf or nan as in numpy; the interpreter lock is released; no fast-math, because
-    error-free transformations and tests for nan must survive.
-
-    A kernel that another kernel calls needs no way in from Python, whose opening of named tuples
-    takes a sixth of the whole time of compiling: kernels call a twin without it, kept apart.
+    None`` costs nothing: a term that a scene lacks is absent from the machine code.
     """
-    directory = _cache_directory(Path(function.__code__.co_filename).resolve())
-    kernel = _dispatcher(function, directory)
-    below = None if directory is None else str(Path(directory) / "called")
-    kernel.called = _dispatcher(function, below, no_cpython_wrapper=True)
-    _answer_calls(kernel, kernel.called)
-    return cast("Callable[P, R]", kernel)
+    return cast("Callable[P, R]", Kernel(cast("FunctionType", function), for_both=False))
 
 
 def compiled_for_both(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a kernel that Python and kernels call with arguments of the same types: once."""
-    kernel = _dispatcher(function, _cache_directory(Path(function.__code__.co_filename).resolve()))
-    _answer_calls(kernel, kernel)
-    return cast("Callable[P, R]", kernel)
+    return cast("Callable[P, R]", Kernel(cast("FunctionType", function), for_both=True))

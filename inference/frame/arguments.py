@@ -10,12 +10,10 @@ the argument's type instead, so that an absent term stays absent.
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
-from numba import extending
 from numpy.typing import NDArray
 
-from simulator.compiled import compiled
+from simulator.compiled import compiled, when_compiling
 from simulator.sensor import Sensor, instrument
 
 __all__ = [
@@ -257,22 +255,24 @@ def _flux_error_of(knots: Array | None, grid: Pair | None, i: int) -> FluxError 
     return None if knots is None or grid is None else FluxError(knots[i], grid[0], grid[1])
 
 
-@extending.overload(_crosstalk_of, strict=False)
-def _compile_crosstalk_of(rows: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
-    if rows is numba.types.none:
-        return lambda rows, i: None  # noqa: ARG005
-    return lambda rows, i: (rows[i, 0], rows[i, 1])
+@when_compiling
+def _overload_members() -> None:
+    from simulator.machine_code import is_none, overload
 
+    @overload(_crosstalk_of)
+    def _crosstalk(rows: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
+        if is_none(rows):
+            return lambda rows, i: None  # noqa: ARG005
+        return lambda rows, i: (rows[i, 0], rows[i, 1])
 
-@extending.overload(_background_of, strict=False)
-def _compile_background_of(rows: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
-    if rows is numba.types.none:
-        return lambda rows, i: None  # noqa: ARG005
-    return lambda rows, i: Background(rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3])
+    @overload(_background_of)
+    def _background(rows: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
+        if is_none(rows):
+            return lambda rows, i: None  # noqa: ARG005
+        return lambda rows, i: Background(rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3])
 
-
-@extending.overload(_flux_error_of, strict=False)
-def _compile_flux_error_of(knots: Any, grid: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
-    if knots is numba.types.none:
-        return lambda knots, grid, i: None  # noqa: ARG005
-    return lambda knots, grid, i: FluxError(knots[i], grid[0], grid[1])
+    @overload(_flux_error_of)
+    def _flux_error(knots: Any, grid: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
+        if is_none(knots):
+            return lambda knots, grid, i: None  # noqa: ARG005
+        return lambda knots, grid, i: FluxError(knots[i], grid[0], grid[1])

@@ -6,12 +6,10 @@ The frames of an object that moves are blocks of one; all frames of an object at
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
-from numba import extending
 from numpy.typing import NDArray
 
-from simulator.compiled import compiled
+from simulator.compiled import compiled, when_compiling
 
 __all__ = [
     "FIRST",
@@ -145,14 +143,18 @@ def _block(frames: Array, starts: NDArray[np.int64] | None, b: int) -> Block:
     return Block(None, frames[starts[b] : starts[b + 1]])
 
 
-@extending.overload(_block, strict=False)
-def _compile_block(frames: Any, starts: Any, b: Any) -> Callable[..., Any]:  # noqa: ARG001
-    # the type of what is returned depends on that of an argument
-    if starts is numba.types.none:
-        return lambda frames, starts, b: Block(  # noqa: ARG005
-            Frame(frames[b, FIRST], frames[b, SECOND], frames[b, GAIN]), None
-        )
-    return lambda frames, starts, b: Block(None, frames[starts[b] : starts[b + 1]])
+@when_compiling
+def _overload_block() -> None:
+    from simulator.machine_code import is_none, overload
+
+    @overload(_block)
+    def _(frames: Any, starts: Any, b: Any) -> Callable[..., Any]:  # noqa: ARG001
+        # the type of what is returned depends on that of an argument
+        if is_none(starts):
+            return lambda frames, starts, b: Block(  # noqa: ARG005
+                Frame(frames[b, FIRST], frames[b, SECOND], frames[b, GAIN]), None
+            )
+        return lambda frames, starts, b: Block(None, frames[starts[b] : starts[b + 1]])
 
 
 @compiled

@@ -58,7 +58,7 @@ def _gaussian(
         area = determinant(noise)
         turned = noise.common2 * e1 - noise.common1 * e2
         square = noise.own2 * e1 * e1 + noise.own1 * e2 * e2
-        square = square + noise.shared * (e1 - e2) ** 2 + turned * turned
+        square = square + noise.shared * ((e1 - e2) * (e1 - e2)) + turned * turned
         ratio = read[0] / unit
         return -0.5 * square / area - 0.5 * math.log(area / ratio / ratio)
     else:  # noqa: RET505  # a branch, so that it is pruned at compile time
@@ -196,7 +196,7 @@ def _covariance_slope(
         p22 = (own1 + shared + s1 * s1) / unit / unit / scale
         p12 = -(shared + s1 * s2) / unit / unit / scale
         w1, w2 = pull
-        square = d1 * w1 * w1 + d2 * w2 * w2 + dk * (w1 + w2) ** 2
+        square = d1 * w1 * w1 + d2 * w2 * w2 + dk * ((w1 + w2) * (w1 + w2))
         square += 2.0 * (w1 * t1 + w2 * t2) * (w1 * s1 + w2 * s2)
         q1, q2 = precision_times((s1, s2), mean, signal, instrument)
         trace = d1 * p11 + d2 * p22 + dk * (p11 + 2.0 * p12 + p22) + 2.0 * (t1 * q1 + t2 * q2)

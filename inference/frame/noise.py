@@ -96,7 +96,7 @@ def determinant(noise: NoiseParts) -> float:
         + shared * (own1 + own2)
         + own2 * s1 * s1
         + own1 * s2 * s2
-        + shared * (s1 - s2) ** 2
+        + shared * ((s1 - s2) * (s1 - s2))
     )
 
 

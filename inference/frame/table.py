@@ -74,11 +74,11 @@ def _too_coarse(
         y2 = (table[MEAN_2, k + 1] - table[MEAN_2, k]) / unit[1]
         length2 = x2 * x2 + y2 * y2
         along = x1 * x2 + y1 * y2
-        if max(length1, length2) > _VISIBLE**2 and (
-            along <= 0.0 or along * along < TURN**2 * length1 * length2
+        if max(length1, length2) > _VISIBLE * _VISIBLE and (
+            along <= 0.0 or along * along < TURN * TURN * length1 * length2
         ):
-            split[k - 1] = split[k - 1] or length1 > _VISIBLE**2
-            split[k] = length2 > _VISIBLE**2
+            split[k - 1] = split[k - 1] or length1 > _VISIBLE * _VISIBLE
+            split[k] = length2 > _VISIBLE * _VISIBLE
         x1, y1, length1 = x2, y2, length2
     if shot is not None:
         # shot noise vanishes where a mean reading does, and the difference's where both are equal

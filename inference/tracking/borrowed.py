@@ -6,7 +6,9 @@ by a kernel that counts. Each says so itself: one that was compiled before keeps
 """
 
 from collections.abc import Callable
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import ParamSpec, TypeVar, cast
+
+from simulator.compiled import Kernel
 
 __all__ = ["borrowed"]
 
@@ -16,6 +18,5 @@ R = TypeVar("R")
 
 def borrowed(kernel: Callable[P, R]) -> Callable[P, R]:
     """Have a compiled kernel leave the reference counts of its arrays alone."""
-    dispatcher = cast("Any", kernel)
-    dispatcher.targetoptions["_nrt"] = dispatcher.called.targetoptions["_nrt"] = False
+    cast("Kernel", kernel).options["_nrt"] = False
     return kernel

@@ -112,8 +112,8 @@ def _divide(
             x = (aways[row] - mean) / sd
             windows = 0.0
             for other in range(-_WINDOWS, _WINDOWS + 1):
-                windows += math.exp(-0.5 * (x - other) ** 2)
-            part = masses[row] * math.exp(-0.5 * (x - window) ** 2) / windows
+                windows += math.exp(-0.5 * ((x - other) * (x - other)))
+            part = masses[row] * math.exp(-0.5 * ((x - window) * (x - window))) / windows
             share += part
             shift += part * x
             square += part * x * x

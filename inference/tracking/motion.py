@@ -76,16 +76,23 @@ def _noise_over(x: float, fall: float, sd: float, time: float) -> Root:
     decay = 1.0 - fall
     if x < 0.1:
         # 2 x - 3 + 4 exp(-x) - exp(-2 x), whose first three orders cancel
-        square = x**3 * (
-            2.0 / 3.0
-            + x
+        square = (
+            x
+            * (x * x)
             * (
-                -0.5
+                2.0 / 3.0
                 + x
                 * (
-                    7.0 / 30.0
+                    -0.5
                     + x
-                    * (-1.0 / 12.0 + x * (31.0 / 1260.0 + x * (-1.0 / 160.0 + x * 127.0 / 90720.0)))
+                    * (
+                        7.0 / 30.0
+                        + x
+                        * (
+                            -1.0 / 12.0
+                            + x * (31.0 / 1260.0 + x * (-1.0 / 160.0 + x * 127.0 / 90720.0))
+                        )
+                    )
                 )
             )
         )

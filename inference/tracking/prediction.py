@@ -131,7 +131,8 @@ def _rate_given_u(of: Hypotheses, row: int, precision: float) -> Rate:
     for j in range(X.shape[-1]):
         slope += X[row, U, j] * X[row, V, j] * precision
     for j in range(X.shape[-1]):
-        square += (X[row, V, j] - slope * X[row, U, j]) ** 2
+        off = X[row, V, j] - slope * X[row, U, j]
+        square += off * off
     return Rate(of.x[row, V], slope, math.sqrt(square))
 
 

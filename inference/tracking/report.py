@@ -84,8 +84,10 @@ def _pool(out: Array, rows: Array, i: int, first: int, last: int, total: float) 
     square, rate_square = 0.0, 0.0
     for j in range(first, last):
         share = rows[i, j, WEIGHT] / total
-        square += share * (rows[i, j, SD] ** 2 + (rows[i, j, POSITION] - u) ** 2)
-        rate_square += share * (rows[i, j, RATE_SD] ** 2 + (rows[i, j, RATE] - rate) ** 2)
+        sd, off = rows[i, j, SD], rows[i, j, POSITION] - u
+        square += share * (sd * sd + off * off)
+        rate_sd, rate_off = rows[i, j, RATE_SD], rows[i, j, RATE] - rate
+        rate_square += share * (rate_sd * rate_sd + rate_off * rate_off)
     out[i, BEST + POSITION], out[i, BEST + SD] = u, math.sqrt(square)
     out[i, BEST + SCENE_SD], out[i, BEST + MODEL_SD] = scene, model
     out[i, BEST + RATE], out[i, BEST + RATE_SD] = rate, math.sqrt(rate_square)

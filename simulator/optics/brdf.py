@@ -77,7 +77,7 @@ def fresnel_dielectric(cosine: float, index: float) -> float:
     # g - c through the difference of squares: n -> 1 loses no digits
     down = (index - 1.0) * (index + 1.0) / up
     ratio = (cosine * up - 1.0) / (cosine * down + 1.0)
-    return 0.5 * (down / up) ** 2 * (1.0 + ratio * ratio)
+    return 0.5 * ((down / up) * (down / up)) * (1.0 + ratio * ratio)
 
 
 @compiled

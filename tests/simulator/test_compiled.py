@@ -2,7 +2,9 @@
 
 import ast
 import importlib.util
+import os
 import shutil
+import stat
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -10,9 +12,10 @@ from typing import Any
 import pytest
 
 import simulator.compiled
+from simulator import kernel_cache
 
 ROOT = Path(simulator.compiled.__file__).resolve().parents[1]
-DECORATORS = set(simulator.compiled.__all__)
+DECORATORS = {"compiled", "compiled_for_both"}
 MARK = "from simulator.compiled import compiled"
 KERNELS = sorted(
     path
@@ -24,7 +27,9 @@ KERNELS = sorted(
 
 def loaded_from(root: Path) -> ModuleType:
     """Return the module as a tree of its own would have it."""
-    spec = importlib.util.spec_from_file_location("a_compiled", root / "simulator" / "compiled.py")
+    spec = importlib.util.spec_from_file_location(
+        "a_kernel_cache", root / "simulator" / "kernel_cache.py"
+    )
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -49,9 +54,10 @@ TOP = Path("inference") / "density" / "collapsed.py"
 
 
 def directory_of(root: Path, path: Path = TOP) -> str:
-    directory = loaded_from(root)._cache_directory(root / path)
-    assert isinstance(directory, str)
-    return directory
+    folder = loaded_from(root).folder_of(root / path)
+    assert folder is not None
+    assert folder.writable
+    return str(folder.path)
 
 
 def used_by(path: Path) -> set[Path]:
@@ -105,12 +111,12 @@ def test_every_module_of_a_package_that_is_imported_from_counts(tree: Path) -> N
     assert len({before, with_new, directory_of(tree)}) == 3
 
 
-def test_the_directory_exists_and_lies_below_the_one_that_is_asked_for(
+def test_the_directory_lies_below_the_one_that_is_asked_for(
     tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = Path(directory_of(tree))
-    assert asked.is_dir()
     assert asked.parent == tmp_path / "cache" / "hybridtof"
+    assert stat.S_IMODE(asked.parent.stat().st_mode) == 0o700
     monkeypatch.delenv("NUMBA_CACHE_DIR")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
     assert directory_of(tree) == str(tmp_path / "xdg" / "hybridtof" / asked.name)
@@ -126,15 +132,6 @@ def four_times(x: float) -> float:
     return twice(twice(x))
 
 
-def test_a_kernel_that_a_kernel_calls_gets_its_way_in_from_python_when_it_is_used() -> None:
-    called: Any = twice
-    assert four_times(3.0) == 12.0
-    assert not called.overloads  # the twin's machine code is kept within the caller's
-    assert called.called.targetoptions["no_cpython_wrapper"]
-    assert twice(3.0) == 6.0
-    assert len(called.overloads) == 1
-
-
 @simulator.compiled.compiled_for_both
 def thrice(x: float, times: int) -> float:
     return 3.0 * x * times
@@ -145,11 +142,27 @@ def nine_times(x: float) -> float:
     return thrice(thrice(x, 0) + thrice(x, 1), 1)
 
 
+@pytest.fixture
+def always(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HYBRIDTOF_COMPILE", "always")
+
+
+@pytest.mark.usefixtures("always")
+def test_a_kernel_that_a_kernel_calls_gets_its_way_in_from_python_when_it_is_used() -> None:
+    kernel: Any = twice
+    assert four_times(3.0) == 12.0
+    assert not kernel.dispatcher.overloads  # the other's machine code is within the caller's
+    assert kernel.called.targetoptions["no_cpython_wrapper"]
+    assert twice(3.0) == 6.0
+    assert len(kernel.dispatcher.overloads) == 1
+
+
+@pytest.mark.usefixtures("always")
 def test_numbers_written_in_a_call_are_no_types_and_both_sides_may_share_machine_code() -> None:
     kernel: Any = thrice
     assert nine_times(2.0) == 18.0
     assert thrice(2.0, 1) == 6.0
-    assert len(kernel.overloads) == 1
+    assert len(kernel.dispatcher.overloads) == 1
 
 
 def half(x: float) -> float:
@@ -160,29 +173,60 @@ def no_home() -> Path:
     raise RuntimeError("Could not determine home directory.")
 
 
+def kept_in(folder: Path) -> dict[str, tuple[int, int]]:
+    """Return what lies below a folder, with its size and the time of its last change."""
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    stats = {path: path.stat() for path in files}
+    return {path.name: (found.st_size, found.st_mtime_ns) for path, found in stats.items()}
+
+
+@pytest.mark.usefixtures("always")
 def test_kernels_work_where_nothing_can_be_written(
-    tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "below"))
-    module = loaded_from(tree)
-    assert module._cache_directory(Path(__file__)) is None
-    assert module.compiled(half)(3.0) == 1.5
+    assert kernel_cache.base_folder() is None
+    assert simulator.compiled.compiled(half)(3.0) == 1.5
     monkeypatch.delenv("NUMBA_CACHE_DIR")
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setattr(Path, "home", no_home)
-    assert loaded_from(tree)._cache_directory(Path(__file__)) is None
+    assert kernel_cache.base_folder() is None
 
 
-def test_machine_code_is_kept_where_it_can_be(tree: Path) -> None:
-    module = loaded_from(tree)
-    assert module.compiled(half)(3.0) == 1.5
-    kept = {
-        path.suffix
-        for path in Path(module._cache_directory(Path(__file__))).rglob("*")
-        if path.is_file()
-    }
-    assert {".nbi", ".nbc"} <= kept
+@pytest.mark.usefixtures("always")
+def test_machine_code_is_kept_where_it_can_be_and_used_from_a_copy_that_is_read_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "first"))
+    assert simulator.compiled.compiled(half)(3.0) == 1.5
+    assert {Path(name).suffix for name in kept_in(tmp_path / "first")} == {".nbi", ".nbc"}
+    shutil.copytree(tmp_path / "first", tmp_path / "copy", copy_function=shutil.copyfile)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "copy"))
+    # as it is for one who may not write: the superuser may in any case
+    monkeypatch.setattr("simulator.kernel_cache.os.access", lambda *_: False)
+    before = kept_in(tmp_path / "copy")
+    kernel: Any = simulator.compiled.compiled(half)
+    assert kernel(3.0) == 1.5
+    assert sum(kernel.dispatcher.stats.cache_hits.values()) == 1
+    assert kernel(3) == 1.5  # of other types: compiled, and not kept
+    assert kept_in(tmp_path / "copy") == before
+
+
+@pytest.mark.parametrize("fault", ["of another user", "others may write"])
+def test_machine_code_of_others_is_refused(
+    fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    folder = tmp_path / "hybridtof"
+    folder.mkdir()
+    if fault == "others may write":
+        folder.chmod(0o777)
+    else:
+        os.chown(folder, 12345, -1) if os.getuid() == 0 else pytest.skip("needs the superuser")
+    with caplog.at_level("WARNING", logger="hybridtof"):
+        assert kernel_cache.base_folder() is None
+    assert str(folder) in caplog.text
 
 
 @pytest.mark.parametrize("path", KERNELS, ids=lambda path: str(path.relative_to(ROOT)))

@@ -66,7 +66,7 @@ def _reduce(system: _System) -> float:
     for i in range(min(d, rows)):
         for j in range(i, d + 1):
             triangle[i, j] = matrix[i, j]
-        taken += matrix[i, d] ** 2
+        taken += matrix[i, d] * matrix[i, d]
     return taken
 
 
@@ -81,7 +81,7 @@ def _linearise(system: _System, place: Place, bounds: Bounds, fit: Fit) -> float
         gradient, square = 0.0, 0.0
         for i in range(rows):
             gradient += matrix[i, j] * matrix[i, d]
-            square += matrix[i, j] ** 2
+            square += matrix[i, j] * matrix[i, j]
         x = place.x[j]
         fixed = (x <= bounds.low[j] and gradient < 0.0) or (x >= bounds.high[j] and gradient > 0.0)
         scale[j] = 0.0 if fixed else math.sqrt(square)
@@ -112,8 +112,9 @@ def _accelerate(
     damped_step(more, bent.triangle, system.scale, damping)
     size, change = 0.0, 0.0
     for j in range(d):
-        size += (system.scale[j] * step[j]) ** 2
-        change += (system.scale[j] * more[j]) ** 2
+        length, added = system.scale[j] * step[j], system.scale[j] * more[j]
+        size += length * length
+        change += added * added
     if change <= _BENT * _BENT * size:
         for j in range(d):
             step[j] += 0.5 * more[j]

@@ -200,7 +200,7 @@ def fill_projected(matrix: Array, place: Place, bounds: Bounds, fit: Fit) -> Non
         for a in range(m):
             _along_coordinates(matrix[first + a], rows, a, chained)
             matrix[first + a, d] = rows[a, Value.READINGS]
-            length += rows[a, Value.LOG_RANGE] ** 2
+            length += rows[a, Value.LOG_RANGE] * rows[a, Value.LOG_RANGE]
         if not (math.isfinite(u) and length > 0.0 and low < u < high):
             continue
         for j in range(d + 1):

@@ -34,7 +34,8 @@ def reduce_columns(matrix: Array, columns: int) -> None:
             continue
         square = 0.0
         for i in range(k, rows):
-            square += (matrix[i, k] / largest) ** 2
+            part = matrix[i, k] / largest
+            square += part * part
         norm = -math.copysign(largest * math.sqrt(square), matrix[k, k])
         head = matrix[k, k] - norm
         for j in range(k + 1, width):

@@ -1,0 +1,97 @@
+"""Kernels as machine code: what is used of numba, imported when it is first needed."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from numba import extending, types
+from numba.core import caching
+
+from simulator.kernel_cache import CacheFolder
+
+__all__ = ["dispatcher", "is_none", "overload", "unliteral"]
+
+F = TypeVar("F", bound=Callable[..., Any])
+# numba's classes carry no types, and its stubs know a part of its options
+_njit: Any = numba.njit
+_FunctionCache: Any = caching.FunctionCache
+_CacheLocator: Any = caching._CacheLocator
+_CacheImpl: Any = caching.CompileResultCacheImpl
+
+_overload: Any = extending.overload
+unliteral: Any = types.unliteral
+
+
+def overload(function: Callable[..., Any]) -> Callable[[F], F]:
+    """Choose the body of a function that kernels call by the types of its arguments."""
+    chosen: Callable[[F], F] = _overload(function, strict=False)
+    return chosen
+
+
+def is_none(kind: object) -> bool:
+    """Tell whether a type is that of None."""
+    return kind is types.none
+
+
+class _Locator(_CacheLocator):  # type: ignore[misc]
+    """Names files by function and line: the folder is that of exactly these sources."""
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._folder, self._line = folder, function.__code__.co_firstlineno
+
+    def ensure_cache_path(self) -> None:
+        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+
+    def get_cache_path(self) -> str:
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        return ""  # the folder says it all: no times, so that a copy is as good
+
+    def get_disambiguator(self) -> str:
+        return str(self._line)
+
+
+class _Impl(_CacheImpl):  # type: ignore[misc]
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._lineno = function.__code__.co_firstlineno
+        self._locator = _Locator(function, folder)
+        self._filename_base = self.get_filename_base(
+            f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}", ""
+        )
+
+
+class _Cache(_FunctionCache):  # type: ignore[misc]
+    """numba's cache of a function, in a folder that may be read-only."""
+
+    def __init__(self, function: Callable[..., Any], folder: Path, writable: bool) -> None:
+        self._writable = writable
+        self._impl_class = lambda one: _Impl(one, folder)
+        super().__init__(function)
+
+    def save_overload(self, signature: Any, result: Any) -> None:
+        if self._writable:
+            super().save_overload(signature, result)
+
+
+def dispatcher(
+    function: Callable[..., Any], folder: CacheFolder | None, options: dict[str, bool]
+) -> Any:
+    """Return numba's dispatcher of a function, with its machine code in a folder.
+
+    Division by zero gives inf or nan as in numpy; the interpreter lock is released; no fast-math,
+    because error-free transformations and tests for nan must survive.
+    """
+    hidden = {name: value for name, value in options.items() if name.startswith("_")}
+    made = _njit(
+        nogil=True,
+        error_model="numpy",
+        fastmath=False,
+        no_cfunc_wrapper=True,  # nothing here is called from C
+        **{name: value for name, value in options.items() if name not in hidden},
+    )(function)
+    made.targetoptions.update(hidden)
+    if folder is not None:
+        made._cache = _Cache(function, *folder)
+    return made
