@@ -1,9 +1,10 @@
 """Notices when kernels are compiled in this process, and what that takes."""
 
-import sys
 import time
 from collections.abc import Callable
 from typing import Any
+
+from simulator.compiled import given_up_s, when_compiling
 
 __all__ = ["compiling_s", "watch_compiling"]
 
@@ -39,7 +40,7 @@ _watch = _Watch()
 
 
 def watch_compiling(tell: Callable[[bool], None]) -> None:
-    """Be told when compiling begins and ends, from now on, where numba is loaded at all.
+    """Be told when compiling begins and ends, from now on.
 
     Parameters
     ----------
@@ -47,22 +48,29 @@ def watch_compiling(tell: Callable[[bool], None]) -> None:
         Gets True at the beginning and False at the end; takes the place of the one before.
     """
     _watch.tell = tell
-    if not _watch.listening and "numba" in sys.modules:
-        from numba.core import event
-
-        register: Any = event.register  # numba has no types here
-
-        class Listener(event.Listener):
-            def on_start(self, _: Any) -> None:
-                _watch.begin()
-
-            def on_end(self, _: Any) -> None:
-                _watch.end()
-
-        register(_EVENT, Listener())
+    if not _watch.listening:
         _watch.listening = True
+        when_compiling(_listen)
+
+
+def _listen() -> None:
+    from numba.core import event
+
+    register: Any = event.register  # numba has no types here
+
+    class Listener(event.Listener):
+        def on_start(self, _: Any) -> None:
+            _watch.begin()
+
+        def on_end(self, _: Any) -> None:
+            _watch.end()
+
+    register(_EVENT, Listener())
 
 
 def compiling_s() -> float:
-    """Return the processor time that compiling has taken since it is watched [s]."""
-    return _watch.seconds
+    """Return the processor time that compiling has taken since it is watched [s].
+
+    With it what was tried without a compiler, in vain.
+    """
+    return _watch.seconds + given_up_s()

@@ -58,7 +58,6 @@ def work(pipe: "Connection[object, object]") -> None:
         except Exception as error:
             answer: tuple[bool, object] = (False, _portable(error))
         else:
-            # the task has brought numba with it, if it needs any
             watch_compiling(lambda going: pipe.send((COMPILING, going)))
             answer = _run(task)
         try:

@@ -10,6 +10,7 @@ more than twice of what it must. `HYBRIDTOF_COMPILE=always` compiles at the firs
 import functools
 import os
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import FunctionType
@@ -17,7 +18,7 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 from simulator.kernel_cache import CacheFolder, folder_of
 
-__all__ = ["Kernel", "compiled", "compiled_for_both", "when_compiling"]
+__all__ = ["Kernel", "compiled", "compiled_for_both", "given_up_s", "when_compiling"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -30,6 +31,7 @@ _MANY = 100_000
 _lock = threading.RLock()
 _waiting: list[Callable[[], None]] = []
 _machine: list[Any] = []
+_given_up_s = [0.0]
 
 
 def when_compiling(action: Callable[[], None]) -> Callable[[], None]:
@@ -40,6 +42,11 @@ def when_compiling(action: Callable[[], None]) -> Callable[[], None]:
         else:
             _waiting.append(action)
     return action
+
+
+def given_up_s() -> float:
+    """Return the time that calls took which the interpreter did not come to an end with [s]."""
+    return _given_up_s[0]
 
 
 def _compiler() -> Any:
@@ -168,11 +175,12 @@ class Kernel:
         if kwargs or not self._may_try(args):
             return self.dispatcher(*args, **kwargs)
         kind = uncompiled.kind_of(args)
-        spent_s = self._spent_s.get(kind, 0.0)
+        spent_s, began = self._spent_s.get(kind, 0.0), time.thread_time()
         try:
             answer, took_s = uncompiled.run(self._function, args, self._cost_s - spent_s)
         except uncompiled.NotSoError:
             self._spent_s[kind] = float("inf")
+            _given_up_s[0] += time.thread_time() - began
             dispatcher = self.dispatcher
             return dispatcher(*args)
         self._spent_s[kind] = spent_s + took_s
