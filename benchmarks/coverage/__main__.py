@@ -1,12 +1,13 @@
 """Coverage: finish the tables, then write the figure and print the shares.
 
-    python -m benchmarks.coverage [--workers 2] [--term with] [--only crosstalk] [--sets 50]
+    python -m benchmarks.coverage [--workers 2] [--term default] [--only crosstalk] [--sets 50]
 
 Interrupt it at will: it goes on where it stopped. With `--sets 0` it only reads the tables.
 """
 
 import argparse
 import functools
+import itertools
 import multiprocessing
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import ExitStack
@@ -16,7 +17,6 @@ from benchmarks.coverage.classes import CLASSES, TERMS, class_row
 from benchmarks.coverage.figure import draw
 from benchmarks.coverage.intervals import COLUMNS
 from benchmarks.coverage.recorded import CELLS, recorded_row
-from benchmarks.coverage.recorded import TERMS as RECORDED_TERMS
 from benchmarks.coverage.report import SETS, coverage, recorded_report, report
 from benchmarks.resumable import code_version, resume, rows_of
 from tests.recorded.experiment import PATH
@@ -42,19 +42,16 @@ def main() -> None:
         if given.workers > 1:
             context = multiprocessing.get_context("spawn")
             executor = stack.enter_context(ProcessPoolExecutor(given.workers, context))
-        for term in given.term or TERMS:
-            for slug, group in CLASSES.items():
-                if term not in group.terms or (given.only and slug not in given.only):
-                    continue
-                work = functools.partial(class_row, group, term, version=version)
-                done = resume(_table(slug, term), COLUMNS, range(given.sets), work, executor)
-                if done:
-                    print(f"{group.name}, {term}: {done} data sets done", flush=True)
-            wanted = term in RECORDED_TERMS and (not given.only or "recorded" in given.only)
-            if wanted and given.sets and PATH.exists():
+        terms = given.term or list(TERMS)
+        classes = [each for each in given.only or [*CLASSES, "recorded"] if each in CLASSES]
+        for number in range(given.sets):  # the first of every class first, so that any time tells
+            for slug, term in itertools.product(classes, terms):
+                work = functools.partial(class_row, CLASSES[slug], term, version=version)
+                resume(_table(slug, term), COLUMNS, range(number + 1), work, executor)
+        if given.sets and PATH.exists() and (not given.only or "recorded" in given.only):
+            for term in terms:
                 work = functools.partial(recorded_row, term, version=version)
-                numbers = range(len(CELLS))
-                resume(_table("recorded", term), COLUMNS, numbers, work, executor)
+                resume(_table("recorded", term), COLUMNS, range(len(CELLS)), work, executor)
     found = [
         coverage(group.name, term, rows)
         for slug, group in CLASSES.items()
@@ -64,7 +61,7 @@ def main() -> None:
     if found:
         draw(found, FIGURE)
     print(report(found))
-    recorded = [(term, row) for term in RECORDED_TERMS for row in rows_of(_table("recorded", term))]
+    recorded = [(term, row) for term in TERMS for row in rows_of(_table("recorded", term))]
     print("", recorded_report(recorded), sep="\n")
 
 

@@ -52,19 +52,8 @@ SHADOW: Mapping[str, Any] = {
     "c0": {"prior": "lognormal", "median": 0.05, "sigma": 2.0},
     "c1": {"prior": "normal", "mean": 0.0, "sd": 0.5},
 }
-# what the scene says of the ranges and of the model's error
-SUPPORT = {"low": 0.02, "high": 15.0}
-_WITH: Mapping[str, Any] = {
-    "range_m": {"prior": "reference", **SUPPORT},
-    "discrepancy": "default",
-}
-# the default prior of c0 leaves a percent to mirrors, whose flux is a square law at any range: the
-# same median, twice the spread of its logarithm
-TERMS: Mapping[str, Mapping[str, Any]] = {
-    "without": {"range_m": {"prior": "loguniform", **SUPPORT}, "discrepancy": 0},
-    "with": _WITH,
-    "wide": {**_WITH, "object": {"c0": {"prior": "lognormal", "median": 0.1, "sigma": 4.0}}},
-}
+# what the scene says of the model's error; of the ranges it says nothing
+TERMS: Mapping[str, Mapping[str, Any]] = {"default": {}, "exact": {"discrepancy": 0}}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,12 +81,6 @@ class SceneClass:
     def slug(self) -> str:
         """Name of its file."""
         return self.name.lower().replace(", ", "-").replace(" ", "-")
-
-    @property
-    def terms(self) -> tuple[str, ...]:
-        """What inference is told, by turns; the object's prior matters beside other light only."""
-        beside = self.crosstalk or self.background
-        return tuple(term for term in TERMS if beside or term != "wide")
 
 
 CLASSES: Mapping[str, SceneClass] = {

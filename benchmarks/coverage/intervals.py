@@ -1,5 +1,6 @@
 """How the 90 % intervals of one data set stand to the truth, as a row of a table."""
 
+import time
 from collections.abc import Mapping
 from typing import Any
 
@@ -28,6 +29,7 @@ COLUMNS = (
     "scale",
     "converged",
     "ess",
+    "seconds",
     "reason",
 )
 
@@ -52,7 +54,7 @@ def interval_row(
     scene : mapping
         What inference is told.
     truth_m : ndarray, shape (n,)
-        True ranges [m].
+        True ranges [m]; nan for a frame without object.
     settings : SamplerSettings
         Of the posterior.
     version : str
@@ -63,16 +65,19 @@ def interval_row(
     Row
         ``inside``: share of the intervals that hold the truth; ``width``: median of width over
         truth; ``error``: median of median over truth, minus one; ``scale``: status of the common
-        scale of the ranges; ``converged``: by effective sample size and R-hat. Without these where
-        the posterior was refused.
+        scale of the ranges; ``converged``: by effective sample size and R-hat; ``seconds`` of
+        processor time. Without these where the posterior was refused.
     """
     row: dict[str, str | int | float] = {"scene": name, "version": version}
+    start = time.process_time()
     try:
         found = sample(sensor, parse_scene(scene), frames, settings, every_gate=False)
     except RefusedError as error:
         return {**row, "converged": 0, "reason": f"refused: {error}"}
     posterior = found.posterior
-    low, middle, high = (getattr(posterior.range_m, q) for q in ("q05", "q50", "q95"))
+    there = np.isfinite(truth_m)
+    low, middle, high = (getattr(posterior.range_m, q)[there] for q in ("q05", "q50", "q95"))
+    truth_m = truth_m[there]
     enough = found.ess is not None and found.ess >= settings.target_ess
     settled = enough and found.rhat is not None and found.rhat <= MAX_R_HAT
     status = {each.parameter: each.status for each in posterior.identifiability}
@@ -84,6 +89,7 @@ def interval_row(
         "misfit": int(posterior.fit.misfit is True),
         "scale": status["range_m"],
         "converged": int(settled or posterior.verdict.converged),
+        "seconds": time.process_time() - start,
         "ess": "" if found.ess is None else round(found.ess),
         "reason": "" if settled else " / ".join(posterior.verdict.reasons),
     }

@@ -1,29 +1,30 @@
 """Recorded photons with injected crosstalk: the cells, and what inference is told of them."""
 
 import dataclasses
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from benchmarks.coverage.classes import TERMS
 from benchmarks.coverage.intervals import interval_row
 from benchmarks.resumable import Row
 from inference.posterior.settings import SamplerSettings
 from service.recordings import pulsed, sine_wave
+from simulator.frames import Frames
+from simulator.scene import parse_scene
+from simulator.simulate import simulate
+from simulator.trajectories import SampledTrajectory
 from tests.recorded.experiment import C2, GAIN, calibration_of, near_recording
 
-__all__ = ["CELLS", "TERMS", "RecordedCell", "recorded_row"]
+__all__ = ["CELLS", "RecordedCell", "recorded_row"]
 
-SUPPORT = {"low": 0.05, "high": 1.0}
-TERMS: Mapping[str, Mapping[str, Any]] = {
-    "without": {"range_m": {"prior": "loguniform", **SUPPORT}, "discrepancy": 0},
-    "with": {"range_m": {"prior": "reference", **SUPPORT}, "discrepancy": "default"},
-}
+EMPTY = 5  # frames without object, where there are any
+_RANGE_M = 0.3  # of the signal that crosstalk is compared with
 
 
 @dataclasses.dataclass(frozen=True)
 class RecordedCell:
-    """A sensor, a stroke, and crosstalk as a share of the signal at 0.3 m.
+    """A sensor, a stroke, crosstalk as a share of the signal at 0.3 m, and frames without object.
 
     Attributes
     ----------
@@ -36,32 +37,38 @@ class RecordedCell:
     housing : bool
         Whether it is light that never left the housing, at zero distance; otherwise it looks as if
         it came from 0.3 m.
+    empty : int
+        Frames of the crosstalk alone, with noise as the sensor states it.
     """
 
     kind: str
     low_m: float
     share: float
     housing: bool
+    empty: int
 
     @property
     def name(self) -> str:
         """Name in the table."""
         where = f" from {'the housing' if self.housing else '0.3 m'}" if self.share else ""
-        return f"{self.kind}, {self.low_m:g}-0.4 m, crosstalk {self.share:.0%}{where}"
+        light = f"crosstalk {self.share:.0%}{where}, {self.empty} empty"
+        return f"{self.kind}, {self.low_m:g}-0.4 m, {light}"
 
 
 CELLS = tuple(
-    RecordedCell(kind, low, share, housing)
+    RecordedCell(kind, low, share, housing, empty)
+    for empty in (EMPTY, 0)
+    for low in (0.1, 0.2)
+    for share, housing in ((0.1, True), (0.1, False), (0.3, True), (0.3, False))
     for kind in ("pulsed", "sine wave")
-    for low in (0.2, 0.25, 0.3)
-    for share, housing in ((0.0, True), (0.1, True), (0.1, False), (0.3, True), (0.3, False))
 )
 
 
 def recorded_row(term: str, number: int, version: str = "") -> Row:
     """Infer the ranges of a cell; nothing is known of object and crosstalk.
 
-    The prior of the crosstalk is as wide as the signal at 0.3 m.
+    The prior of the crosstalk is as wide as the signal at 0.3 m. Intervals are those of the frames
+    with an object.
     """
     cell = CELLS[number]
     recording = near_recording()
@@ -70,13 +77,21 @@ def recorded_row(term: str, number: int, version: str = "") -> Row:
     truth = recording.distance_m
     form = pulsed if cell.kind == "pulsed" else sine_wave
     sensor, clean = form(recording, calibration, gain=GAIN)
-    signal = clean.readings[int(np.argmin(np.abs(truth - 0.3)))]
+    signal = clean.readings[int(np.argmin(np.abs(truth - _RANGE_M)))]
     size = float(np.hypot(*signal))
     direction = signal / size
     if cell.housing:  # the late window sees nothing of it, and its phase is zero
         direction = np.array([0.0, 1.0]) if cell.kind == "pulsed" else np.array([1.0, 0.0])
-    readings = clean.readings + cell.share * size * direction
-    frames = dataclasses.replace(clean, readings=readings)
+    crosstalk = cell.share * size * direction
+    absent = SampledTrajectory(range_m=[1.0] * EMPTY, object_present=[False] * EMPTY)
+    known = parse_scene({"crosstalk": crosstalk.tolist()})
+    empty = simulate(sensor, known, absent, number).frames.readings[: cell.empty]
+    present = np.arange(truth.size + cell.empty) < truth.size
+    frames = Frames(
+        np.concatenate([clean.readings + crosstalk, empty]),
+        object_present=present if cell.empty else None,
+    )
+    truth = np.concatenate([truth, np.full(cell.empty, np.nan)])
     prior: dict[str, Any] = {"prior": "normal", "mean": 0.0, "sd": size}
     scene = {"object": {"c2": C2}, "crosstalk": [prior, prior], **TERMS[term]}
     if cell.kind == "pulsed":  # windows count photons
