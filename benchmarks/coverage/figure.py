@@ -11,12 +11,8 @@ from benchmarks.coverage.report import GOAL, Coverage
 
 __all__ = ["draw"]
 
-_COLOURS = {"without": "tab:red", "with": "tab:blue", "wide": "tab:green"}
-_LABELS = {
-    "without": "without the term",
-    "with": "discrepancy and reference prior of the ranges",
-    "wide": "the same, wider prior of c0",
-}
+_COLOURS = {"exact": "tab:red", "default": "tab:blue"}
+_LABELS = {"exact": "model taken for exact", "default": "nothing stated"}
 
 
 def draw(found: Sequence[Coverage], path: Path) -> None:
