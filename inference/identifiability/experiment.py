@@ -43,6 +43,8 @@ class Experiment:
         Standard deviation of a smooth error of the object's log flux along log r.
     common_range : bool
         Whether all frames have one unknown range: an object that is known not to move.
+    error : ndarray, shape (k,), optional
+        Coefficients of the flux's error that the readings have; left out: none.
     """
 
     sensor: Sensor
@@ -53,6 +55,7 @@ class Experiment:
     known: tuple[str, ...] = ()
     discrepancy: float | None = None
     common_range: bool = False
+    error: Array | None = None
 
     @functools.cached_property
     def terms(self) -> Terms:
@@ -79,7 +82,17 @@ class Experiment:
     @functools.cached_property
     def readings(self) -> Sensitivity:
         """Mean readings and their derivatives."""
-        return sensitivity(self.sensor, self.terms, self.log_r, self.gain)
+        return sensitivity(self.sensor, self.terms, self.log_r, self.gain, self._flux_error)
+
+    @property
+    def _flux_error(self) -> tuple[Array, Array] | None:
+        """Logarithm of the factor on the object's flux, and its slope along log r."""
+        if self.discrepancy is None or self.error is None:
+            return None
+        basis = discrepancy_basis(*self.parameters.reach_m)
+        present = np.isfinite(self.log_r)
+        at, size = np.where(present, self.log_r, basis.first), self.discrepancy * present
+        return size * (basis.values(at) @ self.error), size * (basis.slopes(at) @ self.error)
 
     @property
     def names(self) -> tuple[str, ...]:

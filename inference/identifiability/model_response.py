@@ -14,21 +14,25 @@ the range follows it, as far as the readings tell the range at all.
 """
 
 import dataclasses
-import functools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from inference.frame.sensitivity import sensitivity, whiteners
-from inference.identifiability.expected_posterior import rows_of, without_ranges
+from inference.frame.sensitivity import whiteners
 from inference.identifiability.experiment import Experiment
-from simulator.discrepancy import discrepancy_basis
+from inference.identifiability.response_rows import FluxStep, Rows, flux_step
 
-__all__ = ["ModelResponse", "curvature_of_response", "model_response"]
+__all__ = ["FluxError", "ModelResponse", "common_pull", "curvature_of_response", "model_response"]
 
 Array = NDArray[np.float64]
+Point = tuple[Array, Array, Array]  # change of z and of log r, coefficients of the flux's error
+
+_STEPS = 10
+_SHORTEST = 0.1  # share of a step
+_SETTLED = 0.1  # of the deviance, that the last step gained
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -72,6 +76,9 @@ class ModelResponse:
         Standard deviation of every z, were there no error of the model.
     shared : ndarray, shape (n,)
         That of log r that comes from z.
+    followed : ndarray, shape (rows,)
+        What the readings and priors are off the draw, as far as the exact model could follow them:
+        the noise of a draw, about the mode.
     """
 
     parameters: Array
@@ -83,116 +90,12 @@ class ModelResponse:
     alone: Array
     sd: Array
     shared: Array
+    followed: Array
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Rows:
-    """What readings and priors tell at one point, its ranges eliminated on demand."""
-
-    experiment: Experiment
-
-    @functools.cached_property
-    def _all(self) -> tuple[Array, Array, Array, Array]:
-        """Derivatives along z, the flux's errors and log r, and rows of z's prior."""
-        e = self.experiment
-        jacobian, along, extra = rows_of(e)
-        d = len(e.parameters)
-        present = np.isfinite(e.log_r)
-        # a range that the readings do not tell stays within its prior's support
-        low, high = e.range_prior.low, e.range_prior.high
-        room = math.log(high / low) if low > 0 else math.inf
-        if room > 0:
-            limit = math.sqrt(12.0) / room
-            wide = present & (np.abs(along[:, 2]) < limit)
-            if e.common_range:
-                wide &= np.cumsum(present) == 1
-            along[wide, 2] = limit
-        prior = np.concatenate([np.eye(d), *(rows[:, :d] for rows in extra[1:])])
-        return jacobian[:, :, :d], jacobian[:, :, d:], along, prior
-
-    @property
-    def by_error(self) -> Array:
-        """Whitened derivatives along the flux's errors, shape (n, 3, k)."""
-        return self._all[1]
-
-    @property
-    def jacobian(self) -> Array:
-        """Whitened derivatives along z, shape (n, 3, d)."""
-        return self._all[0]
-
-    @property
-    def along(self) -> Array:
-        """Whitened derivatives along log r, shape (n, 3)."""
-        return self._all[2]
-
-    def follow(self, errors: Array, of_prior: Array | None = None) -> tuple[Array, Array, Array]:
-        """Return how z and log r follow errors of the readings, and what is left of these.
-
-        Parameters
-        ----------
-        errors : ndarray, shape (n, 3, k)
-            Of two whitened readings, and of the prior of log r.
-        of_prior : ndarray, shape (d, k), optional
-            Of the prior of z; left out: none.
-
-        Returns
-        -------
-        (ndarray, ndarray, ndarray)
-            Shapes (d, k), (n, k), and (rows, k) across all that the model can follow.
-        """
-        jacobian, _, along, prior = self._all
-        d, k = jacobian.shape[2], errors.shape[2]
-        both = np.concatenate([jacobian, errors], axis=2)
-        across, response, _ = without_ranges(self.experiment, both, along)
-        rows = across.reshape(-1, d + k)
-        seen = np.concatenate([rows[:, d:], np.zeros((len(prior), k))])
-        if of_prior is not None:
-            seen[len(rows) : len(rows) + d] = of_prior
-        change = np.zeros((d, k))
-        if d > 0:
-            own = np.concatenate([rows[:, :d], prior])
-            factor, triangle = linalg.qr(own, mode="economic", check_finite=False)
-            told = factor.T @ seen
-            change = linalg.solve_triangular(triangle, told)
-            seen = seen - factor @ told
-        # `response` leaves the readings where they are: an error in them moves the range against it
-        return change, response[:, :d] @ change - response[:, d:], seen
-
-    def residual(self, seen: Array) -> Array:
-        """Return what readings, shape (n, 2), and priors of the ranges are off, (n, 3, 1)."""
-        e, law = self.experiment, self.experiment.range_prior
-        present, along = np.isfinite(e.log_r), self._all[2]
-        u = np.where(present, e.log_r, 0.0)
-        off = np.zeros((u.size, 3, 1))
-        whitener = whiteners(e.sensor, e.readings)
-        off[:, :2, 0] = np.einsum("nij,nj->ni", whitener, seen - e.readings.mean)
-        pull = np.exp(u) * (law.mean - np.exp(u)) * law.inverse_sd**2
-        pull += (law.log_mean - u) * law.log_inverse_sd**2
-        np.divide(pull, along[:, 2], out=off[:, 2, 0], where=along[:, 2] > 0)
-        return off
-
-    def spreads(self) -> tuple[Array, Array, Array, Array]:
-        """Return ``own``, ``alone``, ``sd`` and ``shared`` of `ModelResponse`."""
-        jacobian, _, along, prior = self._all
-        across, response, variance = without_ranges(self.experiment, jacobian, along)
-        present = np.isfinite(self.experiment.log_r)
-        own = np.where(present, np.sqrt(np.where(present, variance, 0.0)), 0.0)
-        d = jacobian.shape[2]
-        if d == 0:
-            return own, np.zeros(0), np.zeros(0), np.zeros(own.size)
-        rows = np.concatenate([across.reshape(-1, d), prior])
-        factor = linalg.solve_triangular(linalg.qr(rows, mode="r")[0][:d], np.eye(d))
-        alone, sd = 1.0 / np.linalg.norm(rows, axis=0), np.linalg.norm(factor, axis=1)
-        return own, alone, sd, np.linalg.norm(response @ factor, axis=1)
-
-
-def _solved(triangle: Array, across: Array, off: Array) -> Array:
-    """Return the coefficients that readings off the model, shape (rows,), tell."""
-    mean = linalg.solve_triangular(triangle, across.T @ off, trans="T")
-    return np.asarray(linalg.solve_triangular(triangle, mean))
-
-
-def model_response(experiment: Experiment, readings: Array) -> ModelResponse:
+def model_response(
+    experiment: Experiment, readings: Array, pull: Array | None = None
+) -> ModelResponse:
     """Return the response of a posterior that takes its model for exact.
 
     Parameters
@@ -201,23 +104,23 @@ def model_response(experiment: Experiment, readings: Array) -> ModelResponse:
         A draw with its ranges; its ``discrepancy`` is the size of the flux's error.
     readings : ndarray, shape (n, 2)
         Of the frames.
+    pull : ndarray, shape (rows,), optional
+        What is ``followed`` by all draws, as `common_pull` finds it. Then steps are repeated until
+        they settle, each with its own derivatives; left out: the first is all.
 
     Returns
     -------
     ModelResponse
     """
-    rows = _Rows(experiment)
-    k, d = rows.by_error.shape[2], len(experiment.parameters)
-    of_prior = np.zeros((d, k + 1))
-    of_prior[:, k] = -experiment.z
-    both = np.concatenate([rows.by_error, rows.residual(readings)], axis=2)
-    change, moved, left = rows.follow(both, of_prior)
-    change, moved, across = change[:, :k], moved[:, :k], left[:, :k]
-    # what is known of the error: its precision is I + across^T across, and readings off the model
-    # by what nothing else can follow tell its mean
-    triangle = linalg.qr(np.concatenate([across, np.eye(k)]), mode="r")[0][:k]
-    mean = _solved(triangle, across, left[:, k])
-    spread = np.asarray(linalg.solve_triangular(triangle, np.eye(k)))
+    rows = Rows(experiment)
+    step = flux_step(rows, rows.residual(readings), -experiment.z)
+    k = step.across.shape[1]
+    mean = step.coefficients(np.zeros(k))
+    point = step.by_error[0] @ mean, step.by_error[1] @ mean, mean
+    followed = step.followed
+    if pull is not None:
+        point, step = _settled(rows, step, point, pull)
+    spread = np.asarray(linalg.solve_triangular(step.triangle, np.eye(k)))
     along = np.square(rows.along)
     whole = along.sum(axis=1)
     if experiment.common_range:
@@ -225,20 +128,99 @@ def model_response(experiment: Experiment, readings: Array) -> ModelResponse:
         told[~np.isfinite(experiment.log_r)] = 0.0
     else:
         told = np.divide(along[:, :2].sum(axis=1), whole, out=np.zeros(whole.size), where=whole > 0)
-    error = FluxError(mean, spread)
-    shift = -change @ mean, -moved @ mean
-    return ModelResponse(-change @ spread, -moved @ spread, shift, error, told, *rows.spreads())
+    error = FluxError(point[2], spread)
+    follow = step.by_error[0] @ spread, step.by_error[1] @ spread
+    return ModelResponse(*follow, point[:2], error, told, *rows.spreads(), followed)
 
 
-def curvature_of_response(experiment: Experiment, coefficients: Array) -> float:
-    """Return how far the linear response misses where one error of the flux leads.
+def common_pull(responses: Sequence[ModelResponse]) -> Array:
+    """Return what all draws could follow and do not, shape (rows,); zero where that is little.
+
+    Draws lie about the mode of readings that the exact model can make, but for what volume adds,
+    one squared standard deviation an unknown at most. Readings that it cannot make are not met
+    best where its mode is: noise that grows with the signal, for one, pulls it to more noise.
+    """
+    mean = np.mean([each.followed for each in responses], axis=0)
+    size = float(np.square(mean).sum())
+    unknowns = len(responses[0].parameters)
+    return np.asarray(mean * (1.0 - unknowns / size if size > unknowns else 0.0))
+
+
+def _moved(experiment: Experiment, by: Point) -> Experiment:
+    z, log_r = experiment.z + by[0], experiment.log_r + by[1]
+    return dataclasses.replace(experiment, z=z, log_r=log_r, error=by[2])
+
+
+def _settled(rows: Rows, first: FluxStep, point: Point, pull: Array) -> tuple[Point, FluxStep]:
+    """Repeat steps until they settle: where they lead, and the last one's derivatives.
+
+    A draw of the exact model's posterior lies beside its mode by what noise lets it. That stays as
+    it is: readings and priors are taken to be off by what the first step leaves of them and what
+    pulls all draws, so that the mode would be where the draw is.
+    """
+    e, d = rows.experiment, rows.experiment.z.size
+    n = e.log_r.size
+    off_by = first.left + pull
+    left = off_by[: 3 * n].reshape(n, 3)
+    whitener = whiteners(e.sensor, e.readings)
+    readings = e.readings.mean + np.linalg.solve(whitener, left[:, :2, None])[:, :, 0]
+    of_prior = off_by[3 * n : 3 * n + d]
+
+    def cost(by: Point) -> float:
+        with np.errstate(all="ignore"):
+            mean = _moved(e, by).readings.mean
+            off = np.einsum("nij,nj->ni", whitener, readings - mean)
+        pulls = of_prior - by[0], by[2]
+        value = float(np.square(off).sum() + sum(np.square(pull).sum() for pull in pulls))
+        return value if math.isfinite(value) else math.inf
+
+    start, none = point, (np.zeros(d), np.zeros(n), np.zeros(point[2].size))
+    step, last = first, cost(none)
+    if not cost(point) < last:  # half the way is nearer
+        point = none
+    else:
+        last = cost(point)
+    for _ in range(_STEPS):
+        here = Rows(_moved(e, point))
+        off = here.residual(readings)
+        off[:, 2] = left[:, 2] - rows.along[:, 2] * point[1]
+        tried = flux_step(here, off, of_prior - point[0])
+        by = tried.coefficients(point[2])
+        way = (
+            tried.by_readings[0] + tried.by_error[0] @ by,
+            tried.by_readings[1] + tried.by_error[1] @ by,
+            by,
+        )
+        share = 1.0
+        while share > _SHORTEST:
+            following = (
+                point[0] + share * way[0],
+                point[1] + share * way[1],
+                point[2] + share * way[2],
+            )
+            if cost(following) < last:
+                break
+            share *= 0.5
+        else:
+            break
+        point, step, gained = following, tried, last - cost(following)
+        last -= gained
+        if gained < _SETTLED:
+            break
+    return (start, first) if point is none else (point, step)
+
+
+def curvature_of_response(experiment: Experiment, response: ModelResponse, normal: Array) -> float:
+    """Return how far the response misses where one error of the flux leads.
 
     Parameters
     ----------
     experiment : Experiment
         As for `model_response`.
-    coefficients : ndarray, shape (k,)
-        Of the error.
+    response : ModelResponse
+        What that found.
+    normal : ndarray, shape (k,)
+        The error: standard normal variates beside the mean of what is known of it.
 
     Returns
     -------
@@ -246,27 +228,24 @@ def curvature_of_response(experiment: Experiment, coefficients: Array) -> float:
         Root mean square over the frames of what the next Gauss-Newton step would still move log r
         by; inf where it leads beyond what numbers hold.
     """
-    e, rows = experiment, _Rows(experiment)
+    e, rows = experiment, Rows(experiment)
     present = np.isfinite(e.log_r)
-    change, moved, across = rows.follow(rows.by_error)
-    dz, du = -change @ coefficients, np.where(present, -moved @ coefficients, 0.0)
     if e.discrepancy is None or not present.any():
         return 0.0
-    basis = discrepancy_basis(*e.parameters.reach_m)
-    at = np.where(present, e.log_r + du, basis.first)
-    size = np.where(present, e.discrepancy, 0.0)
-    curve = (size * (basis.values(at) @ coefficients), size * (basis.slopes(at) @ coefficients))
+    of = response
+    by = (
+        of.shift[0] + of.parameters @ normal,
+        np.where(present, of.shift[1] + of.log_r @ normal, 0.0),
+        of.error.mean + of.error.spread @ normal,
+    )
     with np.errstate(all="ignore"):
-        terms = e.parameters.terms((e.z + dz)[None])
-        mean = sensitivity(e.sensor, terms, e.log_r + du, e.gain, curve).mean
-        off = rows.residual(2.0 * e.readings.mean - mean)
+        off = rows.residual(2.0 * e.readings.mean - _moved(e, by).readings.mean)
     # to first order the readings stay where they are, but for what across leaves of the error
-    linear = rows.by_error @ coefficients + rows.jacobian @ dz + rows.along * du[:, None]
-    off[:, :2, 0] += linear[:, :2]
+    linear = rows.by_error @ by[2] + rows.jacobian @ by[0] + rows.along * by[1][:, None]
+    off[:, :2] += linear[:, :2]
     off[:, 2] = 0.0
     if not np.isfinite(off).all():
         return math.inf
-    dz, again, left = rows.follow(off)
-    triangle = linalg.qr(np.concatenate([across, np.eye(across.shape[1])]), mode="r")[0]
-    again = again[:, 0] - moved @ _solved(triangle[: across.shape[1]], across, left[:, 0])
+    step = flux_step(rows, off, np.zeros(e.z.size))
+    again = step.by_readings[1] + step.by_error[1] @ step.coefficients(np.zeros(by[2].size))
     return float(np.sqrt(np.mean(np.square(again[present]))))

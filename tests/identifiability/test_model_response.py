@@ -1,13 +1,23 @@
 """The linear response to errors of the model, against all unknowns solved at once."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from inference.density.whitened import whitened
+from inference.frame.sensitivity import whiteners
 from inference.identifiability.expected_posterior import expected_posterior
 from inference.identifiability.experiment import Experiment
-from inference.identifiability.model_response import curvature_of_response, model_response
+from inference.identifiability.model_response import (
+    FluxError,
+    ModelResponse,
+    common_pull,
+    curvature_of_response,
+    model_response,
+)
 from simulator.parameters import parameters_of
 from simulator.scene import parse_scene
 from tests.posterior.scenes import UNKNOWN_CROSSTALK, sensor_of
@@ -74,9 +84,55 @@ def test_the_shift_is_that_of_all_unknowns_solved_at_once(range_m: dict[str, obj
 def test_a_small_error_is_followed_to_second_order() -> None:
     """Half the error misses by a quarter."""
     at, rng = experiment("pulsed", 1000.0), np.random.default_rng(5)
-    coefficients = rng.standard_normal(at.by_error.shape[2])
-    missed = [curvature_of_response(at, np.asarray(s * coefficients)) for s in (0.04, 0.02)]
+    found = model_response(at, at.readings.mean)
+    still = np.zeros(found.error.mean.size)
+    none = FluxError(still, np.eye(still.size))
+    follow = _by_coefficients(found)
+    found = dataclasses.replace(found, shift=(0 * at.z, 0 * at.log_r), error=none, **follow)
+    coefficients = rng.standard_normal(still.size)
+    missed = [curvature_of_response(at, found, s * coefficients) for s in (0.04, 0.02)]
     assert missed[1] / missed[0] == pytest.approx(0.25, abs=0.05)
+
+
+def _by_coefficients(found: ModelResponse) -> dict[str, Array]:
+    """Return the response to the error's own coefficients."""
+    back = np.linalg.inv(found.error.spread)
+    return {"parameters": found.parameters @ back, "log_r": found.log_r @ back}
+
+
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+def test_steps_settle_where_the_error_integrated_out_has_its_mode(kind: str) -> None:
+    """From where the exact model would be, hundreds of standard deviations off."""
+    at = experiment(kind, 1e4, empty=3)
+    size, d, n = at.by_error.shape[2], at.z.size, 15
+    error = np.asarray(1.5 * np.random.default_rng(2).standard_normal(size))
+    readings = dataclasses.replace(at, error=error, z=at.z + 0.3).readings.mean
+    whitener = whiteners(at.sensor, at.readings)
+
+    def off(x: Array) -> Array:
+        z, coefficients, log_r = x[:d], x[d : d + size], np.append(x[d + size :], [np.nan] * 3)
+        mean = dataclasses.replace(at, z=z, log_r=log_r, error=coefficients).readings.mean
+        return np.append(np.einsum("nij,nj->ni", whitener, readings - mean).ravel(), x[: d + size])
+
+    start = np.concatenate([at.z, np.zeros(size), at.log_r[:n]])
+    wanted = least_squares(off, start, x_scale="jac", max_nfev=100).x
+    first = model_response(at, readings)
+    found = model_response(at, readings, first.followed)
+    way = wanted[d + size :] - at.log_r[:n]
+    assert np.abs(first.shift[1][:n] - way).max() > 0.3 * np.abs(way).max()
+    assert found.shift[1][:n] == pytest.approx(way, abs=0.02 * np.abs(way).max())
+    assert at.z + found.shift[0] == pytest.approx(wanted[:d], abs=0.03)
+    assert found.error.mean == pytest.approx(wanted[d : d + size], abs=0.03)
+
+
+def test_noise_of_draws_pulls_nothing() -> None:
+    """The mean of 400 draws about one mode is off by a twentieth of each: five of 1 or less."""
+    at, rng = experiment("pulsed", 1000.0), np.random.default_rng(4)
+    noise = rng.standard_normal((400, 3 * at.log_r.size + at.z.size))
+    found = model_response(at, at.readings.mean)
+    assert not common_pull([dataclasses.replace(found, followed=row) for row in noise]).any()
+    pulled = [dataclasses.replace(found, followed=row + 10.0) for row in noise]
+    assert common_pull(pulled) == pytest.approx(10.0, abs=0.3)
 
 
 def test_a_range_that_the_prior_tells_does_not_follow() -> None:

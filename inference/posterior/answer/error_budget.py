@@ -20,6 +20,7 @@ from inference.density.collapsed import CollapsedDensity
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.model_response import (
     ModelResponse,
+    common_pull,
     curvature_of_response,
     model_response,
 )
@@ -36,6 +37,8 @@ Array = NDArray[np.float64]
 _REFERENCES = 200  # draws at which the response is computed
 _FRAMES = 20_000  # that this may cost
 _FEWEST = 20
+_STRAIGHT = 0.1  # share of the response that the next order adds, below which the first is all
+_THINNED = 4  # of them one is followed further
 _TRIED = 12  # of them, at which the response is followed beyond its first order
 _AT_ONCE = 20_000  # draws that are moved
 # what linear response is taken for at most: e-folds of a range, and standard deviations of a prior
@@ -183,6 +186,13 @@ def error_budget(
     readings = density.frames[:, :2]
     responses = [model_response(each, readings) for each in experiments]
     curvature = _curvature(experiments, responses, rng) if flux > 0 else 0.0
+    pull = common_pull(responses)
+    further = flux > 0 and job.scene.motion != "static"
+    if further and (curvature > _STRAIGHT or pull.any()):
+        fewer = slice(None, None, _THINNED)
+        chosen, experiments = chosen[fewer], experiments[fewer]
+        responses = [model_response(each, readings, pull) for each in experiments]
+        curvature = _curvature(experiments, responses, rng)
     stretch = np.hypot(1.0, min(curvature, 1.0))  # what the next order may add is no less wide
     by_z = [
         np.array([each.shift[0] for each in responses])[:, :, None],
@@ -229,7 +239,7 @@ def _curvature(
             return 0.0
         # what is wildly off counts as wholly off, and no more
         moved = float(np.mean(np.square((of.log_r @ normal + of.shift[1])[present])))
-        off = curvature_of_response(experiments[i], of.error.mean + of.error.spread @ normal)
+        off = curvature_of_response(experiments[i], of, normal)
         missed += min(off**2, moved)
         size += moved
     return float(np.sqrt(missed / size)) if size > 0 else 0.0

@@ -1,0 +1,172 @@
+"""What readings and priors tell at one point, its ranges eliminated: rows of linear systems."""
+
+import dataclasses
+import functools
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from inference.frame.sensitivity import whiteners
+from inference.identifiability.expected_posterior import rows_of, without_ranges
+from inference.identifiability.experiment import Experiment
+
+__all__ = ["FluxStep", "Rows", "flux_step"]
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Rows:
+    """What readings and priors tell at one point, its ranges eliminated on demand."""
+
+    experiment: Experiment
+
+    @functools.cached_property
+    def _all(self) -> tuple[Array, Array, Array, Array]:
+        """Derivatives along z, the flux's errors and log r, and rows of z's prior."""
+        e = self.experiment
+        jacobian, along, extra = rows_of(e)
+        d = len(e.parameters)
+        present = np.isfinite(e.log_r)
+        # a range that the readings do not tell stays within its prior's support
+        low, high = e.range_prior.low, e.range_prior.high
+        room = math.log(high / low) if low > 0 else math.inf
+        if room > 0:
+            limit = math.sqrt(12.0) / room
+            wide = present & (np.abs(along[:, 2]) < limit)
+            if e.common_range:
+                wide &= np.cumsum(present) == 1
+            along[wide, 2] = limit
+        prior = np.concatenate([np.eye(d), *(rows[:, :d] for rows in extra[1:])])
+        return jacobian[:, :, :d], jacobian[:, :, d:], along, prior
+
+    @property
+    def by_error(self) -> Array:
+        """Whitened derivatives along the flux's errors, shape (n, 3, k)."""
+        return self._all[1]
+
+    @property
+    def jacobian(self) -> Array:
+        """Whitened derivatives along z, shape (n, 3, d)."""
+        return self._all[0]
+
+    @property
+    def along(self) -> Array:
+        """Whitened derivatives along log r, shape (n, 3)."""
+        return self._all[2]
+
+    def follow(self, errors: Array, of_prior: Array | None = None) -> tuple[Array, Array, Array]:
+        """Return how z and log r follow errors of the readings, and what is left of these.
+
+        Parameters
+        ----------
+        errors : ndarray, shape (n, 3, k)
+            Of two whitened readings, and of the prior of log r.
+        of_prior : ndarray, shape (d, k), optional
+            Of the prior of z; left out: none.
+
+        Returns
+        -------
+        (ndarray, ndarray, ndarray)
+            Shapes (d, k), (n, k), and (rows, k) across all that the model can follow.
+        """
+        jacobian, _, along, prior = self._all
+        d, k = jacobian.shape[2], errors.shape[2]
+        both = np.concatenate([jacobian, errors], axis=2)
+        across, response, _ = without_ranges(self.experiment, both, along)
+        rows = across.reshape(-1, d + k)
+        seen = np.concatenate([rows[:, d:], np.zeros((len(prior), k))])
+        if of_prior is not None:
+            seen[len(rows) : len(rows) + d] = of_prior
+        change = np.zeros((d, k))
+        if d > 0:
+            own = np.concatenate([rows[:, :d], prior])
+            factor, triangle = linalg.qr(own, mode="economic", check_finite=False)
+            told = factor.T @ seen
+            change = linalg.solve_triangular(triangle, told)
+            seen = seen - factor @ told
+        # `response` leaves the readings where they are: an error in them moves the range against it
+        return change, response[:, :d] @ change - response[:, d:], seen
+
+    def residual(self, seen: Array) -> Array:
+        """Return what readings, shape (n, 2), and priors of the ranges are off, (n, 3)."""
+        e, law = self.experiment, self.experiment.range_prior
+        present, along = np.isfinite(e.log_r), self._all[2]
+        u = np.where(present, e.log_r, 0.0)
+        off = np.zeros((u.size, 3))
+        whitener = whiteners(e.sensor, e.readings)
+        off[:, :2] = np.einsum("nij,nj->ni", whitener, seen - e.readings.mean)
+        pull = np.exp(u) * (law.mean - np.exp(u)) * law.inverse_sd**2
+        pull += (law.log_mean - u) * law.log_inverse_sd**2
+        np.divide(pull, along[:, 2], out=off[:, 2], where=along[:, 2] > 0)
+        return off
+
+    def spreads(self) -> tuple[Array, Array, Array, Array]:
+        """Return ``own``, ``alone``, ``sd`` and ``shared`` of `ModelResponse`."""
+        jacobian, _, along, prior = self._all
+        across, response, variance = without_ranges(self.experiment, jacobian, along)
+        present = np.isfinite(self.experiment.log_r)
+        own = np.where(present, np.sqrt(np.where(present, variance, 0.0)), 0.0)
+        d = jacobian.shape[2]
+        if d == 0:
+            return own, np.zeros(0), np.zeros(0), np.zeros(own.size)
+        rows = np.concatenate([across.reshape(-1, d), prior])
+        factor = linalg.solve_triangular(linalg.qr(rows, mode="r")[0][:d], np.eye(d))
+        alone, sd = 1.0 / np.linalg.norm(rows, axis=0), np.linalg.norm(factor, axis=1)
+        return own, alone, sd, np.linalg.norm(response @ factor, axis=1)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FluxStep:
+    """A Gauss-Newton step with the flux's error: how all follow it, and how they follow readings.
+
+    Attributes
+    ----------
+    by_error : (ndarray, ndarray)
+        Change of z and of log r with the error's coefficients, shape (d, k) and (n, k), that
+        leaves the readings where they are as far as the model can.
+    by_readings : (ndarray, ndarray)
+        Change towards the readings, shape (d,) and (n,).
+    left, followed : ndarray, shape (rows,)
+        What readings and priors are off, divided into what is left of it then and the rest.
+    across : ndarray, shape (rows, k)
+        What nothing but the error can follow.
+    triangle : ndarray, shape (k, k)
+        Of what is known of the error: its precision is I + across^T across.
+    """
+
+    by_error: tuple[Array, Array]
+    by_readings: tuple[Array, Array]
+    left: Array
+    followed: Array
+    across: Array
+    triangle: Array
+
+    def coefficients(self, before: Array) -> Array:
+        """Return by how much the readings move coefficients, whose prior is standard normal."""
+        told = self.across.T @ self.left - before
+        told = linalg.solve_triangular(self.triangle, told, trans="T")
+        return np.asarray(linalg.solve_triangular(self.triangle, told))
+
+
+def flux_step(rows: Rows, off: Array, of_prior: Array) -> FluxStep:
+    """Return the step from what readings, shape (n, 3), and priors of z, shape (d,), are off."""
+    k = rows.by_error.shape[2]
+    prior = np.zeros((of_prior.size, k + 1))
+    prior[:, k] = of_prior
+    both = np.concatenate([rows.by_error, off[:, :, None]], axis=2)
+    change, moved, left = rows.follow(both, prior)
+    triangle = linalg.qr(np.concatenate([left[:, :k], np.eye(k)]), mode="r")[0][:k]
+    whole = np.zeros(len(left))
+    whole[: off.size] = off.ravel()
+    whole[off.size : off.size + of_prior.size] = of_prior
+    return FluxStep(
+        (-change[:, :k], -moved[:, :k]),
+        (change[:, k], moved[:, k]),
+        left[:, k],
+        whole - left[:, k],
+        left[:, :k],
+        triangle,
+    )
