@@ -6,6 +6,7 @@ Baseline: the same health checks against the idle server, in the same run.
 """
 
 import argparse
+import os
 import re
 import subprocess
 import sys
@@ -43,7 +44,11 @@ def main() -> None:
     n = parser.parse_args().frames
     start = time.perf_counter()
     command = (sys.executable, "-m", "service.cli", "serve", "--port", "0")
-    server = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)  # noqa: S603
+    limits = {"HYBRIDTOF_MAX_BODY_BYTES": str(2**28), "HYBRIDTOF_MAX_HELD_BYTES": str(2**30)}
+    limits |= {"HYBRIDTOF_REQUEST_S": "600"}
+    server = subprocess.Popen(  # noqa: S603
+        command, stderr=subprocess.PIPE, text=True, env=os.environ | limits
+    )
     assert server.stderr is not None
     try:
         match = None

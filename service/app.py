@@ -12,6 +12,7 @@ from inference.posterior import fold as posterior_fold
 from service import openapi, problems
 from service.border import gate
 from service.border.authorities import Authorities
+from service.border.held import Room
 from service.border.keys import KeyRing
 from service.border.traces import Traces
 from service.fold import Fold
@@ -84,5 +85,12 @@ def create_app(
     openapi.install(app, ROUTERS)
     for router in ROUTERS:
         app.include_router(router)
-    gate.install(app, ROUTERS, Authorities.of(settings.allowed_hosts), keys, traces)
+    gate.install(
+        app,
+        ROUTERS,
+        Authorities.of(settings.allowed_hosts),
+        keys,
+        traces,
+        Room(settings.max_held_bytes),
+    )
     return app

@@ -1,5 +1,6 @@
 """Request bodies: bytes, bounded; then JSON; then a validated request."""
 
+import asyncio
 import re
 from collections.abc import AsyncIterator
 from email.message import Message
@@ -7,8 +8,16 @@ from typing import Generic, TypeVar
 
 from fastapi import Request
 from starlette.datastructures import Headers
+from starlette.requests import ClientDisconnect
 
-from service.errors import BodyTooLargeError, MalformedError, UnsupportedMediaTypeError
+from service.border.held import Held
+from service.errors import (
+    BodyTooLargeError,
+    ClientGoneError,
+    MalformedError,
+    SlowClientError,
+    UnsupportedMediaTypeError,
+)
 from service.shared import shared_of
 from service.strict_json import check_bulk, decode
 from simulator.validated import Validated, parse
@@ -48,8 +57,14 @@ def parse_document(model: type[T], raw: bytes) -> T:
     return parse(model, data)
 
 
-async def read_limited(chunks: AsyncIterator[bytes], declared: str | None, limit: int) -> bytes:
-    """Collect a body, and stop as soon as it is too large.
+async def read_limited(
+    chunks: AsyncIterator[bytes],
+    declared: str | None,
+    limit: int,
+    held: Held,
+    client_s: float = 10.0,
+) -> bytes:
+    """Collect a body, and stop as soon as it is too large or too slow.
 
     Parameters
     ----------
@@ -59,6 +74,10 @@ async def read_limited(chunks: AsyncIterator[bytes], declared: str | None, limit
         The header ``Content-Length``.
     limit : int
         Largest number of bytes.
+    held : Held
+        Holds the bytes.
+    client_s : float
+        Time for the whole body [s], and a second more for every megabyte that is there.
 
     Returns
     -------
@@ -71,6 +90,12 @@ async def read_limited(chunks: AsyncIterator[bytes], declared: str | None, limit
         Where it is, or is declared to be, larger than ``limit``.
     MalformedError
         Where ``declared`` is not a number.
+    BusyError
+        Where there is no room for it among the bodies of others.
+    SlowClientError
+        Where it takes too long.
+    ClientGoneError
+        Where it ends before its end.
     """
     message = f"the body has more than {limit} bytes"
     if declared is not None:
@@ -79,10 +104,19 @@ async def read_limited(chunks: AsyncIterator[bytes], declared: str | None, limit
         if len(declared) > 18 or int(declared) > limit:
             raise BodyTooLargeError(message)
     body = bytearray()
-    async for chunk in chunks:
-        body += chunk
-        if len(body) > limit:
-            raise BodyTooLargeError(message)
+    begun = asyncio.get_running_loop().time()
+    try:
+        async with asyncio.timeout_at(begun + client_s) as clock:
+            async for chunk in chunks:
+                if len(body) + len(chunk) > limit:
+                    raise BodyTooLargeError(message)
+                held.take(len(chunk))
+                body += chunk
+                clock.reschedule(begun + client_s + len(body) / 1e6)
+    except TimeoutError:
+        raise SlowClientError(f"of the body {len(body)} bytes have come, too slowly") from None
+    except ClientDisconnect:
+        raise ClientGoneError("the client hung up within the body") from None
     return bytes(body)
 
 
@@ -142,7 +176,11 @@ class BodyOf(Generic[T]):
         check_media_type(request.headers)
         shared = shared_of(request)
         raw = await read_limited(
-            request.stream(), request.headers.get("content-length"), shared.settings.max_body_bytes
+            request.stream(),
+            request.headers.get("content-length"),
+            shared.settings.max_body_bytes,
+            request.scope["hybridtof.held"],
+            shared.settings.client_s,
         )
         parsed = await shared.parsing.run(request, parse_document, self.model, raw)
         return parsed, raw

@@ -8,6 +8,7 @@
     └── ServiceError
         ├── MalformedError             the body or a header cannot be read at all
         ├── BodyTooLargeError
+        ├── SlowClientError            the head or the body does not come
         ├── UnsupportedMediaTypeError
         ├── MethodError                no such method for this resource
         ├── MisdirectedError           for a host that this is not
@@ -42,6 +43,7 @@ __all__ = [
     "NotFoundError",
     "OverdueError",
     "ServiceError",
+    "SlowClientError",
     "StoreError",
     "UnauthorizedError",
     "UnsupportedMediaTypeError",
@@ -59,6 +61,10 @@ class MalformedError(ServiceError):
 
 class BodyTooLargeError(ServiceError):
     """The body has more bytes than the service accepts."""
+
+
+class SlowClientError(ServiceError):
+    """The head or the body of the request takes too long to come."""
 
 
 class UnsupportedMediaTypeError(ServiceError):

@@ -1,14 +1,23 @@
 """Logs on standard error: one JSON object a line, or for a terminal one line of text."""
 
+import atexit
+import contextlib
 import json
 import logging
+import os
+import queue
 import sys
+import threading
+import time
 from datetime import UTC, datetime
 from typing import Any
 
 from service.border.traces import REQUEST_ID
 
-__all__ = ["JsonLines", "PlainLines", "log_config"]
+__all__ = ["JsonLines", "Lines", "PlainLines", "log_config"]
+
+_MOST_LINES = 2000
+_FLUSH_S = 0.5
 
 
 def _members(record: logging.LogRecord) -> dict[str, Any]:
@@ -46,6 +55,39 @@ class PlainLines(logging.Formatter):
         return f"{text}\n{self.formatException(record.exc_info)}" if record.exc_info else text
 
 
+class Lines(logging.Handler):
+    """Writes lines in a thread of its own, and drops them where nobody reads for long.
+
+    A pipe that is full would otherwise halt the service with its next line.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._lines: queue.Queue[bytes] = queue.Queue(_MOST_LINES)
+        threading.Thread(target=self._write, name="log", daemon=True).start()
+        atexit.register(self.flush)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Hand a line over."""
+        with contextlib.suppress(queue.Full):
+            self._lines.put_nowait((self.format(record) + "\n").encode("utf-8", "replace"))
+
+    def flush(self) -> None:
+        """Wait until what was said is written, but not for a reader that stands still."""
+        end = time.monotonic() + _FLUSH_S
+        while self._lines.unfinished_tasks and time.monotonic() < end:
+            time.sleep(0.005)
+
+    def _write(self) -> None:
+        while True:
+            rest = self._lines.get()
+            with contextlib.suppress(OSError):  # nobody reads any more
+                while rest:
+                    # not sys.stderr, whose lock a thread that is stuck would keep to the end
+                    rest = rest[os.write(2, rest) :]
+            self._lines.task_done()
+
+
 def log_config(level: str) -> dict[str, Any]:
     """Return a configuration for `logging.config.dictConfig`.
 
@@ -59,7 +101,7 @@ def log_config(level: str) -> dict[str, Any]:
         "version": 1,
         "disable_existing_loggers": False,
         "formatters": {"lines": {"()": form}},
-        "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "lines"}},
+        "handlers": {"stderr": {"()": Lines, "formatter": "lines"}},
         "loggers": {
             name: {"handlers": ["stderr"], "level": level.upper(), "propagate": False}
             for name in ("hybridtof", "uvicorn")

@@ -14,6 +14,7 @@ ForeignError               403    a page of another origin asks
 NotFoundError              404
 MethodError                405    with ``Allow``
 NotAcceptableError         406    no form that ``Accept`` names
+SlowClientError            408
 ConflictError              409    not in a state to be asked this
 GoneError                  410    was there, and is kept no longer
 BodyTooLargeError          413
@@ -54,6 +55,7 @@ from service.errors import (
     NotAcceptableError,
     NotFoundError,
     OverdueError,
+    SlowClientError,
     StoreError,
     UnauthorizedError,
     UnsupportedMediaTypeError,
@@ -113,6 +115,7 @@ _KINDS: Mapping[type[HybridTofError], tuple[HTTPStatus, str, str]] = {
     NotAcceptableError: (HTTPStatus(406), "not-acceptable", "There is no form that is accepted"),
     ConflictError: (HTTPStatus.CONFLICT, "conflict", "This cannot be asked now"),
     GoneError: (HTTPStatus.GONE, "gone", "It is kept no longer"),
+    SlowClientError: (HTTPStatus.REQUEST_TIMEOUT, "timeout", "The request takes too long to come"),
     BodyTooLargeError: (HTTPStatus(413), "too-large", "The body is too large"),
     UnsupportedMediaTypeError: (
         HTTPStatus.UNSUPPORTED_MEDIA_TYPE,

@@ -45,7 +45,14 @@ class ServiceSettings(pydantic.BaseModel):
     max_seconds, max_target_ess, max_ensembles
         Most that a posterior may ask for.
     max_body_bytes : int
-        Largest request body: a million frames of six columns need about 128 MiB.
+        Largest request body: of two columns, room for 200,000 frames.
+    max_held_bytes : int
+        Bytes of bodies and answers that are held at a time, over all requests.
+    connections : int
+        Connections at a time; more are closed.
+    client_s : float
+        Time that a client has for the head of a request, for its body (and a second for every
+        megabyte), and to read a block of an answer [s].
     api_keys : Path or None
         File of the keys of those who may use the service (``hybridtof keys``); None: everybody who
         can reach it.
@@ -76,7 +83,10 @@ class ServiceSettings(pydantic.BaseModel):
     max_seconds: Annotated[float, pydantic.Field(gt=0)] = 86_400.0
     max_target_ess: Annotated[int, pydantic.Field(ge=10)] = 1_000_000
     max_ensembles: Annotated[int, pydantic.Field(ge=2)] = 32
-    max_body_bytes: Count = 128 * 2**20
+    max_body_bytes: Count = 8 * 2**20
+    max_held_bytes: Count = 48 * 2**20
+    connections: Count = 500
+    client_s: Annotated[float, pydantic.Field(gt=0)] = 10.0
     api_keys: Path | None = None
     allowed_hosts: Annotated[tuple[Host, ...], pydantic.BeforeValidator(_split)] = ()
     database: str | None = None

@@ -8,6 +8,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.border.authorities import Authorities
+from service.border.held import Held, Room
 from service.border.keys import KeyRing
 from service.border.methods import Methods
 from service.border.traces import REQUEST_ID, Told, Traces, request_id
@@ -25,6 +26,7 @@ _HEADERS = {
     "X-Content-Type-Options": "nosniff",
 }
 # who starts and stops the service must see whether it lives, and has no key
+_BLOCK = 2**16
 _WITHOUT_KEY = frozenset({"/health/live", "/health/ready"})
 
 
@@ -41,15 +43,23 @@ class Gate:
         Who may ask; None: everybody who can reach it.
     traces : Traces
         Is told of every request.
+    room : Room
+        For bodies and answers.
     """
 
     def __init__(
-        self, app: ASGIApp, authorities: Authorities, keys: KeyRing | None, traces: Traces
+        self,
+        app: ASGIApp,
+        authorities: Authorities,
+        keys: KeyRing | None,
+        traces: Traces,
+        room: Room,
     ) -> None:
         self._app = app
         self._authorities = authorities
         self._keys = keys
         self._traces = traces
+        self._room = room
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request, or refuse it."""
@@ -77,6 +87,7 @@ class Gate:
         name = request_id(Headers(scope=scope).get("x-request-id"))
         before = REQUEST_ID.set(name)
         began, status, sent = time.perf_counter(), None, 0
+        held = scope["hybridtof.held"] = Held(self._room)
 
         async def send_dressed(message: Message) -> None:
             nonlocal status, sent
@@ -86,9 +97,17 @@ class Gate:
                 headers["X-Request-ID"] = name
                 for header, value in _HEADERS.items():
                     headers.setdefault(header, value)
-            else:
-                sent += len(message.get("body", b""))
-            await send(message)
+                await send(message)
+                return
+            body = message.get("body", b"")
+            held.answer(len(body))
+            sent += len(body)
+            # each block waits until the client has read most of those before it
+            for start in range(0, len(body) - _BLOCK, _BLOCK):
+                block = body[start : start + _BLOCK]
+                await send({"type": "http.response.body", "body": block, "more_body": True})
+            rest = (len(body) - 1) // _BLOCK * _BLOCK if body else 0
+            await send(dict(message) | {"body": body[rest:]})
 
         self._traces.open.inc()
         try:
@@ -102,6 +121,7 @@ class Gate:
                 await internal(error)(scope, receive, send_dressed)
         finally:
             self._traces.open.dec()
+            held.release()
             self._traces.tell(scope, Told(status, sent, time.perf_counter() - began))
             REQUEST_ID.reset(before)
 
@@ -112,6 +132,7 @@ def install(
     authorities: Authorities,
     keys: KeyRing | None,
     traces: Traces,
+    room: Room,
 ) -> None:
     """Put the gate before an application: outside of all that FastAPI answers by itself.
 
@@ -121,13 +142,13 @@ def install(
         The application.
     routers : sequence of APIRouter
         Its routers.
-    authorities, keys, traces
+    authorities, keys, traces, room
         See `Gate`.
     """
     build = app.build_middleware_stack
     routes = [*app.routes, *(route for router in routers for route in router.routes)]
 
     def built() -> ASGIApp:
-        return Gate(Methods(build(), routes), authorities, keys, traces)
+        return Gate(Methods(build(), routes), authorities, keys, traces, room)
 
     app.build_middleware_stack = built  # type: ignore[method-assign]  # nothing is outside of it

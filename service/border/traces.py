@@ -113,6 +113,8 @@ class Traces:
             "client": scope.get("hybridtof.client", ""),
         }
         level = logging.WARNING if status >= 500 else logging.INFO
+        if route.startswith("/health/"):  # which is asked all day
+            level = logging.DEBUG
         _log.log(level, "%s %s %s", method, route, status, extra={"fields": fields})
 
     def text(self) -> bytes:

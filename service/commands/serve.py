@@ -41,12 +41,11 @@ def _port(text: str) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
-    import uvicorn
-
     from service.app import create_app
     from service.border.authorities import is_loopback
     from service.border.keys import POINTER
     from service.logs import log_config
+    from service.server import server_of
     from service.service_settings import ServiceSettings
 
     settings = ServiceSettings.from_environment(os.environ)
@@ -55,17 +54,13 @@ def _run(args: argparse.Namespace) -> int:
             POINTER,
             f"is needed to listen on {args.host}, where others can ask: hybridtof keys create NAME",
         )
-    config = uvicorn.Config(
+    server = server_of(
         create_app(settings),
+        settings,
         host=args.host,
         port=args.port,
-        # requests have a line of their own, on standard error: standard output is for results
-        access_log=False,
-        # an open connection must not hold up the end
-        timeout_graceful_shutdown=round(settings.shutdown_s),
         log_config=log_config("warning" if args.quiet else "info"),
     )
-    server = uvicorn.Server(config)
     try:
         server.run()
     except SystemExit:

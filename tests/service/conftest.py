@@ -8,10 +8,10 @@ from typing import Any
 
 import httpx
 import pytest
-import uvicorn
 from fastapi import FastAPI
 
 from service.app import create_app
+from service.server import server_of
 from service.service_settings import ServiceSettings
 from tests.service import fake_fold
 
@@ -52,7 +52,7 @@ async def client() -> AsyncIterator[httpx.AsyncClient]:
 @contextlib.asynccontextmanager
 async def listening(app: FastAPI) -> AsyncIterator[str]:
     """The application behind a real socket, in this process; its address."""
-    server = uvicorn.Server(uvicorn.Config(app, port=0, log_config=None))
+    server = server_of(app, app.state.shared.settings, port=0, log_config=None)
     serving = asyncio.create_task(server.serve())
     try:
         while not server.started:

@@ -4,9 +4,8 @@ import json
 import os
 import sys
 
-import uvicorn
-
 from service.app import create_app
+from service.server import server_of
 from service.service_settings import ServiceSettings
 from tests.service import fake_fold
 
@@ -16,4 +15,4 @@ if __name__ == "__main__":
     environment = ServiceSettings.from_environment(os.environ)
     settings = environment.model_copy(update={"workers": 2, "max_body_bytes": int(sys.argv[2])})
     app = create_app(settings, fake_fold)
-    uvicorn.run(app, port=0, timeout_graceful_shutdown=2)
+    server_of(app, settings, port=0).run()

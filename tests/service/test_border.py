@@ -100,13 +100,13 @@ async def test_what_the_body_is(
 async def test_head(address: str, request_body: dict[str, Any]) -> None:
     """Where GET is, with its headers, and with an end where GET has none."""
     async with speaking(f"http://{address}") as http:
-        made = (await http.post("/v1/posteriors", json=request_body)).headers["location"]
         for path in ("/health/live", "/v1/techniques", "/v1/posteriors", "/openapi.json"):
             got, head = await http.get(path), await http.head(path)
             assert (got.status_code, head.status_code) == (200, 200)
             assert head.content == b""
             for name in ("content-type", "content-length"):
                 assert head.headers[name] == got.headers[name]
+        made = (await http.post("/v1/posteriors", json=request_body)).headers["location"]
         assert (await http.head(made)).status_code == 200
         events = await http.head(made + "/events")
         assert events.headers["content-type"].startswith("text/event-stream")

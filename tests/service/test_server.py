@@ -101,6 +101,9 @@ def test_serves_without_configuration_and_ends_on_sigterm() -> None:
             assert http.get("/health/ready").status_code == 200
             body = {"sensor": SENSOR, "scene": SCENE, "frames": FRAMES}
             assert http.post("/v1/estimates", json=body).status_code == 200
+            # more lines than a pipe holds, of which nobody reads any
+            for _ in range(400):
+                assert http.get("/v1/nothing").status_code == 404
         process.send_signal(signal.SIGTERM)
         assert end(process.pid)
 

@@ -1,0 +1,131 @@
+"""The server: uvicorn, with limits on what clients may leave undone.
+
+A connection costs memory for as long as it is open, so that each has a deadline at every step: for
+the head of a request, for what is left of a body that was refused (a body that is read has its own,
+`service.bodies`), and for every block of an answer (`service.border.gate`).
+"""
+
+import asyncio
+import logging
+from typing import Any
+
+import h11
+import uvicorn
+from fastapi import FastAPI
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from service.errors import MalformedError, ServiceError, SlowClientError
+from service.problems import response_of
+from service.service_settings import ServiceSettings
+
+__all__ = ["server_of"]
+
+_log = logging.getLogger("hybridtof")
+
+
+class _Bounded(H11Protocol):
+    """One connection of a client that may be slow, or greedy."""
+
+    most = 0
+    client_s = 0.0
+
+    _reading: asyncio.TimerHandle | None = None
+    _writing: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        if len(self.connections) > self.most:
+            _log.warning("a connection was closed: there are %d", self.most)
+            transport.abort()
+        else:
+            self._reading = self.loop.call_later(self.client_s, self._late)
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        if self.conn.their_state is not h11.IDLE:
+            if self.conn.our_state is not h11.DONE:  # a body that nobody reads keeps its deadline
+                self._stop_reading_clock()
+        elif self._reading is None and not self.transport.is_closing():
+            self._reading = self.loop.call_later(self.client_s, self._late)
+
+    def on_response_complete(self) -> None:
+        super().on_response_complete()
+        if self.conn.their_state is h11.SEND_BODY and self._reading is None:
+            self._reading = self.loop.call_later(self.client_s, self._late)
+
+    def pause_writing(self) -> None:
+        super().pause_writing()
+        self._writing = self.loop.call_later(self.client_s, self._stuck)
+
+    def resume_writing(self) -> None:
+        super().resume_writing()
+        if self._writing is not None:
+            self._writing.cancel()
+            self._writing = None
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._stop_reading_clock()
+        self.resume_writing()
+        super().connection_lost(exc)
+
+    def send_400_response(self, msg: str) -> None:
+        self._refuse(MalformedError(msg.lower().rstrip(".")))
+
+    def _stop_reading_clock(self) -> None:
+        if self._reading is not None:
+            self._reading.cancel()
+            self._reading = None
+
+    def _late(self) -> None:
+        """Close a connection on which a request does not come to its end, or none begins."""
+        self._reading = None
+        if self.conn.trailing_data[0]:
+            self._refuse(SlowClientError("the head of the request took too long"))
+        else:
+            self.transport.abort()
+
+    def _stuck(self) -> None:
+        _log.warning("an answer was given up: its client does not read")
+        self.transport.abort()
+
+    def _refuse(self, error: ServiceError) -> None:
+        """Answer what never became a request."""
+        if self.transport.is_closing():
+            return
+        if self.conn.our_state not in (h11.IDLE, h11.SEND_RESPONSE):
+            self.transport.abort()
+            return
+        response = response_of(error)
+        headers = [*response.raw_headers, (b"connection", b"close")]
+        for event in (
+            h11.Response(status_code=response.status_code, headers=headers),
+            h11.Data(data=bytes(response.body)),
+            h11.EndOfMessage(),
+        ):
+            self.transport.write(self.conn.send(event) or b"")
+        self.transport.close()
+
+
+def server_of(app: FastAPI, settings: ServiceSettings, **more: Any) -> uvicorn.Server:
+    """Return a server of an application, not yet running.
+
+    Parameters
+    ----------
+    app : FastAPI
+        The application.
+    settings : ServiceSettings
+        With the limits.
+    **more
+        Of `uvicorn.Config`.
+    """
+    limits = {"most": settings.connections, "client_s": settings.client_s}
+    config = uvicorn.Config(
+        app,
+        http=type("Bounded", (_Bounded,), limits),
+        # requests have a line of their own
+        access_log=False,
+        # an open connection must not hold up the end
+        timeout_graceful_shutdown=round(settings.shutdown_s),
+        **more,
+    )
+    return uvicorn.Server(config)
