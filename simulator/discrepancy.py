@@ -12,8 +12,8 @@ import functools
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 __all__ = [
     "DISCREPANCY_LENGTH",
@@ -118,7 +118,7 @@ def discrepancy_basis(low: float, high: float) -> DiscrepancyBasis:
     first = min(first, last - _SPACING)
     count = max(math.ceil((last - first) / (_SPACING * DISCREPANCY_LENGTH)), 4) + 1
     u = np.linspace(first, last, count)
-    values, vectors = linalg.eigh(matern(u[:, None] - u[None, :]))
+    values, vectors = scipy.linalg.eigh(matern(u[:, None] - u[None, :]))
     values, vectors = values[::-1], vectors[:, ::-1]
     # eigenvectors are known but for their signs, and draws must be the same everywhere
     vectors = vectors * np.where(vectors[0] < 0.0, -1.0, 1.0)

@@ -4,8 +4,8 @@ import math
 from typing import Annotated, Literal
 
 import pydantic
-from scipy.constants import speed_of_light
 
+from simulator.constants import SPEED_OF_LIGHT
 from simulator.errors import InvalidInputError
 from simulator.validated import NonNegative, Number, Positive, Validated, problems_of
 
@@ -64,7 +64,7 @@ class PulsedSensor(_AnySensor):
     @property
     def r0(self) -> float:
         """Range at which the whole pulse is late, c T_p / 2 [m]."""
-        return speed_of_light * self.pulse_width_s / 2
+        return SPEED_OF_LIGHT * self.pulse_width_s / 2
 
     @property
     def max_range_m(self) -> float:
@@ -101,12 +101,12 @@ class SineWaveSensor(_AnySensor):
     @property
     def wave_number(self) -> float:
         """Phase per range k = 4 pi f / c, the round trip included [rad/m]."""
-        return 4 * math.pi * self.frequency_hz / speed_of_light
+        return 4 * math.pi * self.frequency_hz / SPEED_OF_LIGHT
 
     @property
     def max_range_m(self) -> float:
         """Range at which the phase wraps, c / (2 f) [m]."""
-        return speed_of_light / (2 * self.frequency_hz)
+        return SPEED_OF_LIGHT / (2 * self.frequency_hz)
 
     @property
     def columns(self) -> tuple[str, str]:

@@ -4,8 +4,8 @@ import dataclasses
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from simulator.compiled import compiled
 from simulator.discrepancy import matern
@@ -137,7 +137,7 @@ def _smooth_error(rng: np.random.Generator, ranges: Array, sd: float) -> Array:
         return np.zeros(ranges.size)
     knots = np.linspace(logs.min() - 1e-9, logs.max() + 1e-9, 200)
     # a smooth kernel is singular to rounding: the square root is taken from its eigenvalues
-    values, vectors = linalg.eigh(matern(knots[:, None] - knots[None, :]))
+    values, vectors = scipy.linalg.eigh(matern(knots[:, None] - knots[None, :]))
     path = sd * vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(knots.size))
     finite = np.where(np.isfinite(ranges), ranges, np.exp(knots[0]))
     return np.asarray(np.interp(np.log(finite), knots, path))

@@ -4,8 +4,8 @@ import dataclasses
 import functools
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 __all__ = ["Information"]
 
@@ -76,7 +76,7 @@ class Information:
         columns = np.linalg.norm(self.before[used] / rows[:, None], axis=0)
         columns = np.where(columns > 0, columns, 1.0)
         matrix = self.jacobian[used] / rows[:, None] / columns
-        _, values, vectors = linalg.svd(_triangle(matrix), full_matrices=True)
+        _, values, vectors = scipy.linalg.svd(_triangle(matrix), full_matrices=True)
         return columns, np.pad(values, (0, d - values.size)), vectors.T
 
     @property
@@ -117,7 +117,7 @@ class Information:
         columns = np.where(columns > 0, columns, 1.0)
         # graded columns are scaled for the triangle only, which keeps their relative accuracy
         triangle = self._with_errors(self.jacobian / columns)[k:, k:] * columns
-        values = linalg.svdvals(triangle) if triangle.size else np.empty(0)
+        values = scipy.linalg.svdvals(triangle) if triangle.size else np.empty(0)
         values = np.pad(values, (0, d - values.size))
         values[self.rank :] = 0.0
         return values
@@ -158,7 +158,7 @@ class Information:
         triangle = self._with_errors(self.jacobian @ told)
         if triangle.size == 0:
             return np.zeros((len(self.names), 0)), np.zeros((0, 0))
-        inverse = linalg.solve_triangular(triangle, np.eye(k + self.rank))
+        inverse = scipy.linalg.solve_triangular(triangle, np.eye(k + self.rank))
         return told @ inverse[k:], np.asarray(inverse[:k])
 
     @property
@@ -205,7 +205,7 @@ class Information:
         """
         found = [(np.inf, vector) for vector in self.null_space.T]
         if self.rank > 0:
-            vectors, sizes, _ = linalg.svd(self.factor, full_matrices=False)
+            vectors, sizes, _ = scipy.linalg.svd(self.factor, full_matrices=False)
             found.append((float(sizes[0]), vectors[:, 0]))
         named = []
         for sd, vector in found:
@@ -248,4 +248,4 @@ class Information:
 def _triangle(matrix: Array) -> Array:
     """Return R of a QR decomposition with rows sorted by size, which is stable for each row."""
     order = np.argsort(-np.abs(matrix).max(axis=1, initial=0.0))
-    return np.asarray(linalg.qr(matrix[order], mode="r")[0][: matrix.shape[1]])
+    return np.asarray(scipy.linalg.qr(matrix[order], mode="r")[0][: matrix.shape[1]])

@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from inference.tracking.motion import Rules
 from inference.tracking.nuisance_jacobian import NuisanceJacobian
@@ -51,7 +51,7 @@ def rules_of(
         log_negligible=math.log(settings.negligible),
         same=_SAME,
         memory=1.0 - 1.0 / settings.window,
-        most_surprise=float(stats.chi2.isf(tail, observed.channels)),
+        most_surprise=float(scipy.stats.chi2.isf(tail, observed.channels)),
         unique_above=settings.unique_above,
         from_scene=shared.from_scene,
     )
@@ -82,6 +82,6 @@ def surprise_limit(
         What all frames err in common.
     """
     if _is_felt(shared):
-        return float(stats.chi2.isf(settings.false_alarm, channels)) / channels
+        return float(scipy.stats.chi2.isf(settings.false_alarm, channels)) / channels
     freedom = 0.5 * channels * (1.0 + rules.memory) / (1.0 - rules.memory)
-    return float(stats.gamma.isf(settings.false_alarm, freedom, scale=1.0 / freedom))
+    return float(scipy.stats.gamma.isf(settings.false_alarm, freedom, scale=1.0 / freedom))

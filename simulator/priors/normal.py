@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 import numpy as np
 import pydantic
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from simulator.priors.distribution import LEAST_LOG_MASS, Distribution, RangeForm
 from simulator.validated import Number, Positive, Validated
@@ -39,7 +39,7 @@ def _log_normal_mass(low: Array, high: Array) -> Array:
     flip = low + high > 0
     below = np.where(flip, -high, low)
     above = np.where(flip, -low, high)
-    return _log_difference(special.log_ndtr(above), special.log_ndtr(below))
+    return _log_difference(scipy.special.log_ndtr(above), scipy.special.log_ndtr(below))
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,9 +67,11 @@ class NormalDistribution(Distribution):
         a, b = self._standard(a), self._standard(b)
         if not _is_whole(a, b):
             mass = _log_normal_mass(a, b)
-            lower = np.logaddexp(special.log_ndtr(a), special.log_ndtr(z) + mass)
-            upper = np.logaddexp(special.log_ndtr(-b), special.log_ndtr(-z) + mass)
-            z = np.where(lower < upper, special.ndtri_exp(lower), -special.ndtri_exp(upper))
+            lower = np.logaddexp(scipy.special.log_ndtr(a), scipy.special.log_ndtr(z) + mass)
+            upper = np.logaddexp(scipy.special.log_ndtr(-b), scipy.special.log_ndtr(-z) + mass)
+            z = np.where(
+                lower < upper, scipy.special.ndtri_exp(lower), -scipy.special.ndtri_exp(upper)
+            )
             z = np.clip(z, a, b)
         return np.asarray(self.loc + self.scale * z)
 
@@ -80,7 +82,9 @@ class NormalDistribution(Distribution):
         mass = _log_normal_mass(a, b)
         lower = np.minimum(_log_normal_mass(a, standard) - mass, 0.0)
         upper = np.minimum(_log_normal_mass(standard, b) - mass, 0.0)
-        return np.where(lower < upper, special.ndtri_exp(lower), -special.ndtri_exp(upper))
+        return np.where(
+            lower < upper, scipy.special.ndtri_exp(lower), -scipy.special.ndtri_exp(upper)
+        )
 
     def _log_density(self, position: Array, a: Array, b: Array) -> Array:
         standard = self._standard(position)

@@ -5,8 +5,8 @@ from typing import Literal
 
 import numpy as np
 import pydantic
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from simulator.priors.distribution import Distribution, RangeForm
 from simulator.validated import Number, Positive, Validated
@@ -26,7 +26,7 @@ class UniformDistribution(Distribution):
     def _position(self, z: Array, a: Array, b: Array) -> Array:
         width = b - a
         # from the nearer end, so that both ends are resolved
-        from_low, from_high = a + width * special.ndtr(z), b - width * special.ndtr(-z)
+        from_low, from_high = a + width * scipy.special.ndtr(z), b - width * scipy.special.ndtr(-z)
         return np.asarray(np.where(z < 0, from_low, from_high))
 
     def _variate(self, position: Array, a: Array, b: Array) -> Array:
@@ -34,7 +34,7 @@ class UniformDistribution(Distribution):
         lower = np.minimum(np.log(position - a) - mass, 0.0)
         upper = np.minimum(np.log(b - position) - mass, 0.0)
         return np.asarray(
-            np.where(lower < upper, special.ndtri_exp(lower), -special.ndtri_exp(upper))
+            np.where(lower < upper, scipy.special.ndtri_exp(lower), -scipy.special.ndtri_exp(upper))
         )
 
     def _log_density(self, position: Array, a: Array, b: Array) -> Array:

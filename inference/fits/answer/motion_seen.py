@@ -10,8 +10,8 @@ neither its curvature nor its differences say how far such values are from the t
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.fits.likelihood.maximum import Maximum
 from inference.fits.likelihood.problem import FitProblem
@@ -54,14 +54,14 @@ def numbers_shown(problem: FitProblem, top: Maximum) -> float:
     freedom = 2 * max(len(readings) - 1, 1)
     miss = readings - readings.mean(axis=0)
     white = np.einsum("nij,nj->ni", whiteners(problem.instrument, readings, signal), miss)
-    if np.square(white).sum() < special.chdtri(freedom, _FALSE_ALARM):
+    if np.square(white).sum() < scipy.special.chdtri(freedom, _FALSE_ALARM):
         return 1.0
     if len(readings) < 3:
         return 2.0
     read = np.asarray(problem.instrument.read)
     covariance = covariances(problem.instrument, readings, signal) / read / read[:, None]
     off = _off_a_line(readings / read, covariance)
-    return 2.0 if off < special.chdtri(len(readings) - 2, _FALSE_ALARM) else math.inf
+    return 2.0 if off < scipy.special.chdtri(len(readings) - 2, _FALSE_ALARM) else math.inf
 
 
 def _signal(problem: FitProblem, top: Maximum, shown: NDArray[np.bool_]) -> Array:

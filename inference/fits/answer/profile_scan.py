@@ -7,8 +7,8 @@ its prior, wherever the best optimum lies, and everything else is fitted anew.
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.fits.answer.inflation import BETTER, loosely_told
 from inference.fits.likelihood.conditional_fit import conditional, unconditional
@@ -75,7 +75,7 @@ def _spread_over_prior(problem: FitProblem, j: int) -> Array:
     """
     names = problem.parameters.names
     z = np.zeros((len(_QUANTILES), len(names)))
-    z[:, names.index(problem.names[j])] = BREADTH * special.ndtri(_QUANTILES)
+    z[:, names.index(problem.names[j])] = BREADTH * scipy.special.ndtri(_QUANTILES)
     columns = [names.index(name) for name in problem.names]
     values = problem.coordinates(problem.parameters.natural(z)[:, columns])[:, j]
     return np.asarray(values[np.isfinite(values)])

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.estimates import Status, TechniqueResult
 from inference.fits.likelihood.frame_modes import MOST, frame_modes
@@ -24,7 +23,8 @@ __all__ = ["DECIDED", "WITHIN", "Answer", "frame_ranges"]
 Array = NDArray[np.float64]
 
 DECIDED = 9.0  # deviance by which something must be worse to be decided against: 3 sd
-WITHIN = special.chdtri(1, 0.05)  # deviance that intervals of 95 % reach: 1.96 sd
+# deviance that intervals of 95 % reach, 1.96 sd squared: of chi-square, one degree, 5 %
+WITHIN = 3.8414588206941285
 _IMPOSSIBLE = 36.0  # chi-square of a single frame that nothing explains
 _ONE = 1.0  # standard deviations below which two modes are one
 

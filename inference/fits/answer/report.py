@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.fits.answer.ranges import WITHIN
 from inference.fits.likelihood.information import residuals_and_information
@@ -154,7 +154,7 @@ def fit_report(
     residual, _ = residuals_and_information(problem, optima[0].x, optima[0].positions)
     chi_square = float(np.einsum("ni,ni->", residual, residual))
     freedom = 2 * problem.present.size - int(problem.present.sum()) - len(problem)
-    p_value = float(special.chdtrc(freedom, chi_square))
+    p_value = float(scipy.special.chdtrc(freedom, chi_square))
     return {
         "chi_square": chi_square,
         "deviance": optima[0].deviance,

@@ -3,8 +3,8 @@
 import dataclasses
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.fits.likelihood.conditional_fit import conditional, unconditional
 from inference.fits.likelihood.information import residuals_and_information
@@ -100,7 +100,7 @@ def _starts(problem: FitProblem, count: int) -> Array:
     order, empty = _by_light(problem)
     anchors = _spread(order, _ANCHORS)
     uniform = _low_discrepancy(count, len(parameters) + anchors.size)
-    z = special.ndtri(uniform[:, : len(parameters)]) * BREADTH
+    z = scipy.special.ndtri(uniform[:, : len(parameters)]) * BREADTH
     columns = [parameters.names.index(name) for name in problem.names]
     points = problem.coordinates(parameters.natural(z)[:, columns])
     low, high = np.log(problem.support)

@@ -7,8 +7,8 @@ exact gradients along directions in which the first-order information is the uni
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from inference.fits.likelihood.deviance import POSITION
 from inference.fits.likelihood.linearisation import rows_of
@@ -47,8 +47,8 @@ def _directions(jacobian: Array, problem: FitProblem, free: NDArray[np.bool_]) -
     j = jacobian[:, free]
     scale = np.linalg.norm(j, axis=0)
     scale = np.where(scale > 0, scale, 1.0)
-    triangle = linalg.qr(j / scale, mode="r")[0][: j.shape[1]]
-    _, sizes, right = linalg.svd(triangle)
+    triangle = scipy.linalg.qr(j / scale, mode="r")[0][: j.shape[1]]
+    _, sizes, right = scipy.linalg.svd(triangle)
     sizes = np.concatenate([sizes, np.zeros(j.shape[1] - sizes.size)])
     columns = (right.T / np.maximum(sizes, 1e-12)) / scale[:, None]
     logarithms = problem.logarithms[free]
@@ -62,7 +62,7 @@ def _directions(jacobian: Array, problem: FitProblem, free: NDArray[np.bool_]) -
 
 def _step(gradient: Array, hessian: Array, radius: float) -> tuple[Array, float]:
     """Minimise a quadratic in a ball; the step and its predicted decrease."""
-    values, vectors = linalg.eigh(hessian)
+    values, vectors = scipy.linalg.eigh(hessian)
     along = vectors.T @ gradient
 
     def at(shift: float) -> Array:

@@ -3,8 +3,8 @@
 import dataclasses
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 __all__ = ["LinearFit", "solve_weighted"]
 
@@ -64,10 +64,10 @@ def solve_weighted(matrix: Array, target: Array) -> tuple[Array, Array, int]:
     p = matrix.shape[1]
     scale = np.linalg.norm(matrix, axis=0)
     scale = np.where(scale > 0, scale, 1.0)
-    q, r = linalg.qr(matrix / scale, mode="economic")
-    sizes = linalg.svdvals(r)
+    q, r = scipy.linalg.qr(matrix / scale, mode="economic")
+    sizes = scipy.linalg.svdvals(r)
     rank = int(np.count_nonzero(sizes > _ROUNDING * sizes[0])) if sizes.size else 0
     if rank < p:
         return np.full(p, np.nan), np.full((p, p), np.nan), rank
-    inverse = linalg.solve_triangular(r, np.eye(p)) / scale[:, None]
+    inverse = scipy.linalg.solve_triangular(r, np.eye(p)) / scale[:, None]
     return inverse @ (q.T @ target), inverse, rank

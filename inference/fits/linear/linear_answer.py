@@ -5,8 +5,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.estimates import TechniqueResult
 from inference.fits.answer.ranges import Answer, frame_ranges
@@ -91,7 +91,7 @@ def linear_answer(
     parameters = entries(parameters_of(task.sensor, task.scene), found)
     parameters |= {path: not_identified(reason) for path, reason in missing.items()}
     freedom = fit.residuals.size - fit.x.size
-    p_value = float(special.chdtrc(freedom, fit.chi_square))
+    p_value = float(scipy.special.chdtrc(freedom, fit.chi_square))
     report = {
         "chi_square": fit.chi_square,
         "degrees_of_freedom": freedom,

@@ -5,9 +5,9 @@ from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import speed_of_light
 
 from simulator.compiled import compiled
+from simulator.constants import SPEED_OF_LIGHT
 
 __all__ = ["cycles_phase", "difference_of_products", "weighted_differences"]
 
@@ -65,5 +65,5 @@ def cycles_phase(frequency: float, distance: float) -> float:
     distance : float
         Distance [m].
     """
-    cycles = 2 * Fraction(frequency) * Fraction(distance) / Fraction(speed_of_light)
+    cycles = 2 * Fraction(frequency) * Fraction(distance) / Fraction(SPEED_OF_LIGHT)
     return 2 * math.pi * float(cycles % 1)
