@@ -41,14 +41,15 @@ FROM base AS runtime
 RUN useradd --uid 10001 --no-create-home --shell /usr/sbin/nologin hybridtof \
     && install -d -m 700 -o hybridtof /var/cache/hybridtof /var/lib/hybridtof
 COPY --from=build /opt/hybridtof /opt/hybridtof
-# machine code of the kernels: compiled at the first use, kept for as long as the volume
+# machine code of the kernels is part of the image: for any processor of its kind
 # jobs: for as long as the volume, or where HYBRIDTOF_DATABASE says
-# keys: whoever reaches the container's network must have one; docker compose run hybridtof keys create NAME
 ENV NUMBA_CACHE_DIR=/var/cache/hybridtof \
-    HYBRIDTOF_API_KEYS=/var/lib/hybridtof/keys.json \
+    NUMBA_CPU_NAME=generic \
+    NUMBA_CPU_FEATURES="" \
     HYBRIDTOF_DATABASE=sqlite:////var/lib/hybridtof/jobs.sqlite
 VOLUME /var/lib/hybridtof
 USER hybridtof
+RUN hybridtof warm
 EXPOSE 8000
 HEALTHCHECK --interval=10s --timeout=5s --start-period=30s \
     CMD ["python3", "-c", "import urllib.request as r; r.urlopen('http://127.0.0.1:8000/health/live', timeout=4)"]

@@ -17,150 +17,19 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import Any
 
-__all__ = ["QUESTIONS", "main"]
+from service.warm.questions import QUESTIONS
 
-Body = dict[str, Any]
-_PULSED: Body = {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1e-5, 1e-4]}}
-_SINE: Body = {"kind": "sine_wave", "frequency_hz": 5e6, "noise": {"read": [3e-5, 3e-5]}}
-_OBJECT: Body = {"c0": 0.0817, "c1": 0.0574, "c2": 0.103}
-_SHADOW: Body = {"c0": 0.056, "c1": 0.013}
-_WALL: Body = {"strength": 0.0177, "distance_m": 3.0, "shadow": _SHADOW}
-_FREE_WALL: Body = {
-    "strength": {"prior": "lognormal", "median": 0.02, "sigma": 0.5},
-    "distance_m": {"prior": "uniform", "low": 2.5, "high": 4.0},
-}
-_VAGUE: Body = {"prior": "normal", "mean": 0.0, "sd": 0.05}
-_CROSSTALK: Body = {"crosstalk": [_VAGUE, _VAGUE]}
-_FRAMES = 12
-
-
-def _data(sensor: Any, wall: bool, crosstalk: bool) -> Any:
-    """Return frames on a way from 0.3 to 1.5 m, without a kernel."""
-    import numpy as np
-
-    from simulator.frames import Frames
-    from simulator.sensor import PulsedSensor
-
-    c0, c1, gain = _OBJECT["c0"], _OBJECT["c1"], _OBJECT["c0"] * _OBJECT["c2"]
-    r = np.geomspace(0.3, 1.5, _FRAMES)
-    q = r * r + c1 * r + c0
-    flux = gain / (r * r * q)
-    change = -flux * (4 * r * r + 3 * c1 * r + 2 * c0) / (r * q)
-    far, s0, s1 = _WALL["distance_m"], _SHADOW["c0"], _SHADOW["c1"]
-    qs = r * r + s1 * r + s0
-    back = wall * _WALL["strength"] * (r * r + s1 * r) / qs
-    back_change = wall * _WALL["strength"] * s0 * (2 * r + s1) / qs**2
-    if isinstance(sensor, PulsedSensor):
-        pair = (flux * r + back * far) / sensor.r0, flux + back
-        rate = (change * r + flux + back_change * far) / sensor.r0, change + back_change
-    else:
-        k = sensor.wave_number
-        turn, end = np.exp(1j * k * r), np.exp(1j * k * far)
-        x, dx = flux * turn + back * end, (change + 1j * k * flux) * turn + back_change * end
-        pair, rate = (x.real, x.imag), (dx.real, dx.imag)
-    readings = np.column_stack(pair) + np.multiply(crosstalk, (0.003, 0.01))
-    noise = np.random.default_rng(1).normal(size=readings.shape)
-    return Frames(
-        readings + noise * sensor.noise.read,
-        time_s=np.linspace(0.0, 1.0, _FRAMES),
-        derivatives=np.column_stack(rate),
-    )
-
-
-def _question(sensor: Body, scene: Body, wall: bool = False, crosstalk: bool = False) -> Any:
-    import hybridtof
-
-    parsed = hybridtof.parse_sensor(sensor)
-    return parsed, hybridtof.parse_scene(scene), _data(parsed, wall, crosstalk)
-
-
-def _estimate(technique: str, sensor: Body, scene: Body, **data: bool) -> None:
-    import hybridtof
-
-    parsed, known, frames = _question(sensor, scene, **data)
-    assert hybridtof.estimate(parsed, known, frames, [technique]).results, technique
-
-
-def _track(sensor: Body, scene: Body, **data: bool) -> None:
-    import hybridtof
-
-    parsed, known, frames = _question(sensor, scene, **data)
-    model = hybridtof.tracker(parsed, known)
-    hybridtof.step(model, model.first, frames)
-
-
-def _posterior(sensor: Body, scene: Body, **data: bool) -> None:
-    from hybridtof import SamplerSettings, fold
-
-    parsed, known, frames = _question(sensor, scene, **data)
-    job = fold.prepare(parsed, known, frames, SamplerSettings(seed=1))
-    ahead = fold.tasks(job, fold.start(job))
-    if ahead:
-        fold.run(ahead[0])
+__all__ = ["main"]
 
 
 def _numpy() -> None:
     import numpy  # noqa: F401
 
 
-def _parsed() -> None:
-    _question(_PULSED, {"object": _OBJECT})
-
-
-def _single() -> dict[str, Callable[[], None]]:
-    plain, wall = {"object": _OBJECT}, {"object": _OBJECT, "background": _WALL}
-    without = ("conventional", "intensity", "intensity_w1", "differential")
-    behind = ("cancelling", "intensity", "cancelling_differential")
-    found: dict[str, Callable[[], None]] = {}
-    for kind, sensor in (("pulsed", _PULSED), ("sine wave", _SINE)):
-        for name in without:
-            if (kind, name) != ("sine wave", "intensity_w1"):
-                found[f"{name}, {kind}"] = partial(_estimate, name, sensor, plain)
-        for name in behind:
-            whole = f"background_{name}"
-            found[f"{whole}, {kind}"] = partial(_estimate, whole, sensor, wall, wall=True)
-    return found
-
-
-def _many() -> dict[str, Callable[[], None]]:
-    plain = {"object": _OBJECT}
-    return {
-        "object_fit": partial(_estimate, "object_fit", _PULSED, {}),
-        "joint_fit, object": partial(_estimate, "joint_fit", _PULSED, {}),
-        "joint_fit, crosstalk": partial(
-            _estimate, "joint_fit", _PULSED, _CROSSTALK, crosstalk=True
-        ),
-        "joint_fit, sine wave": partial(_estimate, "joint_fit", _SINE, {}),
-        "tracker": partial(_track, _PULSED, plain),
-        "tracker, crosstalk": partial(_track, _PULSED, plain | _CROSSTALK, crosstalk=True),
-    }
-
-
-def _posteriors() -> dict[str, Callable[[], None]]:
-    optional = {"crosstalk": {"values": [_VAGUE, _VAGUE], "optional": True}}
-    both = _CROSSTALK | {"background": _FREE_WALL}
-    return {
-        "posterior, object": partial(_posterior, _PULSED, {}),
-        "posterior, at rest": partial(_posterior, _PULSED, {"motion": "static"}),
-        "posterior, sine wave": partial(_posterior, _SINE, {}),
-        "posterior, crosstalk": partial(_posterior, _PULSED, _CROSSTALK, crosstalk=True),
-        "posterior, optional": partial(_posterior, _PULSED, optional, crosstalk=True),
-        "posterior, wall": partial(_posterior, _PULSED, both, wall=True, crosstalk=True),
-    }
-
-
-QUESTIONS: dict[str, Callable[[], None]] = {
-    "numpy": _numpy,
-    "scene and frames": _parsed,
-    **_single(),
-    **_many(),
-    **_posteriors(),
-}
-"""What a process may be asked first."""
+def _started() -> dict[str, Callable[[], object]]:
+    return {"numpy": _numpy} | QUESTIONS
 
 
 def _seconds(name: str, cache: Path, **settings: str) -> float:
@@ -205,12 +74,12 @@ def main() -> None:
     parser.add_argument("--answer", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.answer is not None:
-        QUESTIONS[args.answer]()
+        _started()[args.answer]()
         print(time.process_time(), flush=True)
         os._exit(0)  # what is still compiling is nobody's any more
     caches = args.caches.split(",")
     print(f"{'processor time [s], cache:':<40}" + "".join(f"{cache:>11}" for cache in caches))
-    for name in QUESTIONS:
+    for name in _started():
         if args.only in name:
             row = _row(name, caches)
             print(f"{name:<40}" + "".join(f"{seconds:>11.2f}" for seconds in row), flush=True)

@@ -24,12 +24,15 @@ from service.service_settings import ServiceSettings
 from service.shared import Shared
 from service.store.database import default_url
 from service.store.sql_store import Retention, SqlJobStore
+from service.warm.warming import Warming
 
 __all__ = ["create_app"]
 
 
 def create_app(
-    settings: ServiceSettings | None = None, fold: Fold[Any, Any, Any, Any] = posterior_fold
+    settings: ServiceSettings | None = None,
+    fold: Fold[Any, Any, Any, Any] = posterior_fold,
+    warming: Warming | None = None,
 ) -> FastAPI:
     """Make an application of its own: nothing is shared between two of them.
 
@@ -39,6 +42,8 @@ def create_app(
         Left out: the defaults; the environment is read by the caller.
     fold : Fold, optional
         How posteriors are computed.
+    warming : Warming, optional
+        Makes machine code from the application's start; left out, it is made when it is needed.
 
     Returns
     -------
@@ -58,15 +63,19 @@ def create_app(
     traces = Traces(store.counts)
     parsing, threads = (Threads(settings.threads, settings.queue) for _ in range(2))
     processes = Processes(settings.threads, settings.queue, settings.request_s)
-    shared = Shared(settings, jobs, parsing, threads, processes, traces)
+    shared = Shared(settings, jobs, parsing, threads, processes, traces, warming)
     keys = None if settings.api_keys is None else KeyRing(settings.api_keys)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         await jobs.start()
+        if warming is not None:
+            warming.begin()
         try:
             yield
         finally:
+            if warming is not None:
+                warming.end()
             await asyncio.to_thread(processes.close)
             await jobs.close()
 

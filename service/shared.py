@@ -9,6 +9,7 @@ from service.border.traces import Traces
 from service.jobs import Jobs
 from service.lanes import Processes, Threads
 from service.service_settings import ServiceSettings
+from service.warm.warming import Warming
 
 __all__ = ["SMALL", "Shared", "client_of", "shared_of"]
 
@@ -32,6 +33,8 @@ class Shared:
         For answers that may take long.
     traces : Traces
         Counts of requests.
+    warming : Warming or None
+        Makes machine code ahead of the first question.
     """
 
     settings: ServiceSettings
@@ -40,6 +43,7 @@ class Shared:
     threads: Threads
     processes: Processes
     traces: Traces
+    warming: Warming | None = None
 
     def lane(self, frames: int) -> Threads | Processes:
         """Return where an answer about so many frames is made: of few, at once in a thread."""

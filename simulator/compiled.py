@@ -78,6 +78,7 @@ class Kernel:
         self._dispatcher: Any = None
         self._below: Any = None
         self._spent_s: dict[Any, float] = {}
+        self._found = False
 
     def __reduce__(self) -> str:
         return self._function.__qualname__
@@ -150,15 +151,24 @@ class Kernel:
         called.get_call_template = of_types
 
     @functools.cached_property
-    def _cost_s(self) -> float:
-        """What machine code for a call would take [s]."""
+    def _make_s(self) -> float:
+        """What making machine code for a call would take [s]."""
         from simulator.uncompiled import reach
 
-        folder = self._folder
-        name = self._function.__qualname__
-        there = folder is not None and any(folder.path.glob(f"*.{name}-*.nbi"))
-        start = 0.0 if _machine else _START_S
-        return start + (_LOAD_S if there else _MAKE_S * reach(self._function))
+        return _MAKE_S * reach(self._function)
+
+    def _kept(self) -> bool:
+        """Tell whether there is machine code on the disk, be it since a short while."""
+        if not self._found and self._folder is not None:
+            name = self._function.__qualname__
+            self._found = any(self._folder.path.glob(f"*.{name}-*.nbi"))
+        return self._found
+
+    def _left_s(self, kind: object) -> float:
+        """Return for how long the interpreter may still try to answer such calls [s]."""
+        start_s = 0.0 if _machine else _START_S
+        cost_s = start_s + (_LOAD_S if self._kept() else self._make_s)
+        return cost_s - self._spent_s.get(kind, 0.0)
 
     def _may_try(self, args: tuple[Any, ...]) -> bool:
         """Tell whether the interpreter may answer a call."""
@@ -166,7 +176,7 @@ class Kernel:
 
         if os.environ.get("HYBRIDTOF_COMPILE") == "always" or uncompiled.size(args) > _MANY:
             return False
-        return self._spent_s.get(uncompiled.kind_of(args), 0.0) < self._cost_s
+        return self._left_s(uncompiled.kind_of(args)) > 0.0
 
     def _answer(self, *args: Any, **kwargs: Any) -> Any:
         """Answer a call for which there is no machine code, as far as is known."""
@@ -177,7 +187,7 @@ class Kernel:
         kind = uncompiled.kind_of(args)
         spent_s, began = self._spent_s.get(kind, 0.0), time.thread_time()
         try:
-            answer, took_s = uncompiled.run(self._function, args, self._cost_s - spent_s)
+            answer, took_s = uncompiled.run(self._function, args, self._left_s(kind))
         except uncompiled.NotSoError:
             self._spent_s[kind] = float("inf")
             _given_up_s[0] += time.thread_time() - began

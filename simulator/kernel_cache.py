@@ -17,7 +17,7 @@ import stat
 from pathlib import Path
 from typing import NamedTuple
 
-__all__ = ["CacheFolder", "base_folder", "folder_of"]
+__all__ = ["CacheFolder", "base_folder", "digest_of_all", "folder_of"]
 
 _log = logging.getLogger("hybridtof")
 _ROOT = Path(__file__).resolve().parents[1]
@@ -65,6 +65,15 @@ def _digest(path: Path) -> str:
         if source:
             digest.update(os.path.relpath(one, _ROOT).encode())
             digest.update(source)
+    return digest.hexdigest()[:16]
+
+
+def digest_of_all() -> str:
+    """Return a digest of every file of kernels."""
+    digest = hashlib.sha256()
+    for package in ("simulator", "inference"):
+        for path in sorted((_ROOT / package).rglob("*.py")):
+            digest.update(_read(path)[0])
     return digest.hexdigest()[:16]
 
 

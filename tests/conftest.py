@@ -4,6 +4,8 @@ import os
 
 # before numpy is loaded: with threads of its own the last bits of a product differ from run to run
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# servers of tests make the machine code that they need, and no other
+os.environ.setdefault("HYBRIDTOF_WARM", "off")
 
 
 import itertools

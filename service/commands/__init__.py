@@ -7,7 +7,17 @@ import argparse
 from collections.abc import Callable
 
 from service import reproduce
-from service.commands import estimate, identifiability, infer, keys, schema, serve, simulate, track
+from service.commands import (
+    estimate,
+    identifiability,
+    infer,
+    keys,
+    schema,
+    serve,
+    simulate,
+    track,
+    warm,
+)
 from service.commands.command import Subparsers
 from service.demo import command as demo
 from service.report import command as report
@@ -25,6 +35,7 @@ COMMANDS: tuple[AddParser, ...] = (
     identifiability.add_parser,
     keys.add_parser,
     schema.add_parser,
+    warm.add_parser,
     reproduce.add_parser,
     demo.add_parser,
     report.add_parser,

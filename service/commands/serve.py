@@ -47,6 +47,7 @@ def _run(args: argparse.Namespace) -> int:
     from service.logs import log_config
     from service.server import server_of
     from service.service_settings import ServiceSettings
+    from service.warm.warming import Warming
 
     settings = ServiceSettings.from_environment(os.environ)
     if settings.api_keys is None and not is_loopback(args.host):
@@ -55,7 +56,7 @@ def _run(args: argparse.Namespace) -> int:
             f"is needed to listen on {args.host}, where others can ask: hybridtof keys create NAME",
         )
     server = server_of(
-        create_app(settings),
+        create_app(settings, warming=Warming()),
         settings,
         host=args.host,
         port=args.port,

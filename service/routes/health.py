@@ -15,9 +15,12 @@ router = APIRouter(prefix="/health", tags=["health"])
 
 
 class Health(BaseModel):
-    """The good answer; the other one is a problem."""
+    """The good answer; the other one is a problem.
 
-    status: Literal["ok"] = "ok"
+    ``warming``: machine code is being made; answers are the same meanwhile, only slower.
+    """
+
+    status: Literal["ok", "warming"] = "ok"
 
 
 @router.get("/live")
@@ -31,4 +34,5 @@ async def ready(request: Request) -> Health:
     """Answer 503 while the service starts or ends."""
     if not shared_of(request).jobs.open:
         raise BusyError("the service is starting or ending")
-    return Health()
+    warming = shared_of(request).warming
+    return Health(status="warming" if warming is not None and warming.going else "ok")

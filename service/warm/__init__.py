@@ -1,0 +1,1 @@
+"""Machine code ahead of the first question."""
