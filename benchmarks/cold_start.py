@@ -56,7 +56,7 @@ def _row(name: str, caches: list[str]) -> list[float]:
     try:
         found["empty"] = _seconds(name, folder)
         if "warm" in caches or "read-only" in caches:
-            _seconds(name, folder, HYBRIDTOF_COMPILE="always")
+            _seconds(name, folder, KERNELS_COMPILE="always")
             found["warm"] = min(_seconds(name, folder) for _ in range(3))
         if "read-only" in caches:
             _seal(folder, True)

@@ -68,6 +68,8 @@ class ServiceSettings(pydantic.BaseModel):
         Bytes for the draws of finished posteriors; the oldest make room.
     keep_days : float
         How long finished posteriors are kept [days].
+    warm : bool
+        Whether `serve` makes all machine code from its start on.
     shutdown_s : float
         How long open requests may take to end after SIGTERM [s].
     """
@@ -93,6 +95,7 @@ class ServiceSettings(pydantic.BaseModel):
     max_jobs: Count = 1000
     max_draws_bytes: Count = 2**30
     keep_days: Annotated[float, pydantic.Field(gt=0)] = 30.0
+    warm: bool = True
     shutdown_s: Annotated[float, pydantic.Field(ge=0, le=10)] = 5.0
 
     @classmethod

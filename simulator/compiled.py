@@ -4,7 +4,7 @@ A kernel is machine code made by numba (`simulator.machine_code`), kept in a fol
 sources (`simulator.kernel_cache`). Until there is machine code for the arguments of a call, the
 interpreter answers (`simulator.uncompiled`), with the same bits, for as long in all as making or
 loading that code would take: the first few frames need no compiler, and no kind of work takes much
-more than twice of what it must. `HYBRIDTOF_COMPILE=always` compiles at the first call.
+more than twice of what it must. `KERNELS_COMPILE=always` compiles at the first call.
 """
 
 import functools
@@ -174,7 +174,7 @@ class Kernel:
         """Tell whether the interpreter may answer a call."""
         from simulator import uncompiled
 
-        if os.environ.get("HYBRIDTOF_COMPILE") == "always" or uncompiled.size(args) > _MANY:
+        if os.environ.get("KERNELS_COMPILE") == "always" or uncompiled.size(args) > _MANY:
             return False
         return self._left_s(uncompiled.kind_of(args)) > 0.0
 

@@ -58,6 +58,7 @@ ALLOWED: dict[str, str] = {
     "service/store": "service",
     "service/store/migrations": "service.store",
     "service/store/migrations/versions": "",
+    "service/warm": "service inference",
     "hybridtof": "inference service.frame_files",
 }
 

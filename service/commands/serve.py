@@ -21,7 +21,7 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
         "file that hybridtof keys makes, and HYBRIDTOF_ALLOWED_HOSTS, its names there. Other "
         "environment variables are optional: "
         "HYBRIDTOF_WORKERS, HYBRIDTOF_THREADS, HYBRIDTOF_MAX_BODY_BYTES, HYBRIDTOF_MAX_JOBS, "
-        "HYBRIDTOF_MAX_DRAWS_BYTES, HYBRIDTOF_KEEP_DAYS, HYBRIDTOF_SHUTDOWN_S.",
+        "HYBRIDTOF_MAX_DRAWS_BYTES, HYBRIDTOF_KEEP_DAYS, HYBRIDTOF_WARM, HYBRIDTOF_SHUTDOWN_S.",
         examples="""
             hybridtof serve
             hybridtof serve --port 8080
@@ -56,7 +56,7 @@ def _run(args: argparse.Namespace) -> int:
             f"is needed to listen on {args.host}, where others can ask: hybridtof keys create NAME",
         )
     server = server_of(
-        create_app(settings, warming=Warming()),
+        create_app(settings, warming=Warming() if settings.warm else None),
         settings,
         host=args.host,
         port=args.port,

@@ -39,7 +39,7 @@ def _run(args: argparse.Namespace) -> int:
         note(args, f"{folder.path} is warm")
         return 0
     # read at the first call of a kernel
-    os.environ["HYBRIDTOF_COMPILE"] = "always"
+    os.environ["KERNELS_COMPILE"] = "always"
     from service.warm.questions import QUESTIONS
 
     for number, (name, ask) in enumerate(QUESTIONS.items(), start=1):

@@ -58,29 +58,32 @@ def _data(sensor: Any, wall: bool, crosstalk: bool) -> Any:
 
 
 def _question(sensor: Body, scene: Body, wall: bool = False, crosstalk: bool = False) -> Any:
-    import hybridtof
+    from simulator.scene import parse_scene
+    from simulator.sensor import parse_sensor
 
-    parsed = hybridtof.parse_sensor(sensor)
-    return parsed, hybridtof.parse_scene(scene), _data(parsed, wall, crosstalk)
+    parsed = parse_sensor(sensor)
+    return parsed, parse_scene(scene), _data(parsed, wall, crosstalk)
 
 
 def _estimate(technique: str, sensor: Body, scene: Body, **data: bool) -> object:
-    import hybridtof
+    from inference.estimate import estimate
 
     parsed, known, frames = _question(sensor, scene, **data)
-    return hybridtof.estimate(parsed, known, frames, [technique]).results
+    return estimate(parsed, known, frames, [technique]).results
 
 
 def _track(sensor: Body, scene: Body, **data: bool) -> None:
-    import hybridtof
+    from inference.tracking.track import step
+    from inference.tracking.tracker import tracker
 
     parsed, known, frames = _question(sensor, scene, **data)
-    model = hybridtof.tracker(parsed, known)
-    hybridtof.step(model, model.first, frames)
+    model = tracker(parsed, known)
+    step(model, model.first, frames)
 
 
 def _posterior(sensor: Body, scene: Body, **data: bool) -> None:
-    from hybridtof import SamplerSettings, fold
+    from inference.posterior import fold
+    from inference.posterior.settings import SamplerSettings
 
     parsed, known, frames = _question(sensor, scene, **data)
     job = fold.prepare(parsed, known, frames, SamplerSettings(seed=1))

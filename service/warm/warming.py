@@ -50,7 +50,7 @@ def _work() -> None:
 class Warming:
     """``hybridtof warm`` beside a service, where there is a cache to be filled.
 
-    Answers given meanwhile are the same, only slower. `HYBRIDTOF_WARM=off` leaves it out.
+    Answers given meanwhile are the same, only slower.
     """
 
     def __init__(self) -> None:
@@ -59,7 +59,7 @@ class Warming:
     def begin(self) -> None:
         """Start the process, if it is of any use, in a thread that outlives it."""
         folder = base_folder()
-        if os.environ.get("HYBRIDTOF_WARM") == "off" or folder is None or not folder.writable:
+        if folder is None or not folder.writable:
             return
         if not is_warm():
             context = multiprocessing.get_context("spawn")

@@ -17,7 +17,7 @@ def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Have two questions, an empty cache, and a list of what is asked."""
     said: list[str] = []
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.setenv("HYBRIDTOF_COMPILE", "")
+    monkeypatch.setenv("KERNELS_COMPILE", "")
     questions = {name: lambda name=name: said.append(name) for name in ("one", "two")}
     monkeypatch.setattr("service.warm.questions.QUESTIONS", questions)
     return said
@@ -49,7 +49,6 @@ def test_no_cache_cannot_be_warmed(
 @pytest.mark.anyio
 async def test_ready_says_that_it_warms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.delenv("HYBRIDTOF_WARM")
     warming = Warming()
     app = create_app(ServiceSettings(workers=1), warming=warming)
     transport = httpx.ASGITransport(app)

@@ -144,7 +144,7 @@ def nine_times(x: float) -> float:
 
 @pytest.fixture
 def always(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("HYBRIDTOF_COMPILE", "always")
+    monkeypatch.setenv("KERNELS_COMPILE", "always")
 
 
 @pytest.mark.usefixtures("always")

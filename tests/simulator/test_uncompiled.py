@@ -71,7 +71,7 @@ def both(kernel: Any, *args: Any) -> tuple[Any, Any]:
 
 
 def test_the_same_bits_at_every_edge(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("HYBRIDTOF_COMPILE", "always")
+    monkeypatch.setenv("KERNELS_COMPILE", "always")
     edges = (0.0, 1.0, 1e-320, 0.7, 3.0, 800.0, 1e308, math.inf, math.nan)
     signed = [sign * edge for edge in edges for sign in (1.0, -1.0)]
     for x, y in itertools.product(signed, signed):
