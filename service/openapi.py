@@ -10,7 +10,8 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 from service.bodies import BodyOf
-from service.problems import ProblemDetails
+from service.border.gate import WITHOUT_KEY
+from service.problems import ProblemDetails, problem_responses
 
 __all__ = ["install"]
 
@@ -55,10 +56,27 @@ def install(app: FastAPI, routers: Sequence[APIRouter]) -> None:
                     "content": {"application/json": {"schema": references[model, "validation"]}},
                 }
             _drop_supposed_refusals(document)
+            _add_border(document)
             app.openapi_schema = document
         return app.openapi_schema
 
     app.openapi = openapi  # type: ignore[method-assign]  # FastAPI's own way to extend it
+
+
+def _add_border(document: dict[str, Any]) -> None:
+    """Say of every operation what the border answers, and where a key is needed."""
+    bearer = {"type": "http", "scheme": "bearer", "description": "where the service has keys"}
+    document["components"]["securitySchemes"] = {"key": bearer}
+    for path, operations in document["paths"].items():
+        open_to_all = path in WITHOUT_KEY
+        for operation in operations.values():
+            refusals = (403, 421) if open_to_all else (401, 403, 421)
+            if "requestBody" in operation:
+                refusals = (*refusals, 408, 503)
+            for status, response in problem_responses(*refusals).items():
+                operation["responses"].setdefault(str(status), response)
+            if not open_to_all:
+                operation["security"] = [{"key": []}, {}]
 
 
 def _drop_supposed_refusals(document: dict[str, Any]) -> None:

@@ -81,12 +81,12 @@ class ServiceSettings(pydantic.BaseModel):
     queue: Count = 256
     request_s: Annotated[float, pydantic.Field(gt=0)] = 10.0
     max_fit_frames: Count = 10_000
-    max_trajectory: Count = 200_000
+    max_trajectory: Count = 100_000
     max_seconds: Annotated[float, pydantic.Field(gt=0)] = 86_400.0
     max_target_ess: Annotated[int, pydantic.Field(ge=10)] = 1_000_000
     max_ensembles: Annotated[int, pydantic.Field(ge=2)] = 32
     max_body_bytes: Count = 8 * 2**20
-    max_held_bytes: Count = 48 * 2**20
+    max_held_bytes: Count = 32 * 2**20
     connections: Count = 500
     client_s: Annotated[float, pydantic.Field(gt=0)] = 10.0
     api_keys: Path | None = None

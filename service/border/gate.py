@@ -15,7 +15,7 @@ from service.border.traces import REQUEST_ID, Told, Traces, request_id
 from service.problems import internal, response_of
 from simulator.errors import HybridTofError
 
-__all__ = ["Gate", "install"]
+__all__ = ["WITHOUT_KEY", "Gate", "install"]
 
 # no answer is a page: nothing in it may run, be framed, be guessed at or be kept
 _HEADERS = {
@@ -25,9 +25,10 @@ _HEADERS = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
 }
-# who starts and stops the service must see whether it lives, and has no key
 _BLOCK = 2**16
-_WITHOUT_KEY = frozenset({"/health/live", "/health/ready"})
+
+WITHOUT_KEY = frozenset({"/health/live", "/health/ready"})
+"""Who starts and stops the service must see whether it lives, and has no key."""
 
 
 class Gate:
@@ -79,7 +80,7 @@ class Gate:
         """Refuse a request, or note whose it is."""
         headers = Headers(scope=scope)
         self._authorities.check(headers)
-        if self._keys is not None and scope["path"] not in _WITHOUT_KEY:
+        if self._keys is not None and scope["path"] not in WITHOUT_KEY:
             given = headers.getlist("authorization")
             scope["hybridtof.client"] = self._keys.owner(given[0] if len(given) == 1 else None)
 

@@ -46,6 +46,11 @@ async def test_other_methods_are_refused_with_those_that_are_allowed(
 async def test_the_document_has_every_route(client: httpx.AsyncClient) -> None:
     paths = (await client.get("/openapi.json")).json()["paths"]
     assert {path: {method.upper() for method in ways} for path, ways in paths.items()} == routes()
+    for path, ways in paths.items():
+        for way in ways.values():
+            assert {"403", "421"} <= way["responses"].keys()
+            assert ("401" in way["responses"]) == ("security" in way) == ("/health/" not in path)
+            assert ("requestBody" not in way) or {"408", "415", "503"} <= way["responses"].keys()
 
 
 class Question(Validated):

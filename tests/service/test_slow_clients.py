@@ -135,7 +135,7 @@ async def test_connections_have_an_end(address: str) -> None:
 
 async def test_a_client_that_does_not_read(caplog: pytest.LogCaptureFixture) -> None:
     app = create_app(ServiceSettings(**LIMITS | {"max_held_bytes": 10**8}), fake_fold)
-    trajectory = {"kind": "radial", "from_m": 0.2, "to_m": 2.0, "frames": 200_000}
+    trajectory = {"kind": "radial", "from_m": 0.2, "to_m": 2.0, "frames": 100_000}
     body = json.dumps({"sensor": SENSOR, "scene": SCENE, "trajectory": trajectory}).encode()
     async with listening(app) as address:
         host, _, port = address.rpartition(":")
