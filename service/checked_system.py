@@ -6,10 +6,10 @@ from simulator.scene import Scene
 from simulator.scene_checks import check_scene
 from simulator.sensor import PulsedSensor, Sensor
 
-__all__ = ["checked_frames", "checked_system"]
+__all__ = ["aliases_of", "checked_frames", "checked_system"]
 
-# roots that an answer may hold: about a gigabyte
-_MOST_ROOTS = 50_000_000
+# roots that an answer may hold: about a hundred megabytes
+_MOST_ROOTS = 5_000_000
 
 
 def checked_system(sensor: Sensor, scene: Scene) -> tuple[Sensor, Scene]:
@@ -75,14 +75,25 @@ def checked_frames(
     return sensor, scene, frames
 
 
-def _check_aliases(sensor: Sensor, scene: Scene, n: int) -> None:
-    """Refuse a background so many wavelengths away that every frame has a multitude of roots."""
+def aliases_of(sensor: Sensor, scene: Scene) -> float:
+    """Return how many roots a frame may have: as many as unambiguous ranges before a background.
+
+    Parameters
+    ----------
+    sensor, scene : Sensor, Scene
+        Of a request.
+    """
     if isinstance(sensor, PulsedSensor) or scene.background is None:
-        return
+        return 1.0
     distance = scene.background.distance_m
     if not isinstance(distance, float | int):
-        return
-    aliases = 1.0 + distance / sensor.max_range_m
+        return 1.0
+    return 1.0 + distance / sensor.max_range_m
+
+
+def _check_aliases(sensor: Sensor, scene: Scene, n: int) -> None:
+    """Refuse a background so many wavelengths away that every frame has a multitude of roots."""
+    aliases = aliases_of(sensor, scene)
     if n * aliases > _MOST_ROOTS:
         raise RefusedError(
             f"the background lies {aliases:.3g} unambiguous ranges away, and each of {n} frames "

@@ -31,6 +31,7 @@ _log = logging.getLogger("hybridtof")
 _RENEW_S = 3.0
 _SWEEP_EVERY = 600  # renewals
 _DRAWS_LIMIT_S = 600.0
+_MOST_DRAWING = 16
 
 
 class Jobs(Generic[J, C, T, P]):
@@ -73,6 +74,7 @@ class Jobs(Generic[J, C, T, P]):
         )
         self._tasks: list[asyncio.Task[None]] = []
         self._held: set[str] = set()
+        self._drawing = 0
         self._news = asyncio.Event()
         self._open = False
 
@@ -226,6 +228,8 @@ class Jobs(Generic[J, C, T, P]):
             Where there is none of that name.
         ConflictError
             Where the job has not ended, or ended without draws.
+        BusyError
+            Where too many are being made.
         GoneError
             Where the draws had to make room for others, or were made by another version.
         """
@@ -242,13 +246,17 @@ class Jobs(Generic[J, C, T, P]):
             if kept.pieces:
                 reason = "are in the form of another version of hybridtof"
             raise GoneError(f"the draws {reason}; ask again with the same seed")
+        if self._drawing >= _MOST_DRAWING:
+            raise BusyError("too many requests for draws wait for their turn")
         call = write_draws, self._fold.Job.from_bytes, self._fold.Checkpoint.from_bytes
         future = self._workers.submit_within(
             _DRAWS_LIMIT_S, *call, self._fold.draw, media_type, kept.job, kept.pieces
         )
+        self._drawing += 1
         try:
             return await asyncio.wrap_future(future)
         finally:
+            self._drawing -= 1
             if not future.done():
                 self._workers.abandon(future)
 

@@ -10,7 +10,7 @@ from inference.fits.techniques.registry import FITS
 from inference.plan import plan
 from service.answers.estimates import EstimatesResponse, encode_estimates
 from service.bodies import BodyOf
-from service.checked_system import checked_frames
+from service.checked_system import aliases_of, checked_frames
 from service.errors import OverdueError
 from service.problems import problem_responses
 from service.requests import EstimateRequest
@@ -76,7 +76,7 @@ def quick_answer(request: EstimateRequest, settings: ServiceSettings) -> bytes |
             message = f"a fit over frames takes at most {most} of them here: ask for a posterior"
             raise InvalidInputError.at("/frames", message)
         return None
-    if len(frames) > SMALL:
+    if len(frames) * aliases_of(sensor, scene) > SMALL:
         return None
     return encode_estimates(estimate(sensor, scene, frames, request.techniques))
 

@@ -132,7 +132,7 @@ async def events(
     response_class=Response,
     responses={
         200: {"content": {form.media_type: {} for form in EXPORTS}},
-        **problem_responses(404, 406, 409, 410),
+        **problem_responses(404, 406, 409, 410, 503),
     },
 )
 async def draws(request: Request, job_id: str) -> Response:

@@ -121,7 +121,7 @@ class SqlJobStore:
             known = self._of_key(connection, job)
             if known is not None:
                 return known
-            self._make_room(connection)
+            self._make_room(connection, job.client)
             row = dataclasses.asdict(job) | {
                 "status": "queued",
                 "cancel_requested": False,
@@ -152,12 +152,27 @@ class SqlJobStore:
             raise IdempotencyError("the key came before with another request")
         return SqlJobStore._one(connection, row.id)
 
-    def _make_room(self, connection: sa.Connection) -> None:
+    def _make_room(self, connection: sa.Connection, client: str) -> None:
+        """Forget what has ended of the client that has most; refuse one that fills half of it all.
+
+        Where there are no keys there is one client, which may fill it all.
+        """
+        waiting = (JOB.c.client == client, JOB.c.ended.is_(None))
+        own = connection.scalar(sa.select(sa.func.count()).select_from(JOB).where(*waiting)) or 0
+        if client and own >= max(1, self._retention.jobs // 2):
+            raise BusyError(f"{own} posteriors of this key are waiting or running")
         count = connection.scalar(sa.select(sa.func.count()).select_from(JOB)) or 0
         surplus = count - self._retention.jobs + 1
         if surplus <= 0:
             return
-        oldest = sa.select(JOB.c.sequence).where(JOB.c.ended.is_not(None)).order_by(JOB.c.sequence)
+        counts = sa.select(JOB.c.client, sa.func.count().label("jobs")).group_by(JOB.c.client)
+        most = counts.subquery()
+        oldest = (
+            sa.select(JOB.c.sequence)
+            .join(most, most.c.client == JOB.c.client)
+            .where(JOB.c.ended.is_not(None))
+            .order_by(most.c.jobs.desc(), JOB.c.sequence)
+        )
         going = connection.scalars(oldest.limit(surplus)).all()
         if len(going) < surplus:
             raise BusyError(f"{self._retention.jobs} posteriors are waiting or running")

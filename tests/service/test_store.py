@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import sqlalchemy as sa
 
-from service.errors import StoreError
+from service.errors import BusyError, StoreError
 from service.store.holder import has_ended, holder_name
 from service.store.record import JobRecord, NewJob
 from service.store.sql_store import Retention, SqlJobStore
@@ -71,6 +71,20 @@ def test_turns(tmp_path: Path) -> None:
     while store.claim(holder):
         pass
     assert not store.waits()
+
+
+def test_a_client_takes_no_room_of_others(tmp_path: Path) -> None:
+    """What has ended goes where there is most; what waits is half of the room at most."""
+    store = store_at(tmp_path, jobs=4)
+    for name, client in (("b1", "b"), ("a1", "a"), ("a2", "a")):
+        store.add(new(name, client=client))
+    with pytest.raises(BusyError, match="2 posteriors of this key"):
+        store.add(new("a3", client="a"))
+    for name in ("b1", "a1", "a2"):
+        store.cancel(name)
+    for name in ("a3", "a4"):
+        store.add(new(name, client="a"))
+    assert [store.get(name) is None for name in ("b1", "a1", "a2")] == [False, True, False]
 
 
 def test_pieces_come_back_in_order_and_a_whole_one_replaces_them(tmp_path: Path) -> None:
