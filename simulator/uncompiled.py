@@ -21,7 +21,7 @@ __all__ = ["NotSoError", "kind_of", "reach", "run", "size"]
 _Float = np.float64
 # packages whose functions are run so wherever they are used
 _OWN = ("simulator", "inference", "tests")
-# iterations, and loops, between looks at the clock, which is that of this thread's own work
+# turns, and loops, between looks at the clock, which is that of this thread's own work
 _STRETCH, _LOOPS = 256, 63
 _clock = time.thread_time
 # of one run; the interpreter runs one at a time in any case
@@ -37,10 +37,24 @@ class NotSoError(Exception):
 def _in_time(*bounds: int) -> Any:
     """Stand for `range`, and end what takes too long: no kernel runs long without a loop."""
     _loops[0] += 1
+    found = range(*bounds)
+    if _loops[0] == 1:
+        return _outermost(found)
     if not _loops[0] & _LOOPS and _clock() > _limit[0]:
         raise NotSoError("takes too long")
-    found = range(*bounds)
     return found if len(found) <= _STRETCH else _stretches(found)
+
+
+def _outermost(whole: range) -> Iterator[int]:
+    """Give up as soon as the turns so far tell that there are too many."""
+    began = _clock()
+    for number, turn in enumerate(whole):
+        yield turn
+        done = number + 1
+        if done > 1 and not done & number:  # after 2, 4, 8, ...
+            each_s = (_clock() - began) / done
+            if began + each_s * len(whole) > _limit[0]:
+                raise NotSoError("would take too long")
 
 
 def _stretches(whole: range) -> Iterator[int]:
@@ -263,7 +277,7 @@ def run(function: Any, arguments: tuple[Any, ...], most_s: float) -> tuple[Any, 
     kept = [(array, array.copy()) for array in _arrays(arguments) if array.flags.writeable]
     with _turn, np.errstate(all="ignore"):
         began = _clock()
-        _limit[0] = began + most_s
+        _limit[0], _loops[0] = began + most_s, 0
         try:
             answer = _plain(twin(function)(*map(_number, arguments)))
             return answer, _clock() - began

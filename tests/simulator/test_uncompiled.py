@@ -108,6 +108,18 @@ def test_what_takes_longer_than_compiling_is_compiled_and_nothing_is_done_twice(
     assert counted(out, 10) == 20.0 + 10**8
 
 
+def test_what_would_take_too_long_is_given_up_after_a_few_turns(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ticks = itertools.count()
+    monkeypatch.setattr(uncompiled, "_clock", lambda: float(next(ticks)))
+    with pytest.raises(uncompiled.NotSoError, match="would"):
+        uncompiled.run(counted.__wrapped__, (np.zeros(2), 1000), 100.0)  # type: ignore[attr-defined]
+    assert next(ticks) < 5
+    answer, _ = uncompiled.run(counted.__wrapped__, (np.zeros(2), 100), 100.0)  # type: ignore[attr-defined]
+    assert answer == 100.0
+
+
 @compiled
 def ratio(one: int, other: int) -> float:
     return one / other
