@@ -18,7 +18,7 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 from simulator.kernel_cache import CacheFolder, folder_of
 
-__all__ = ["Kernel", "compiled", "compiled_for_both", "given_up_s", "when_compiling"]
+__all__ = ["Kernel", "compiled", "compiled_for_both", "given_up_s", "hot", "when_compiling"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -69,11 +69,14 @@ class Kernel:
     ----------
     options : dict of str to bool
         For numba; to be set before the first call.
+    patience : float
+        How long the interpreter may answer, as a share of what machine code takes to make.
     """
 
     def __init__(self, function: FunctionType, for_both: bool) -> None:
         functools.update_wrapper(self, function)
         self.options: dict[str, bool] = {}
+        self.patience = 1.0
         self._function, self._for_both = function, for_both
         self._dispatcher: Any = None
         self._below: Any = None
@@ -167,7 +170,7 @@ class Kernel:
     def _left_s(self, kind: object) -> float:
         """Return for how long the interpreter may still try to answer such calls [s]."""
         start_s = 0.0 if _machine else _START_S
-        cost_s = start_s + (_LOAD_S if self._kept() else self._make_s)
+        cost_s = start_s + (_LOAD_S if self._kept() else self.patience * self._make_s)
         return cost_s - self._spent_s.get(kind, 0.0)
 
     def _may_try(self, args: tuple[Any, ...]) -> bool:
@@ -209,3 +212,9 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
 def compiled_for_both(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a kernel that Python and kernels call with arguments of the same types: once."""
     return cast("Callable[P, R]", Kernel(cast("FunctionType", function), for_both=True))
+
+
+def hot(kernel: Callable[P, R]) -> Callable[P, R]:
+    """Say of a kernel that who calls it calls it thousands of times: it is compiled soon."""
+    cast("Kernel", kernel).patience = 0.1
+    return kernel

@@ -24,7 +24,7 @@ from inference.frame.log_density import empty_log_likelihood
 from inference.frame.modes import find_modes, room_for_modes
 from inference.frame.range_prior import integration_bounds
 from inference.frame.table import tabulate
-from simulator.compiled import compiled
+from simulator.compiled import compiled, hot
 from simulator.frames import Frames
 from simulator.parameters import Parameters, Terms, parameters_of
 from simulator.scene import Reference, Scene
@@ -35,6 +35,7 @@ __all__ = ["CollapsedDensity", "FluxBasis", "collapsed_density"]
 Array = NDArray[np.float64]
 
 
+@hot
 @compiled
 def _log_likelihoods(out: Array, rows: Rows, data: Data, instrument: Instrument) -> None:
     """Fill out[i, b] with the log likelihood of block b under parameter vector i."""
