@@ -70,10 +70,11 @@ class TechniqueResult:
         Exponent b of Phi ~ r^b and distortion 1 + 1/b with their standard deviations, nan where
         unavailable; only of techniques that see motion.
     parameters : mapping, optional
-        What a technique of many frames found besides the ranges: by scene path ``value``, ``sd``
-        and ``status``.
+        What a technique of many frames found besides the ranges: by scene path ``value``, ``sd``,
+        ``status`` and ``sd_parts``.
     fit : mapping, optional
-        How well a technique of many frames explains them: ``chi_square``, ``deviance``
+        How well a technique of many frames explains them: ``chi_square`` (less what
+        errors of the model take up), ``deviance``
         (-2 log likelihood relative to no residual under read noise alone; of fits by likelihood),
         ``degrees_of_freedom``, ``p_value``, ``misfit``, ``rank``, ``widening`` (factor on all
         standard deviations; of fits by likelihood) and ``optima``.

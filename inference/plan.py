@@ -6,7 +6,6 @@ from collections.abc import Iterable
 
 from inference.estimates import LeftOut
 from inference.known import Known, known_of
-from inference.realtime.registry import TECHNIQUES
 from inference.technique import Technique
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.errors import listed
@@ -53,12 +52,6 @@ def obstacle(
     """
     if sensor.kind not in technique.kinds:
         return "a sine wave has no late window"
-    if (
-        scene.stated_flux_error is not None
-        and technique.name not in TECHNIQUES  # these have it in their error budget
-        and "discrepancy" not in technique.immune_to
-    ):
-        return "has no term for the scene's discrepancy; use a posterior"
     if technique.differential:
         if technique.uses_background and scene.motion == "tangential":
             return "needs radial motion: a range that does not change leaves the background alone"

@@ -54,11 +54,12 @@ class FrameEstimate(pydantic.BaseModel):
 
 
 class FittedParameter(pydantic.BaseModel):
-    """An unknown that a technique of many frames found; sd is the bound times `widening`."""
+    """An unknown that a technique of many frames found; sd is the whole."""
 
     value: float | None
     sd: float | None
     status: Literal["identified", "weak", "not_identified"]
+    sd_parts: ErrorBudget | None = None
     reason: str | None = None
 
 

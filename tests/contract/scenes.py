@@ -236,7 +236,14 @@ def _mean(sensor: Sensor, setting: Setting, r: Any, errors: Errors | None) -> An
     return mean
 
 
-def frames_of(sensor: Sensor, setting: Setting, range_m: Array, rng: np.random.Generator) -> Frames:
+def frames_of(
+    sensor: Sensor,
+    setting: Setting,
+    range_m: Array,
+    rng: np.random.Generator,
+    *,
+    one_error: bool = False,
+) -> Frames:
     """Draw frames of an object at given ranges that recedes at `SPEED`.
 
     Parameters
@@ -249,11 +256,15 @@ def frames_of(sensor: Sensor, setting: Setting, range_m: Array, rng: np.random.G
         True ranges [m].
     rng : numpy.random.Generator
         Source of the noise, and of the errors of the model that the setting states.
+    one_error : bool
+        Whether all frames are of one object and have one error, or each has its own.
     """
     n = range_m.size
     errors = None
     if any(setting.errors):
-        of_flux, of_range = (SmoothErrors.drawn(rng, sd, n) for sd in setting.errors)
+        of_flux, of_range = (
+            SmoothErrors.drawn(rng, sd, 1 if one_error else n) for sd in setting.errors
+        )
         errors = (of_flux, of_range)
     mean = _mean(sensor, setting, range_m, errors)
     signal = _signal(sensor, setting, range_m, errors)

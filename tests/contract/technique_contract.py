@@ -29,6 +29,7 @@ __all__ = [
     "frames_that_cannot_be_used_are_said_to_be",
     "immunities_are_those_declared",
     "model_errors_are_right",
+    "model_errors_of_many_frames_are_right",
     "of_single_frames",
     "settings_of",
 ]
@@ -43,6 +44,7 @@ _SINGLE, _MANY = 200, 24  # frames of a set
 _TRIALS, _SETS = 4000, 40  # frames, and sets of frames, whose scatter is compared with their sd
 _MONTE_CARLO = 2  # scenes of a fit over many frames in which this is done: a set is a whole fit
 _ERRORS = (1e-4, 1e-5)  # of flux and effective distance [m]: small enough to be linear
+_ERRING = 20  # sets of frames whose model errs
 _MISFITS = 3  # of 40 sets of a fit that is right
 _ALARM = 1e-6  # of one comparison of scatter and sd
 
@@ -180,6 +182,32 @@ def model_errors_are_right(technique: Technique, kind: str) -> None:
         assert misses.size > 0.35 * _TRIALS
         share, low, high = float(np.mean(misses < 1.0)), *_binomial_band(misses.size)
         assert low < share < high, (technique.name, setting.name, low, share, high)
+
+
+def model_errors_of_many_frames_are_right(technique: Technique, kind: str) -> None:
+    """Check the model's part against random smooth errors that the frames of a set share.
+
+    Readings nearly without noise, in the first scene, 20 sets: the mean square of the misses in the
+    band of a chi-square with 20 degrees of freedom, as in `errors_are_right`; no set reads as a
+    misfit, and the squares of the parts sum to the whole's.
+    """
+    sensor, ranges = sensor_of(kind, _QUIET), span(_MANY)
+    erring = dataclasses.replace(settings_of(technique, kind)[0], errors=_ERRORS)
+    sums = []
+    for seed in range(_ERRING):
+        rng = np.random.default_rng(200 + seed)
+        frames = frames_of(sensor, erring, ranges, rng, one_error=True)
+        result = _solve(technique, sensor, erring, frames)
+        assert result.fit is not None
+        assert result.sd_parts_m is not None
+        assert not result.fit["misfit"], (technique.name, result.fit["p_value"])
+        filled = np.isfinite(result.roots_sd_m)
+        squares = sum(part[filled] ** 2 for part in result.sd_parts_m)
+        np.testing.assert_allclose(squares, result.roots_sd_m[filled] ** 2, rtol=1e-9)
+        sums.append(float(np.nanmean(_misses(result, ranges) ** 2)))
+    low = float(special.chdtri(_ERRING, 1 - _ALARM / 2)) / _ERRING
+    high = float(special.chdtri(_ERRING, _ALARM / 2)) / _ERRING
+    assert low < float(np.mean(sums)) < high, (technique.name, low, np.mean(sums), high)
 
 
 def _binomial_band(n: int) -> tuple[float, float]:

@@ -19,6 +19,7 @@ from tests.contract.technique_contract import (
     frames_that_cannot_be_used_are_said_to_be,
     immunities_are_those_declared,
     model_errors_are_right,
+    model_errors_of_many_frames_are_right,
     of_single_frames,
     settings_of,
 )
@@ -93,6 +94,12 @@ def test_a_factor_of_two_in_the_model_part_is_noticed(
 @pytest.mark.parametrize(("technique", "kind"), MANY)
 def test_errors_of_many_frames(technique: Technique, kind: str) -> None:
     errors_are_right(technique, kind)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("technique", "kind"), MANY)
+def test_errors_of_the_model_of_many_frames(technique: Technique, kind: str) -> None:
+    model_errors_of_many_frames_are_right(technique, kind)
 
 
 @pytest.mark.parametrize(("technique", "kind"), EVERY)

@@ -47,7 +47,7 @@ class RandomSet:
     simulation: Simulation
 
 
-def random_set(name: str, kind: str, seed: int) -> RandomSet:
+def random_set(name: str, kind: str, seed: int, discrepancy: object = 0) -> RandomSet:
     """Draw a data set: object, ranges, noise, and what stands before and behind.
 
     Parameters
@@ -60,6 +60,8 @@ def random_set(name: str, kind: str, seed: int) -> RandomSet:
         Of the sensor.
     seed : int
         Of all that is random.
+    discrepancy : object
+        What the scene says of its model's error; the readings have none.
     """
     rng = np.random.default_rng(seed)
     c0 = math.exp(rng.normal(math.log(0.08), 0.8))
@@ -75,7 +77,10 @@ def random_set(name: str, kind: str, seed: int) -> RandomSet:
     timing = {"pulse_width_s": 1e-7} if kind == "pulsed" else {"frequency_hz": 1e7}
     sensor = parse_sensor({"kind": kind, **timing, "noise": {"read": [read, read]}})
     truth: dict[str, Any] = {"object": {"c0": c0, "c1": c1, "c2": c2}}
-    scene: dict[str, Any] = {"range_m": {"prior": "loguniform", "low": 0.02, "high": 7.0}}
+    scene: dict[str, Any] = {
+        "range_m": {"prior": "loguniform", "low": 0.02, "high": 7.0},
+        "discrepancy": discrepancy,
+    }
     if name in ("crosstalk", "everything"):
         truth["crosstalk"] = (rng.normal(0.0, 1.0, 2) * signal).tolist()
         scene["crosstalk"] = [{"prior": "normal", "mean": 0.0, "sd": 3 * signal}] * 2

@@ -39,6 +39,11 @@ def path(frames: int, empty: int = 0, span: tuple[float, float] = (0.2, 2.0)) ->
     return SampledTrajectory(range_m=ranges, object_present=[True] * frames + [False] * empty)
 
 
+def exact_scene(document: dict[str, Any]) -> Scene:
+    """Parse a scene whose model is exact where it says nothing else."""
+    return parse_scene({"discrepancy": 0, **document})
+
+
 def data(
     sensor: Sensor, truth: dict[str, Any], trajectory: SampledTrajectory, seed: int = 1
 ) -> Frames:

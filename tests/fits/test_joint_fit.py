@@ -18,7 +18,6 @@ from inference.fits.likelihood.problem import fit_problem
 from inference.identifiability.experiment import Experiment, information
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
-from simulator.scene import parse_scene
 from simulator.sensor import Sensor, parse_sensor
 from tests.fits.scenes import (
     KINDS,
@@ -28,6 +27,7 @@ from tests.fits.scenes import (
     VAGUE,
     WALL,
     data,
+    exact_scene,
     path,
     reference_fit,
     sensor_of,
@@ -53,7 +53,7 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 
 def fitted(sensor: Sensor, scene: dict[str, Any], frames: Frames) -> TechniqueResult:
-    found = estimate(sensor, parse_scene(scene), frames, ["joint_fit"])
+    found = estimate(sensor, exact_scene(scene), frames, ["joint_fit"])
     reasons = {item.name: item.reason for item in found.left_out}
     assert found.results, reasons["joint_fit"]
     return found.results[0]
@@ -74,7 +74,7 @@ def test_a_fit_is_that_of_scipy_over_all_unknowns(kind: str, case: str) -> None:
     assert result.fit is not None
     values, ranges, chi_square = reference_fit(
         sensor,
-        parse_scene(scene),
+        exact_scene(scene),
         frames,
         values_of(sensor, truth),
         np.array(trajectory.range_m),
@@ -100,7 +100,7 @@ def test_the_example_of_the_thesis(frames: int) -> None:
     sensor = parse_sensor({**KINDS["pulsed"], "gain": 3.0, "noise": {"read": [3e-9, 3e-9]}})
     truth = {"object": THESIS, "crosstalk": [3.0, 3.0]}
     trajectory = path(frames)
-    scene = parse_scene({"crosstalk": [{"prior": "normal", "mean": 0.0, "sd": 10.0}] * 2})
+    scene = exact_scene({"crosstalk": [{"prior": "normal", "mean": 0.0, "sd": 10.0}] * 2})
     shown = data(sensor, truth, trajectory)
     problem = fit_problem(sensor, scene, shown)
     start = problem.coordinates(np.array([[0.1, 10.0, 0.1, 3.0, 3.0]]))[0]
@@ -123,7 +123,7 @@ def test_bounds_are_attained() -> None:
     sensor = sensor_of("pulsed", 3e4)
     scene, truth = CASES["crosstalk"]
     trajectory = path(12)
-    problem = fit_problem(sensor, parse_scene(scene), data(sensor, truth, trajectory))
+    problem = fit_problem(sensor, exact_scene(scene), data(sensor, truth, trajectory))
     known = values_of(sensor, truth)
     at = problem.coordinates(np.array([[known[name] for name in problem.names]]))[0]
     _, facts = residuals_and_information(problem, at, np.log(trajectory.range_m))
@@ -131,7 +131,7 @@ def test_bounds_are_attained() -> None:
     sets = 60
     for seed in range(sets):
         shown = data(sensor, truth, trajectory, seed)
-        top = maximum_from(fit_problem(sensor, parse_scene(scene), shown), at)
+        top = maximum_from(fit_problem(sensor, exact_scene(scene), shown), at)
         distance += float(np.sum((facts.jacobian @ (top.x - at)) ** 2))
         chi_square += top.deviance
     for value, freedom in ((distance, 5 * sets), (chi_square, 7 * sets)):
@@ -152,7 +152,7 @@ def test_bounds_are_those_of_the_identifiability_study(kind: str, noise: dict[st
         "crosstalk": [0.002, 0.01],
         "background": WALL,
     }
-    scene = parse_scene(
+    scene = exact_scene(
         {
             "crosstalk": [VAGUE, VAGUE],
             "background": UNKNOWN_WALL,
@@ -209,7 +209,7 @@ def test_published_bounds_of_the_object_before_crosstalk() -> None:
     scene, _ = CASES["crosstalk"]
     truth = {"object": OBJECT, "crosstalk": [0.2 * crosstalk, crosstalk]}
     trajectory = path(40)
-    problem = fit_problem(sensor, parse_scene(scene), data(sensor, truth, trajectory))
+    problem = fit_problem(sensor, exact_scene(scene), data(sensor, truth, trajectory))
     known = values_of(sensor, truth)
     x = problem.coordinates(np.array([[known[name] for name in problem.names]]))[0]
     _, facts = residuals_and_information(problem, x, np.log(trajectory.range_m))
@@ -287,7 +287,7 @@ def test_settings_of_the_joint_fit_give_its_answer() -> None:
         scene, truth = CASES[case]
         truth = {**truth, "object": {**OBJECT, "c1": 0.05}}
         frames = data(sensor, truth, path(12))
-        found = estimate(sensor, parse_scene(scene), frames, [name, "joint_fit"])
+        found = estimate(sensor, exact_scene(scene), frames, [name, "joint_fit"])
         assert [result.technique for result in found.results] == [name, "joint_fit"]
         one, other = found.results
         assert one.parameters == other.parameters
@@ -324,7 +324,7 @@ def test_a_gain_factor_scales_what_is_found_and_nothing_else(factor: float) -> N
             "background": {**WALL, "strength": strength},
         }
         other = sensor.model_copy(update={"gain": gain})
-        (result,) = estimate(other, parse_scene(scene), shown, ["joint_fit"]).results
+        (result,) = estimate(other, exact_scene(scene), shown, ["joint_fit"]).results
         assert result.parameters is not None
         item = result.parameters["background.strength"]
         found.append([item["value"] / gain, item["sd"] / gain])

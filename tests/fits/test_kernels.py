@@ -10,8 +10,7 @@ from inference.fits.likelihood.coordinates import chain, physical
 from inference.fits.likelihood.polish import _Profile
 from inference.fits.likelihood.problem import FitProblem, fit_problem
 from inference.fits.likelihood.triangle import damped_step, reduce_columns, solve_least_squares
-from simulator.scene import parse_scene
-from tests.fits.scenes import OBJECT, VAGUE, WALL, data, path, sensor_of
+from tests.fits.scenes import OBJECT, VAGUE, WALL, data, exact_scene, path, sensor_of
 
 EVERYTHING: dict[str, Any] = {
     "crosstalk": [VAGUE, VAGUE],
@@ -27,7 +26,7 @@ def problem_of(
     kind: str, scene: dict[str, Any], truth: dict[str, Any], **noise: float
 ) -> FitProblem:
     sensor = sensor_of(kind, **noise)
-    return fit_problem(sensor, parse_scene(scene), data(sensor, truth, path(14, 2)))
+    return fit_problem(sensor, exact_scene(scene), data(sensor, truth, path(14, 2)))
 
 
 @pytest.mark.parametrize("shadow", ["object", "free"])

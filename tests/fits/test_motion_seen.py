@@ -8,8 +8,7 @@ import pytest
 from inference.fits.answer.motion_seen import numbers_shown
 from inference.fits.likelihood.maximum import Maximum
 from inference.fits.likelihood.problem import fit_problem
-from simulator.scene import parse_scene
-from tests.fits.scenes import OBJECT, SIGNAL_AT_1M, data, path, sensor_of, values_of
+from tests.fits.scenes import OBJECT, SIGNAL_AT_1M, data, exact_scene, path, sensor_of, values_of
 
 SHAPES = [((0.7, 0.7), 1.0), ((0.69, 0.71), 2.0), ((0.3, 1.5), math.inf)]
 
@@ -19,7 +18,7 @@ def shown(
 ) -> float:
     sensor = sensor_of(kind, SIGNAL_AT_1M / read, **noise)
     frames = data(sensor, {"object": OBJECT}, path(40, span=span), seed)
-    problem = fit_problem(sensor, parse_scene({}), frames)
+    problem = fit_problem(sensor, exact_scene({}), frames)
     known = values_of(sensor, {"object": OBJECT})
     truth = problem.coordinates(np.array([[known[name] for name in problem.names]]))[0]
     ranges = np.log(np.linspace(*span, 40))

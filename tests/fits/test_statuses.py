@@ -10,10 +10,9 @@ from inference.fits.answer.report import entries
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
 from simulator.parameters import parameters_of
-from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
 from simulator.trajectories import SampledTrajectory
-from tests.fits.scenes import KINDS, data
+from tests.fits.scenes import KINDS, data, exact_scene
 
 BOX = {"c0": 0.1, "c1": 0.0, "c2": 0.1}
 SENSOR = parse_sensor({**KINDS["pulsed"], "noise": {"read": [3e-3, 3e-3]}})
@@ -36,7 +35,7 @@ def test_a_fit_and_a_posterior_of_the_same_frames_say_the_same(
     """
     ranges = np.geomspace(*span, 24).tolist()
     frames = data(SENSOR, {"object": BOX}, SampledTrajectory(range_m=ranges), 2)
-    scene = parse_scene({"object": known} if known else {})
+    scene = exact_scene({"object": known} if known else {})
     (fit,) = estimate(SENSOR, scene, frames, ["joint_fit"]).results
     assert fit.parameters is not None
     posterior = infer(SENSOR, scene, frames, SamplerSettings(seed=1))
@@ -53,14 +52,14 @@ def test_the_prior_of_the_scene_is_the_measure(sd: float, status: str) -> None:
     0.2 and 0.7 are reached at s = 0.204 and 0.980.
     """
     normal = {"prior": "normal", "mean": 0.0, "sd": 0.01}
-    scene = parse_scene({"crosstalk": [normal, 0.0], "object": BOX})
+    scene = exact_scene({"crosstalk": [normal, 0.0], "object": BOX})
     found = entries(parameters_of(SENSOR, scene), {"crosstalk.w1": (0.0, 0.01 * sd, np.inf)})
     assert found["crosstalk.w1"]["status"] == status
 
 
 def test_the_logarithm_of_what_is_positive_is_judged() -> None:
     wide = {"prior": "lognormal", "median": 0.1, "sigma": 4.0}
-    parameters = parameters_of(SENSOR, parse_scene({"object": {**BOX, "c0": wide}}))
+    parameters = parameters_of(SENSOR, exact_scene({"object": {**BOX, "c0": wide}}))
     far = entries(parameters, {"object.c0": (0.1, 1e3, 0.5)})["object.c0"]
     assert (far["sd"], far["status"]) == (1e3, "identified")
     none = entries(parameters, {"object.c0": (np.inf, np.nan, np.nan)})["object.c0"]

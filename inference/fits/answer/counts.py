@@ -23,7 +23,6 @@ __all__ = [
     "linear_obstacle",
     "ranges_needed",
     "too_few",
-    "unmodelled_error",
 ]
 
 _MOST_FRAMES = 20_000
@@ -82,20 +81,6 @@ def frames_needed(kind: str, unknowns: tuple[str, ...], empty: bool) -> int:
     return ranges_needed(kind, unknowns, empty) + 1
 
 
-def unmodelled_error(scene: Scene) -> str | None:
-    """Return why a fit over frames does not serve a scene whose object errs, None if it serves.
-
-    Parameters
-    ----------
-    scene : Scene
-        A stated discrepancy is one error for all frames, which noise of each frame cannot stand
-        for: a fit without a term for it would be surer than it may be.
-    """
-    if scene.stated_flux_error is None:
-        return None
-    return "has no term for the scene's discrepancy; use a posterior"
-
-
 def too_few(frames: Frames | None, unknowns: tuple[str, ...]) -> str | None:
     """Return that frames are too few for a fit that takes one equation of each, None if not.
 
@@ -134,7 +119,7 @@ def linear_obstacle(scene: Scene, unknowns: tuple[str, ...]) -> str | None:
             f"tells one of {listed(list(unknowns))}; move the object, or state all of them but one "
             "as known"
         )
-    return unmodelled_error(scene)
+    return None
 
 
 def joint_obstacle(
@@ -156,9 +141,6 @@ def joint_obstacle(
             f"needs an object whose range changes, and the scene's motion is {scene.motion}; "
             "ranges, crosstalk and background cannot be told apart otherwise"
         )
-    unmodelled = unmodelled_error(scene)
-    if unmodelled:
-        return unmodelled
     if scene.optional_terms:
         return (
             f"keeps every term, and the scene leaves {' and '.join(scene.optional_terms)} to the "

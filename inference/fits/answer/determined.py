@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from inference.fits.answer.counts import ranges_needed
+from inference.fits.answer.model_error import Response
 from inference.fits.answer.motion_seen import numbers_shown
 from inference.fits.answer.ranges import DECIDED, WITHIN
 from inference.fits.answer.report import describe
@@ -168,7 +169,7 @@ def refuse_if_noise_was_followed(
 def refuse_if_open(
     problem: FitProblem,
     top: Maximum,
-    facts: Information,
+    at: Response,
     wider: float,
     others: Sequence[tuple[float, Maximum]] = (),
 ) -> None:
@@ -180,7 +181,7 @@ def refuse_if_open(
         The problem.
     top : Maximum
         Its best optimum.
-    facts : Information
+    at : Response
         There.
     wider : float
         Factor on all standard deviations (`inflation`).
@@ -193,15 +194,25 @@ def refuse_if_open(
         Where the ranges share a relative standard deviation above `LIMIT`, there or at another
         optimum as far as the intervals of 95 % reach.
     """
-    present = problem.present & np.isfinite(top.positions)
+    present, facts = problem.present & np.isfinite(top.positions), at.facts
     shared = facts.sd_of(facts.response[present])
-    typical = wider * float(np.median(shared)) if shared.size else math.inf
+    of_noise = wider * float(np.median(shared)) if shared.size else math.inf
+    of_model = float(np.median(at.sd_of_log_r(at.of_x)[present])) if shared.size else 0.0
+    typical = math.hypot(of_noise, of_model)
     if not typical <= LIMIT:
         open_ones = [
             name
-            for name, item in describe(problem, top, facts, wider).items()
+            for name, item in describe(problem, top, facts, wider, of_x=at.of_x).items()
             if item["status"] != "identified"
         ]
+        if of_noise <= LIMIT:
+            raise RefusedError(
+                f"errors of the model (discrepancy) leave the ranges a common relative standard "
+                f"deviation of {typical:.2g}, more than {LIMIT:g}: "
+                f"{listed(open_ones or list(problem.names))} are too uncertain; state a number as "
+                "known, a smaller discrepancy if the object is nearer to the model, or use a "
+                "posterior with priors"
+            )
         raise RefusedError(
             f"the ranges would have a common relative standard deviation of {typical:.2g}, more "
             f"than {LIMIT:g}: {listed(open_ones or list(problem.names))} are too uncertain; "

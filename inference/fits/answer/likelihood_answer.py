@@ -1,5 +1,6 @@
 """From optima of the likelihood of all frames to a result, or to a refusal."""
 
+import dataclasses
 import math
 from collections.abc import Iterable
 
@@ -15,6 +16,7 @@ from inference.fits.answer.determined import (
     refuse_if_undetermined,
 )
 from inference.fits.answer.inflation import inflation, shift_of
+from inference.fits.answer.model_error import Response, response_of
 from inference.fits.answer.profile_scan import profile_scan
 from inference.fits.answer.ranges import DECIDED, WITHIN, Answer, frame_ranges
 from inference.fits.answer.report import describe, fit_report, spoiled
@@ -48,7 +50,8 @@ def likelihood_answer_from(name: str, task: Task, values: dict[str, float]) -> T
         As `likelihood_answer`; and where the values are no object.
     """
     state = rule_out(task.sensor, task.frames)
-    problem = fit_problem(task.sensor, task.scene, task.frames.select(state != SATURATED))
+    frames = task.frames.select(state != SATURATED)
+    problem = fit_problem(task.sensor, task.scene, frames, exact=task.exact)
     x = problem.coordinates(np.array([[values[path] for path in problem.names]]))[0]
     if not np.isfinite(x).all():
         raise RefusedError("the best fit is no object: a size or reflectance is not positive")
@@ -111,23 +114,35 @@ def likelihood_answer(
     for point in points:
         reach = np.sqrt(max(point.deviance - top.deviance, WITHIN))
         wider = max(wider, shift_of(problem, top, facts, point) / reach)
-    others = [(one.deviance - top.deviance, one) for one in optima[1:]]
-    refuse_if_open(problem, top, facts, wider, others)
-    undecided = [
-        Answer(one.x, one.deviance - top.deviance, None if k else wider * facts.factor)
-        for k, one in enumerate(optima)
-        if one.deviance - top.deviance <= DECIDED
+    at = response_of(problem, top.x, top.positions)
+    others = [(_excess(problem, one, top, at), one) for one in optima[1:]]
+    refuse_if_open(problem, top, at, wider, others)
+    best = Answer(top.x, 0.0, wider * facts.factor, at.of_x)
+    undecided = [Answer(one.x, excess) for excess, one in others if excess <= DECIDED]
+    other = [
+        dataclasses.replace(one, deviance=top.deviance + excess)
+        for excess, one in others
+        if excess <= DECIDED
     ]
-    other = [one for one in optima[1:] if one.deviance - top.deviance <= DECIDED]
-    report = fit_report(problem, optima, facts, wider)
-    parameters = describe(problem, top, facts, wider, [*other, *points])
+    report = fit_report(problem, optima, at, wider)
+    parameters = describe(problem, top, facts, wider, [*other, *points], at.of_x)
     points += [one for one in walked if one.deviance - top.deviance <= DECIDED]
     return frame_ranges(
         name,
         problem,
-        undecided,
+        [best, *undecided],
         state,
         spoiled(parameters, report) if report["misfit"] else parameters,
         report,
         [(one.deviance - top.deviance, one.positions) for one in points],
     )
+
+
+def _excess(problem: FitProblem, other: Maximum, top: Maximum, at: Response) -> float:
+    """Return the deviance of an optimum above the best that errors of the model do not explain."""
+    excess = other.deviance - top.deviance
+    if at.exact:
+        return excess
+    there = response_of(problem, other.x, other.positions)
+    whole = float(np.square(there.residual).sum() - np.square(at.residual).sum())
+    return max(excess - whole + there.chi_square - at.chi_square, 0.0)

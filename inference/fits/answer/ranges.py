@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.estimates import Status, TechniqueResult
+from inference.estimates import SdParts, Status, TechniqueResult
+from inference.fits.answer.model_error import response_of
 from inference.fits.likelihood.frame_modes import MOST, frame_modes
-from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.problem import FitProblem
 from inference.realtime.net import ABSENT, COMMON_REASONS, SATURATED
 
@@ -50,40 +50,73 @@ class Answer:
         Deviance above the best answer's.
     covariance_factor : ndarray, shape (d, m), optional
         F with F F^T the covariance of the coordinates; left out: that of the fit's information.
+    of_x : ndarray, shape (d, k), optional
+        Change of the coordinates with errors of the model; left out: that of the likelihood's
+        optimum.
     """
 
     x: Array
     excess: float
     covariance_factor: Array | None = None
+    of_x: Array | None = None
 
 
-def _modes(problem: FitProblem, answers: Sequence[Answer]) -> tuple[Array, Array, Array]:
-    """Log ranges, their standard deviations and deviance above the best; (n, answers * MOST)."""
-    positions, sds, excesses = [], [], []
-    best = np.full(problem.frames.shape[0], np.inf)
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Modes:
+    """Ranges that explain the frames; every array has the shape (n, answers * `MOST`).
+
+    Attributes
+    ----------
+    log_r : ndarray
+        The ranges.
+    noise : ndarray
+        Standard deviations of log r by the frame's own noise.
+    told : ndarray
+        By all noise, that which frames share included.
+    model : ndarray
+        By errors of the model.
+    excess : ndarray
+        Deviance above the best.
+    """
+
+    log_r: Array
+    noise: Array
+    told: Array
+    model: Array
+    excess: Array
+
+
+def _modes(problem: FitProblem, answers: Sequence[Answer]) -> tuple[_Modes, Array]:
+    """Return the modes, and the chi-square of each frame that errors of the model leave."""
+    columns: list[tuple[Array, ...]] = []
+    chi_square = np.empty(0)
     for answer in answers:
         u, deviance = frame_modes(problem, answer.x)
-        sd = np.full(u.shape, np.nan)
+        noise, told, model = np.full((3, *u.shape), np.nan)
+        factor, of_x = answer.covariance_factor, answer.of_x
         for k in range(MOST):
-            if not np.isfinite(u[:, k]).any():
+            if k > 0 and not np.isfinite(u[:, k]).any():
                 break
-            _, facts = residuals_and_information(problem, answer.x, u[:, k])
-            factor = facts.factor if answer.covariance_factor is None else answer.covariance_factor
+            at = response_of(problem, answer.x, u[:, k])
+            # of all frames at once where each has its best range
+            factor = at.facts.factor if factor is None else factor
+            of_x = at.of_x if of_x is None else of_x
             with np.errstate(invalid="ignore"):
-                shared = np.einsum("nk,nk->n", facts.response @ factor, facts.response @ factor)
-                sd[:, k] = np.sqrt(facts.own_variance + shared)
-        positions.append(u)
-        sds.append(sd)
+                shared = np.square(at.facts.response @ factor).sum(axis=1)
+                noise[:, k] = np.sqrt(at.facts.own_variance)
+                told[:, k] = np.sqrt(at.facts.own_variance + shared)
+                model[:, k] = at.sd_of_log_r(of_x)
+            if not at.exact:
+                # another mode is one while all other frames, and so x, stay as they are
+                deviance[:, k] -= at.taken_of_frames(of_x if k == 0 else 0.0 * of_x)
+            if not columns and k == 0:
+                chi_square = at.chi_square_of_frames(of_x)
         # the other frames are as they are: a worse mode of this one costs what it costs here
         with np.errstate(invalid="ignore"):
-            excesses.append(answer.excess + deviance - deviance[:, :1])
-        best = np.minimum(best, deviance[:, 0])
-    excess = np.concatenate(excesses, axis=1)
-    return (
-        np.concatenate(positions, axis=1),
-        np.concatenate(sds, axis=1),
-        np.where(np.isnan(excess), np.inf, excess),
-    )
+            excess = answer.excess + deviance - deviance[:, :1]
+        columns.append((u, noise, told, model, np.where(np.isnan(excess), np.inf, excess)))
+    whole = (np.concatenate(parts, axis=1) for parts in zip(*columns, strict=True))
+    return _Modes(*whole), chi_square
 
 
 def _merged(u: Array, sd: Array, excess: Array) -> tuple[list[int], bool]:
@@ -156,14 +189,14 @@ def frame_ranges(
         Without run time.
     """
     used = np.flatnonzero(state != SATURATED)
-    u, sd, excess = _modes(problem, answers)
-    sd[:, 0] = np.fmax(sd[:, 0], _reaches(problem, u[:, 0], points))
+    modes, chi_square = _modes(problem, answers)
+    u, excess = modes.log_r, modes.excess
+    modes.told[:, 0] = np.fmax(modes.told[:, 0], _reaches(problem, u[:, 0], points))
+    sd = np.hypot(modes.told, modes.model)
     n = state.size
     kept: list[list[int]] = [[] for _ in range(n)]
     near = np.zeros(n, dtype=np.bool_)
     reason = state.copy()
-    residual, _ = residuals_and_information(problem, answers[0].x, u[:, 0])
-    chi_square = np.einsum("ni,ni->n", residual, residual)
     low, high = np.log(problem.support)
     single = np.count_nonzero(excess <= DECIDED, axis=1) <= 1
     for row, frame in enumerate(used):
@@ -184,13 +217,20 @@ def frame_ranges(
             kept[frame], reason[frame] = [], _EDGE
     count = np.array([len(modes) for modes in kept], dtype=np.intp)
     width = max(int(count.max(initial=0)), 1)
-    roots, roots_sd = np.full((n, width), np.nan), np.full((n, width), np.nan)
+    roots, roots_sd, noise, scene, model = np.full((5, n, width), np.nan)
+    # what other values and modes widen by is shared by all frames
+    with np.errstate(invalid="ignore"):
+        shared = np.sqrt(np.maximum(sd**2 - modes.noise**2 - modes.model**2, 0.0))
     for row, frame in enumerate(used):
-        modes = np.array(kept[frame], dtype=np.intp)
-        modes = modes[np.argsort(u[row, modes])]
-        roots[frame, : modes.size] = np.exp(u[row, modes])
+        index = np.array(kept[frame], dtype=np.intp)
+        index = index[np.argsort(u[row, index])]
+        place = slice(index.size)
+        roots[frame, place] = np.exp(u[row, index])
         with np.errstate(invalid="ignore", over="ignore"):
-            roots_sd[frame, : modes.size] = np.exp(u[row, modes]) * sd[row, modes]
+            roots_sd[frame, place] = roots[frame, place] * sd[row, index]
+            noise[frame, place] = roots[frame, place] * modes.noise[row, index]
+            scene[frame, place] = roots[frame, place] * shared[row, index]
+            model[frame, place] = roots[frame, place] * modes.model[row, index]
     roots_sd[~np.isfinite(roots_sd)] = np.nan
     status = np.where(
         count == 1, Status.UNIQUE, np.where(count > 1, Status.AMBIGUOUS, Status.NONE)
@@ -206,6 +246,7 @@ def frame_ranges(
         near_fold=near,
         reason=reason,
         reasons=_REASONS,
+        sd_parts_m=SdParts(noise, scene, model),
         parameters=parameters,
         fit=fit,
     )

@@ -8,15 +8,15 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inference.fits.answer.model_error import Response
 from inference.fits.answer.ranges import WITHIN
-from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.maximum import Maximum
 from inference.fits.likelihood.problem import FitProblem
 from inference.identifiability.information import Information
 from inference.identifiability.status import is_positive, spread_of_fit, status_of
 from simulator.parameters import Parameters
 
-__all__ = ["FALSE_ALARM", "describe", "entries", "fit_report", "spoiled"]
+__all__ = ["FALSE_ALARM", "describe", "entries", "fit_report", "spoiled", "with_parts"]
 
 Array = NDArray[np.float64]
 
@@ -29,6 +29,7 @@ def describe(
     facts: Information,
     wider: float = 1.0,
     undecided: Sequence[Maximum] = (),
+    of_x: Array | None = None,
 ) -> dict[str, Any]:
     """Return value, standard deviation and status of every unknown.
 
@@ -46,16 +47,20 @@ def describe(
         Other values that are not decided against: standard deviations are widened until such
         values lie as far out as their deviance says, or in the interval of 95 % if that reaches
         them.
+    of_x : ndarray, shape (d, k), optional
+        Change of the coordinates with errors of the model; left out: none.
 
     Returns
     -------
     dict
-        As `entries`; ``sd`` is the Cramer-Rao bound, ranges eliminated, times ``wider``, or what
-        ``undecided`` asks for.
+        As `entries`, with ``sd_parts``; ``sd`` is the Cramer-Rao bound, ranges eliminated, times
+        ``wider``, together with the model's part, or what ``undecided`` asks for.
     """
     functionals = problem.chain(top.x)[problem.slots] * problem.units[:, None]
     sds = wider * facts.sd_of(functionals)
     values = problem.natural(top.x)
+    model = np.linalg.norm(functionals @ of_x, axis=1) if of_x is not None else np.zeros(len(sds))
+    sds = np.hypot(sds, model)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         ratios = sds / np.abs(values)
         for other in undecided:
@@ -63,8 +68,38 @@ def describe(
             there = problem.natural(other.x)
             sds = np.fmax(sds, np.abs(there - values) / reach)
             ratios = np.fmax(ratios, np.abs(np.log(there / values)) / reach)
+        # the others known, a coordinate is as certain as its own column is long
+        own = np.abs(np.diag(functionals)) / np.linalg.norm(facts.jacobian, axis=0)
     columns = zip(values.tolist(), sds.tolist(), ratios.tolist(), strict=True)
-    return entries(problem.parameters, dict(zip(problem.names, columns, strict=True)))
+    found = entries(problem.parameters, dict(zip(problem.names, columns, strict=True)))
+    parts = zip(own.tolist(), model.tolist(), strict=True)
+    return with_parts(found, dict(zip(problem.names, parts, strict=True)))
+
+
+def with_parts(
+    parameters: Mapping[str, Any], parts: Mapping[str, tuple[float, float]]
+) -> dict[str, Any]:
+    """Return parameters with their error budget, ``sd_parts``.
+
+    Parameters
+    ----------
+    parameters : mapping
+        As `entries`.
+    parts : mapping of str to (float, float)
+        By scene path, the parts of noise with all others known, and of the model; what is left of
+        the whole is the scene's.
+    """
+    answer: dict[str, Any] = {}
+    for path, entry in parameters.items():
+        sd, (noise, model) = entry["sd"], parts[path]
+        budget = None
+        if sd is not None:
+            model = min(model, sd)
+            noise = min(noise, math.sqrt(sd * sd - model * model))
+            scene = math.sqrt(max(sd * sd - noise * noise - model * model, 0.0))
+            budget = {"noise": noise, "scene": scene, "model": model}
+        answer[path] = {**entry, "sd_parts": budget}
+    return answer
 
 
 def spoiled(parameters: Mapping[str, Any], report: Mapping[str, Any]) -> dict[str, Any]:
@@ -84,14 +119,16 @@ def spoiled(parameters: Mapping[str, Any], report: Mapping[str, Any]) -> dict[st
         As `entries`; nothing is identified by a model that does not explain the frames.
     """
     factor = math.sqrt(max(report["chi_square"] / max(report["degrees_of_freedom"], 1), 1.0))
-    return {
-        path: {
+    answer = {}
+    for path, entry in parameters.items():
+        sd, parts = entry["sd"], entry["sd_parts"]
+        answer[path] = {
             **entry,
-            "sd": None if entry["sd"] is None else factor * entry["sd"],
+            "sd": None if sd is None else factor * sd,
             "status": "not_identified",
+            "sd_parts": parts and {name: factor * part for name, part in parts.items()},
         }
-        for path, entry in parameters.items()
-    }
+    return answer
 
 
 def entries(
@@ -130,7 +167,7 @@ def entries(
 
 
 def fit_report(
-    problem: FitProblem, optima: Sequence[Maximum], facts: Information, wider: float
+    problem: FitProblem, optima: Sequence[Maximum], at: Response, wider: float
 ) -> dict[str, Any]:
     """Return how well a fit explains the frames.
 
@@ -140,7 +177,7 @@ def fit_report(
         The problem.
     optima : sequence of Maximum
         Distinct ones, the best first.
-    facts : Information
+    at : Response
         At the best.
     wider : float
         Factor on all standard deviations (`inflation`).
@@ -148,11 +185,11 @@ def fit_report(
     Returns
     -------
     dict
-        ``chi_square``, ``deviance``, ``degrees_of_freedom``, ``p_value``, ``misfit``, ``rank``,
-        ``widening`` and ``optima``, each with its deviance above the best and its values.
+        ``chi_square`` less what errors of the model take up, ``deviance``, ``degrees_of_freedom``,
+        ``p_value``, ``misfit``, ``rank``, ``widening`` and ``optima``, each with its deviance above
+        the best and its values.
     """
-    residual, _ = residuals_and_information(problem, optima[0].x, optima[0].positions)
-    chi_square = float(np.einsum("ni,ni->", residual, residual))
+    chi_square = at.chi_square
     freedom = 2 * problem.present.size - int(problem.present.sum()) - len(problem)
     p_value = float(scipy.special.chdtrc(freedom, chi_square))
     return {
@@ -161,7 +198,7 @@ def fit_report(
         "degrees_of_freedom": freedom,
         "p_value": p_value,
         "misfit": p_value < FALSE_ALARM,
-        "rank": facts.rank,
+        "rank": at.facts.rank,
         "widening": wider,
         "optima": [
             {

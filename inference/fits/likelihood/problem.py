@@ -21,6 +21,7 @@ from inference.frame.blocks import own_blocks
 from inference.frame.sensitivity import Value
 from simulator.errors import RefusedError
 from simulator.frames import Frames
+from simulator.model_error import ModelError
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import Scene
 from simulator.sensor import Sensor, instrument
@@ -31,6 +32,7 @@ Array = NDArray[np.float64]
 
 _LOUDEST = 1e100  # times the noise: squares of readings, and bounds made from them, are numbers
 _IN_READINGS = (*CROSSTALK, Value.STRENGTH)
+_OBJECT = ("object.c0", "object.c1", "object.c2")
 _SHADOW = slice(Value.SHADOW_C0, Value.SHADOW_C1 + 1)
 
 
@@ -62,6 +64,8 @@ class FitProblem:
         Ranges that the scene allows [m].
     parameters : Parameters
         The scene's priors, from which starting points are drawn.
+    error : ModelError
+        What the model may be wrong by; the likelihood knows nothing of it.
     """
 
     names: tuple[str, ...]
@@ -75,6 +79,7 @@ class FitProblem:
     background: bool | None
     support: tuple[float, float]
     parameters: Parameters
+    error: ModelError
 
     def __len__(self) -> int:
         return len(self.names)
@@ -233,7 +238,7 @@ def _static(sensor: Sensor, parameters: Parameters, low: Array, high: Array, gai
     return Static(share, r0, *(wave or (0.0, 0.0)))
 
 
-def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
+def fit_problem(sensor: Sensor, scene: Scene, frames: Frames, *, exact: bool = False) -> FitProblem:
     """Set a fit up.
 
     Parameters
@@ -244,6 +249,8 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
         The scene; of its priors only the supports bound the fit.
     frames : Frames
         Usable frames, at least one.
+    exact : bool
+        Whether the model is taken as exact, whatever the scene says of its error.
 
     Returns
     -------
@@ -279,6 +286,9 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
     for k in _IN_READINGS:
         low[k], high[k] = low[k] / unit, high[k] / unit
     names, index, known = _known_and_unknown(sensor, parameters, unit)
+    error = scene.model_error
+    if not set(_OBJECT) & set(names):
+        error = error.beside_numbers()
     return FitProblem(
         names=names,
         slots=np.flatnonzero(index >= 0),
@@ -297,4 +307,5 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames) -> FitProblem:
         background=True if parameters.has_background else None,
         support=(near, far),
         parameters=parameters,
+        error=ModelError(0.0, 0.0, integrated=False) if exact else error,
     )

@@ -1,5 +1,6 @@
 """From a linear fit to a result: parameters, fit report, ranges that all frames agree upon."""
 
+import dataclasses
 import functools
 from collections.abc import Callable
 from typing import Any
@@ -9,9 +10,11 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
+from inference.fits.answer.model_error import unexplained
 from inference.fits.answer.ranges import Answer, frame_ranges
-from inference.fits.answer.report import FALSE_ALARM, entries
+from inference.fits.answer.report import FALSE_ALARM, entries, with_parts
 from inference.fits.likelihood.problem import fit_problem
+from inference.fits.linear.follow import Follow
 from inference.fits.linear.least_squares import LinearFit
 from inference.realtime.net import SATURATED, rule_out
 from inference.technique import Task
@@ -54,6 +57,7 @@ def linear_answer(
     natural: dict[str, tuple[float, Array]],
     single: TechniqueResult,
     missing: dict[str, str],
+    follow: Follow,
 ) -> TechniqueResult:
     """Build the result of a linear technique.
 
@@ -71,6 +75,8 @@ def linear_answer(
         Ranges of single frames; they stand where a parameter is not identified.
     missing : dict
         Scene paths that are not identified, with the reason.
+    follow : Follow
+        The fit, to be asked what errors of the model do.
 
     Returns
     -------
@@ -83,17 +89,26 @@ def linear_answer(
             "the fit overflows: the readings are too large or too small against gain and noise, or "
             "do not follow the object's law; check them"
         )
-    sds = {path: float(np.linalg.norm(slope @ fit.factor)) for path, (_, slope) in natural.items()}
+    slopes = np.array([slope for _, slope in natural.values()])
+    spread = slopes.reshape(len(natural), fit.x.size) @ fit.factor
+    changes, of_residuals, size = follow.changes(task)
+    model = np.linalg.norm(changes, axis=1)
+    sds = np.hypot(np.linalg.norm(spread, axis=1), model).tolist()
     found = {
-        path: (float(value), sds[path], float(np.divide(sds[path], abs(value))))
-        for path, (value, _) in natural.items()
+        path: (float(value), sd, float(np.divide(sd, abs(value))))
+        for (path, (value, _)), sd in zip(natural.items(), sds, strict=True)
     }
-    parameters = entries(parameters_of(task.sensor, task.scene), found)
+    own = 1.0 / np.linalg.norm(np.linalg.pinv(spread), axis=0)
+    parts = dict(zip(natural, zip(own.tolist(), model.tolist(), strict=True), strict=True))
+    parameters = with_parts(entries(parameters_of(task.sensor, task.scene), found), parts)
     parameters |= {path: not_identified(reason) for path, reason in missing.items()}
     freedom = fit.residuals.size - fit.x.size
-    p_value = float(scipy.special.chdtrc(freedom, fit.chi_square))
+    chi_square = fit.chi_square
+    if of_residuals.size:
+        chi_square = unexplained(fit.residuals, of_residuals, of_residuals[:, :0], size)
+    p_value = float(scipy.special.chdtrc(freedom, chi_square))
     report = {
-        "chi_square": fit.chi_square,
+        "chi_square": chi_square,
         "degrees_of_freedom": freedom,
         "p_value": p_value,
         "misfit": p_value < FALSE_ALARM,
@@ -101,18 +116,7 @@ def linear_answer(
         "optima": [],
     }
     if missing:
-        return TechniqueResult(
-            technique=name,
-            status=single.status,
-            roots_m=single.roots_m,
-            roots_sd_m=single.roots_sd_m,
-            root_count=single.root_count,
-            near_fold=single.near_fold,
-            reason=single.reason,
-            reasons=single.reasons,
-            parameters=parameters,
-            fit=report,
-        )
+        return dataclasses.replace(single, technique=name, parameters=parameters, fit=report)
     report["optima"] = [
         {
             "excess_deviance": 0.0,
@@ -120,12 +124,14 @@ def linear_answer(
         }
     ]
     state = rule_out(task.sensor, task.frames)
-    problem = fit_problem(task.sensor, task.scene, task.frames.select(state != SATURATED))
+    frames = task.frames.select(state != SATURATED)
+    problem = fit_problem(task.sensor, task.scene, frames, exact=task.exact)
     values = np.array([natural[path][0] for path in problem.names])
     gradients = np.array([natural[path][1] for path in problem.names])
     x = problem.coordinates(values[None])[0]
     if not np.isfinite(x).all():
         raise RefusedError("the best fit is no object: a size or reflectance is not positive")
     along = problem.chain(x)[problem.slots] * problem.units[:, None]
-    factor = np.asarray(np.linalg.solve(along, gradients @ fit.factor), dtype=np.float64)
-    return frame_ranges(name, problem, [Answer(x, 0.0, factor)], state, parameters, report)
+    inverse = np.linalg.inv(along)
+    answer = Answer(x, 0.0, inverse @ gradients @ fit.factor, inverse @ changes)
+    return frame_ranges(name, problem, [answer], state, parameters, report)

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.fits.answer.counts import too_few, unmodelled_error
+from inference.fits.answer.counts import too_few
 from inference.fits.answer.likelihood_answer import likelihood_answer_from
 from inference.fits.likelihood.problem import unknowns_of
+from inference.fits.linear.follow import Follow
 from inference.fits.linear.least_squares import LinearFit, solve_weighted
 from inference.fits.linear.light import object_light
 from inference.fits.linear.linear_answer import linear_answer, without_warnings
@@ -151,8 +152,8 @@ def _known(task: Task, path: str) -> float:
     return float(value) if isinstance(value, float | int) else 0.0
 
 
-def _solve(task: Task) -> TechniqueResult:
-    unknown = unknowns_of(task.sensor, task.scene)
+def _fitted(task: Task, unknown: tuple[str, ...]) -> tuple[LinearFit, TechniqueResult]:
+    """Return the best fit, and the ranges by derivatives that it started from."""
     single = DIFFERENTIAL.solve(dataclasses.replace(task, exact=True))
     solved = int(np.count_nonzero(single.root_count))
     if solved < len(unknown) + 1:
@@ -173,7 +174,12 @@ def _solve(task: Task) -> TechniqueResult:
             "have derivatives that fix the range to 10 %: move the object nearer and farther, or "
             "take joint_fit"
         )
-    fit = min(good, key=lambda one: one.chi_square)
+    return min(good, key=lambda one: one.chi_square), single
+
+
+def _solve(task: Task) -> TechniqueResult:
+    unknown = unknowns_of(task.sensor, task.scene)
+    fit, single = _fitted(task, unknown)
     order = [path for path in _paths(task) if path in unknown]
     values = dict(zip(order, fit.x.tolist(), strict=True))
     if values.get("object.c2", 1.0) <= 0.0:
@@ -192,15 +198,22 @@ def _solve(task: Task) -> TechniqueResult:
             )
         return answer
     natural = {path: (values[path], np.eye(len(order))[k]) for k, path in enumerate(order)}
-    return linear_answer("crosstalk_fit", task, fit, natural, single, {})
+
+    def again(moved: Task) -> tuple[Array, Array]:
+        found, _ = _fitted(moved, unknown)
+        return found.x, found.residuals
+
+    light = [
+        values.get("object.c2", _known(task, "object.c2")) * part
+        for part in _unit_signal(task, fit.ranges)
+    ]
+    follow = Follow(again, fit.ranges, *light)
+    return linear_answer("crosstalk_fit", task, fit, natural, single, {}, follow)
 
 
 def _obstacle(sensor: Sensor, scene: Scene, _known: Known, frames: Frames | None) -> str | None:
     if scene.motion != "radial":
         return f"needs radial motion, and the scene's is {scene.motion}"
-    unmodelled = unmodelled_error(scene)
-    if unmodelled:
-        return unmodelled
     if scene.optional_terms:
         return "keeps crosstalk, and the scene leaves it to the data; use a posterior"
     unknown = unknowns_of(sensor, scene)

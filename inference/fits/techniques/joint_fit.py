@@ -17,7 +17,8 @@ __all__ = ["ITERATIVE_BACKGROUND_CANCELLING", "ITERATIVE_DIFFERENTIAL", "JOINT_F
 
 def _solve_as(name: str, task: Task) -> TechniqueResult:
     state = rule_out(task.sensor, task.frames)
-    problem = fit_problem(task.sensor, task.scene, task.frames.select(state != SATURATED))
+    frames = task.frames.select(state != SATURATED)
+    problem = fit_problem(task.sensor, task.scene, frames, exact=task.exact)
     return likelihood_answer(name, problem, find_maxima(problem), state)
 
 

@@ -6,6 +6,7 @@ Their noise is treated to first order here; from the values found the likelihood
 climbed, in which every range is unknown.
 """
 
+import dataclasses
 import functools
 import math
 
@@ -18,6 +19,7 @@ from inference.fits.answer.likelihood_answer import likelihood_answer_from
 from inference.fits.likelihood.problem import unknowns_of
 from inference.fits.linear.at_rest import refuse_at_rest
 from inference.fits.linear.equations import Equations, Observed, fit_equations
+from inference.fits.linear.follow import Follow
 from inference.fits.linear.least_squares import LinearFit
 from inference.fits.linear.light import background_light, carrier, component, gains
 from inference.fits.linear.linear_answer import linear_answer, without_warnings
@@ -140,7 +142,8 @@ def _solve(task: Task) -> TechniqueResult:
         return Observed(powers @ to_x, 1.0 - powers @ fixed)
 
     signal = functools.partial(_signal, task)
-    fit, single = fit_equations(Equations(technique, task, equation, signal, unknown, _NARROW))
+    equations = Equations(technique, task, equation, signal, unknown, _NARROW)
+    fit, single = fit_equations(equations)
     refuse_at_rest(fit, single, unknown)
     x = to_x @ fit.x + fixed
     sd = np.linalg.norm(to_x @ fit.factor, axis=1)
@@ -149,7 +152,8 @@ def _solve(task: Task) -> TechniqueResult:
     if len(missing) == len(unknown) and not missing.get("object.c1", "").startswith("the flux"):
         raise RefusedError("; ".join(dict.fromkeys(missing.values())))
     if "object.c0" in missing and "object.c2" not in missing and "object.c2" in unknown:
-        fit, x, to_x = _square_law(task, technique, fit, x, to_x)
+        equations, fit, to_x = _square_law(equations, fit, to_x)
+        x = to_x @ fit.x + fixed
     with np.errstate(divide="ignore", invalid="ignore"):
         natural = _natural(x, to_x)
     if not missing:
@@ -157,23 +161,35 @@ def _solve(task: Task) -> TechniqueResult:
         values = {path: natural[path][0] for path in unknown}
         return likelihood_answer_from("object_fit", task, values)
     kept = {path: natural[path] for path in unknown if path not in missing}
-    return linear_answer("object_fit", task, fit, kept, single, missing)
+
+    def again(moved: Task) -> tuple[Array, Array]:
+        found, _ = fit_equations(dataclasses.replace(equations, task=moved))
+        values = _natural(to_x @ found.x + fixed, to_x)
+        return np.array([values[path][0] for path in kept]), found.residuals
+
+    # only derivatives in time ask for the slopes of the light
+    light = _signal(task, fit.ranges, task.frames)
+    follow = Follow(again, fit.ranges, light, np.zeros_like(light))
+    # their ranges stand, with their own error budget
+    single = technique.solve(task)
+    return linear_answer("object_fit", task, fit, kept, single, missing, follow)
 
 
 def _square_law(
-    task: Task, technique: Technique, fit: LinearFit, x: Array, to_x: Array
-) -> tuple[LinearFit, Array, Array]:
+    equations: Equations, fit: LinearFit, to_x: Array
+) -> tuple[Equations, LinearFit, Array]:
     """Fit c2 alone where nothing else is seen."""
+    task = equations.task
 
     def equation(r: Array, frames: Frames) -> Observed:
         return Observed((r**2 * _flux(task, r, frames))[:, None], np.ones(r.size))
 
-    signal = functools.partial(_signal, task)
-    flat, _ = fit_equations(Equations(technique, task, equation, signal, ("object.c2",), _NARROW))
+    alone = dataclasses.replace(equations, equation=equation, unknowns=("object.c2",))
+    flat, _ = fit_equations(alone)
     # a cubic term without a fourth-order one is no square law: keep the whole fit's c2
     if flat.chi_square - fit.chi_square > _SIGNIFICANT**2 * 2:
-        return fit, x, to_x
-    return flat, np.array([flat.x[0], 0.0, 0.0]), np.array([[1.0], [0.0], [0.0]])
+        return equations, fit, to_x
+    return alone, flat, np.array([[1.0], [0.0], [0.0]])
 
 
 def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None) -> str | None:

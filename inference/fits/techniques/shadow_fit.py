@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
 from inference.fits.answer.counts import linear_obstacle, too_few
+from inference.fits.answer.likelihood_answer import likelihood_answer_from
 from inference.fits.likelihood.problem import unknowns_of
 from inference.fits.linear.at_rest import refuse_at_rest
 from inference.fits.linear.equations import Equations, Observed, fit_equations
 from inference.fits.linear.light import background_light, component, gains, object_light
-from inference.fits.linear.linear_answer import linear_answer, without_warnings
+from inference.fits.linear.linear_answer import without_warnings
 from inference.known import Known
 from inference.realtime.net import SATURATED, rule_out
 from inference.realtime.techniques.background_cancelling import BACKGROUND_CANCELLING
@@ -88,13 +89,9 @@ def _solve(task: Task) -> TechniqueResult:
         raise RefusedError(
             f"{reason}; move the object nearer, lower the noise, or use a posterior with priors"
         )
-    fitted0, fitted1 = 1.0 / y[0], y[1] / y[0]
-    natural = {
-        _C0: (fitted0, -fitted0 * fitted0 * to_y[0]),
-        _C1: (fitted1, (to_y[1] - fitted1 * to_y[0]) / y[0]),
-    }
-    kept = {path: natural[path] for path in unknown}
-    return linear_answer("shadow_fit", task, fit, kept, single, {})
+    # the ranges that were regressed on are no truth: the likelihood knows their noise
+    values = {_C0: 1.0 / y[0], _C1: y[1] / y[0]}
+    return likelihood_answer_from("shadow_fit", task, {path: values[path] for path in unknown})
 
 
 def _solve_strength(task: Task) -> TechniqueResult:
@@ -114,17 +111,14 @@ def _solve_strength(task: Task) -> TechniqueResult:
     def signal(r: Array, frames: Frames) -> Array:
         return np.where(frames.present[:, None], _signal(task, r, frames), 0.0)
 
-    fit, single = fit_equations(
-        Equations(BACKGROUND_CANCELLING, task, equation, signal, (_STRENGTH,))
-    )
+    fit, _ = fit_equations(Equations(BACKGROUND_CANCELLING, task, equation, signal, (_STRENGTH,)))
     value = float(fit.x[0])
     if not value > 0.0:
         raise RefusedError(
             f"the best fit has a background of strength {value:.3g}; leave the background out of "
             "the scene, or use a posterior with priors"
         )
-    natural = {_STRENGTH: (value, np.ones(1))}
-    return linear_answer("shadow_fit", task, fit, natural, single, {})
+    return likelihood_answer_from("shadow_fit", task, {_STRENGTH: value})
 
 
 def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None) -> str | None:
