@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 __all__ = [
     "DISCREPANCY_LENGTH",
     "DISCREPANCY_SD",
+    "NEGLECTED",
     "DiscrepancyBasis",
     "discrepancy_basis",
     "matern",
@@ -31,7 +32,8 @@ DISCREPANCY_LENGTH = 1.0
 DISCREPANCY_SD = 0.072
 
 _SPACING = 0.05  # of the knots, in lengths: cubics between them err by 1e-6 of a path
-_NEGLECTED = 1e-4  # share of the variance: a hundredth of the error's size
+NEGLECTED = 1e-4
+"""Share of the variance that a basis leaves out: a hundredth of the error's size."""
 _LONGEST = 8.0  # e-folds; below exp(-8) of the largest range the error is taken as constant
 
 
@@ -122,7 +124,7 @@ def discrepancy_basis(low: float, high: float) -> DiscrepancyBasis:
     values, vectors = values[::-1], vectors[:, ::-1]
     # eigenvectors are known but for their signs, and draws must be the same everywhere
     vectors = vectors * np.where(vectors[0] < 0.0, -1.0, 1.0)
-    size = int(np.searchsorted(np.cumsum(values), (1.0 - _NEGLECTED) * count)) + 1
+    size = int(np.searchsorted(np.cumsum(values), (1.0 - NEGLECTED) * count)) + 1
     values, vectors = values[:size], vectors[:, :size]
     knots = np.empty((count, 2, size))
     knots[:, 0] = vectors * np.sqrt(values)

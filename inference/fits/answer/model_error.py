@@ -11,6 +11,7 @@ import functools
 
 import numpy as np
 import scipy
+import scipy
 from numpy.typing import NDArray
 
 from inference.fits.likelihood.arguments import CROSSTALK, SLOTS
@@ -20,9 +21,9 @@ from inference.fits.likelihood.problem import FitProblem
 from inference.frame.sensitivity import Value
 from inference.identifiability.elimination import eliminate
 from inference.identifiability.information import Information
-from simulator.discrepancy import discrepancy_basis
+from simulator.discrepancy import NEGLECTED, discrepancy_basis
 
-__all__ = ["Response", "errors_of_readings", "relative_size", "response_of", "unexplained"]
+__all__ = ["Response", "errors_of_readings", "share_left", "response_of", "unexplained"]
 
 Array = NDArray[np.float64]
 
@@ -48,8 +49,8 @@ class Response:
         d log r along them at given coordinates; nan without an object.
     free : ndarray of bool, shape (d,)
         Coordinates that no bound holds.
-    size : float
-        Of the errors, relative: what is of second order in them is smaller by that.
+    share : float
+        From `share_left`.
     """
 
     facts: Information
@@ -59,7 +60,7 @@ class Response:
     across: Array
     along: Array
     free: NDArray[np.bool_] = dataclasses.field(default_factory=lambda: np.zeros(0, np.bool_))
-    size: float = 0.0
+    share: float = 0.0
 
     @property
     def exact(self) -> bool:
@@ -85,13 +86,13 @@ class Response:
         if self.exact:
             return whole
         seen, moved = self.across[:, -1], self.facts.jacobian[:, self.free]
-        left = unexplained(seen, self.across[:, :-1], moved, self.size)
+        left = unexplained(seen, self.across[:, :-1], moved, self.share)
         return max(whole - float(seen @ seen), 0.0) + left
 
     def chi_square_of_frames(self, of_x: Array) -> Array:
         """Return the chi-square of each frame, errors that x does not follow allowed for, (n,)."""
         # followed to first order: a share of their size may be left besides
-        parts = [self.errors - self.jacobian @ of_x, self.size * self.errors]
+        parts = [self.errors - self.jacobian @ of_x, np.sqrt(self.share) * self.errors]
         errors = np.concatenate(parts, axis=2)
         spread = np.eye(2) + errors @ errors.transpose(0, 2, 1)
         left = np.linalg.solve(spread, self.residual[:, :, None])[:, :, 0]
@@ -103,7 +104,7 @@ class Response:
         return np.asarray(whole - self.chi_square_of_frames(of_x))
 
 
-def unexplained(residual: Array, errors: Array, moved: Array, size: float) -> float:
+def unexplained(residual: Array, errors: Array, moved: Array, share: float) -> float:
     """Return the sum of squares that errors of the model do not take up.
 
     Parameters
@@ -114,9 +115,8 @@ def unexplained(residual: Array, errors: Array, moved: Array, size: float) -> fl
         Its derivatives along independent standard normal errors.
     moved : ndarray, shape (m, d)
         Along all that the fit is free to follow with.
-    size : float
-        Of the errors, relative: of what they take up a share of its square may be left besides,
-        for they are followed to first order.
+    share : float
+        From `share_left`.
     """
     m, count = errors.shape
     moved = moved / np.maximum(np.linalg.norm(moved, axis=0), np.finfo(float).tiny)
@@ -126,7 +126,7 @@ def unexplained(residual: Array, errors: Array, moved: Array, size: float) -> fl
     left = target - rows @ scipy.linalg.lstsq(rows, target)[0]
     rest = float(left @ left)
     taken = max(float(residual @ residual) - rest, 0.0) / max(m, 1)
-    return float(rest / (1.0 + size**2 * taken))
+    return float(rest / (1.0 + share * taken))
 
 
 def errors_of_readings(
@@ -173,10 +173,14 @@ def _moved(problem: FitProblem, light: Array, positions: Array, functions: Array
     return np.concatenate([part[:, :, None] * functions[:, None, :] for part in parts], axis=2)
 
 
-def relative_size(problem: FitProblem, positions: Array) -> float:
-    """Return the size of the errors relative to the nearest range of frames that have one."""
+def share_left(problem: FitProblem, positions: Array) -> float:
+    """Return the share of what errors take up of a chi-square that may be left besides.
+
+    They are followed to first order, so that what is left of their size is that size again
+    (relative, at the nearest range), and by functions that leave out a part of them.
+    """
     nearest = float(np.exp(np.nanmin(positions)))
-    return float(np.hypot(problem.error.flux, problem.error.range_m / nearest))
+    return float(problem.error.flux**2 + (problem.error.range_m / nearest) ** 2 + NEGLECTED)
 
 
 def response_of(problem: FitProblem, x: Array, positions: Array) -> Response:
@@ -227,5 +231,5 @@ def response_of(problem: FitProblem, x: Array, positions: Array) -> Response:
         seen.errors,
         -seen.error_response[:, :-1],
         (x > low) & (x < high),
-        relative_size(problem, positions),
+        share_left(problem, positions),
     )

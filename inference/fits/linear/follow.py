@@ -5,9 +5,10 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy
+import scipy
 from numpy.typing import NDArray
 
-from inference.fits.answer.model_error import errors_of_readings, relative_size
+from inference.fits.answer.model_error import errors_of_readings, share_left
 from inference.fits.likelihood.problem import fit_problem
 from inference.technique import Task
 from simulator.discrepancy import discrepancy_basis
@@ -51,8 +52,8 @@ class Follow:
         Returns
         -------
         (ndarray, ndarray, float)
-            Of values, shape (p, k), and of residuals, shape (m, k); the relative size of the
-            errors.
+            Of values, shape (p, k), and of residuals, shape (m, k); the share of
+            what errors take up that may be left (`share_left`).
 
         Raises
         ------
@@ -94,4 +95,4 @@ class Follow:
                 )
             found.append([(a - b) / (2 * _STEP) for a, b in zip(*ends, strict=True)])
         values, residuals = (np.stack(column, axis=1) for column in zip(*found, strict=True))
-        return values @ turn.T, residuals @ turn.T, relative_size(problem, log_r)
+        return values @ turn.T, residuals @ turn.T, share_left(problem, log_r)

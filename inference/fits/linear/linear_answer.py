@@ -91,7 +91,7 @@ def linear_answer(
         )
     slopes = np.array([slope for _, slope in natural.values()])
     spread = slopes.reshape(len(natural), fit.x.size) @ fit.factor
-    changes, of_residuals, size = follow.changes(task)
+    changes, of_residuals, share = follow.changes(task)
     model = np.linalg.norm(changes, axis=1)
     sds = np.hypot(np.linalg.norm(spread, axis=1), model).tolist()
     found = {
@@ -105,7 +105,7 @@ def linear_answer(
     freedom = fit.residuals.size - fit.x.size
     chi_square = fit.chi_square
     if of_residuals.size:
-        chi_square = unexplained(fit.residuals, of_residuals, of_residuals[:, :0], size)
+        chi_square = unexplained(fit.residuals, of_residuals, of_residuals[:, :0], share)
     p_value = float(scipy.special.chdtrc(freedom, chi_square))
     report = {
         "chi_square": chi_square,
