@@ -23,7 +23,7 @@ from inference.identifiability.elimination import eliminate
 from inference.identifiability.information import Information
 from simulator.discrepancy import NEGLECTED, discrepancy_basis
 
-__all__ = ["Response", "errors_of_readings", "share_left", "response_of", "unexplained"]
+__all__ = ["Response", "errors_of_readings", "response_of", "share_left", "unexplained"]
 
 Array = NDArray[np.float64]
 
