@@ -11,7 +11,6 @@ import functools
 
 import numpy as np
 import scipy
-import scipy
 from numpy.typing import NDArray
 
 from inference.fits.likelihood.arguments import CROSSTALK, SLOTS

@@ -5,7 +5,6 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy
-import scipy
 from numpy.typing import NDArray
 
 from inference.fits.answer.model_error import errors_of_readings, share_left
