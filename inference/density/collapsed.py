@@ -87,12 +87,15 @@ class CollapsedDensity:
         False where a frame is known to hold no object; None where all may.
     sensor : Sensor
         The sensor.
+    weights : ndarray, shape (n,), or None
+        How many frames each stands for; None where it is one each.
     """
 
     parameters: Parameters
     frames: Array
     present: NDArray[np.bool_] | None
     sensor: Sensor
+    weights: Array | None
 
     @functools.cached_property
     def instrument(self) -> Instrument:
@@ -138,6 +141,10 @@ class CollapsedDensity:
     def of_frames(self, found: Array) -> Array:
         """Return best ranges of blocks, shape (n, blocks, 3), as those of frames."""
         return found
+
+    def total(self, values: Array) -> Array:
+        """Return the sum of values of frames, shape (n, frames), over all that they stand for."""
+        return np.asarray(values.sum(axis=1) if self.weights is None else values @ self.weights)
 
     def common(self, values: Array) -> Array:
         """Return for every frame what its block has, shape (n, frames)."""
@@ -246,7 +253,7 @@ class CollapsedDensity:
 
     def log_likelihood(self, z: Array) -> Array:
         """Return log p(frames | z), shape (len(z),)."""
-        return np.asarray(self.frame_log_likelihoods(z).sum(axis=1))
+        return self.total(self.frame_log_likelihoods(z))
 
     def __call__(self, z: Array) -> Array:
         """Return the log posterior density, shape (len(z),); never nan."""
@@ -285,4 +292,5 @@ def collapsed_density(sensor: Sensor, scene: Scene, frames: Frames) -> Collapsed
         np.ascontiguousarray(np.column_stack([frames.readings, gain])),
         None if all_present else frames.object_present,
         sensor,
+        None,
     )

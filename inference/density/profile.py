@@ -40,8 +40,9 @@ class Linearisation:
     Attributes
     ----------
     residual : ndarray, shape (frames, 2)
-        Whitened, the direction along the range projected out; with a discrepancy more rows, those
-        of its coefficients, and their directions projected out, too.
+        Whitened, the direction along the range projected out, times the root of what a frame stands
+        for; with a discrepancy more rows, those of its coefficients, and their directions projected
+        out, too.
     jacobian : ndarray, shape (frames, 2, d)
         Derivative of the residual along z, projected likewise.
     """
@@ -87,6 +88,9 @@ def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearis
         return np.asarray(vectors - unit[:, :, None] * shares[:, None, :])
 
     residual, jacobian = across(at.residual[:, :, None])[:, :, 0], across(-at.jacobian)
+    if density.weights is not None:
+        size = np.sqrt(density.weights)
+        residual, jacobian = residual * size[:, None], jacobian * size[:, None, None]
     if basis is None:
         return Linearisation(residual, jacobian)
     flux = across(-at.signal[:, :, None])

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.density.representatives import Representatives
 from inference.posterior.sampling.ensemble import Ensemble
 from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.population import Population
@@ -127,6 +128,7 @@ _PARTS = {
         Selecting,
         Selection,
         Reparametrisation,
+        Representatives,
         Starting,
         Tempering,
         TriangularMap,

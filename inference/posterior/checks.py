@@ -25,8 +25,9 @@ Array = NDArray[np.float64]
 
 # object 3, crosstalk 2, background 2, its shadow 2, centre and spread of a stroke 2
 MOST_UNKNOWNS = 11
-# beyond, finding the starting points alone takes longer than most callers wait
-MOST_FRAMES = 2000
+MOST_FRAMES = 100_000
+# whose likelihoods do not add up frame by frame, or are taken out one by one
+MOST_COUPLED = 2000
 _PRIOR_DRAWS = 256
 # standard deviations by which readings may miss the best fit, root mean square. A model that is
 # wrong misses by less than the signal, which no sensor reads a million times above its noise; and
@@ -65,9 +66,9 @@ def check_scene_for_posterior(sensor: Sensor, scene: Scene, frames: Frames) -> N
     if len(frames) > MOST_FRAMES:
         raise RefusedError(
             f"{len(frames)} frames that are not saturated, and posteriors were tested up to "
-            f"{MOST_FRAMES}; send one frame in {-(-len(frames) // MOST_FRAMES)}, or several "
-            "posteriors of a part each"
+            f"{MOST_FRAMES}; send several posteriors of a part each"
         )
+    _check_coupled(scene, len(frames))
     _check_priors(parameters)
     if not frames.present.any():
         _check_empty(parameters)
@@ -132,6 +133,30 @@ def check_ranges(density: CollapsedDensity, scene: Scene, z: Array) -> None:
         f"{low:.3g} to {high:.3g} m; widen it, or leave it out. If the ranges stated are right, "
         "check the sensor's pulse width, frequency or phase offset and the order of the columns",
     )
+
+
+def _check_coupled(scene: Scene, count: int) -> None:
+    """Refuse more frames than can be computed where a few cannot stand for all."""
+    if count <= MOST_COUPLED:
+        return
+    error, of = scene.model_error, f"{count} frames that are not saturated"
+    if scene.motion == "static":
+        together = -(-count // MOST_COUPLED)
+        raise RefusedError(
+            f"{of}, and of an object at rest posteriors take {MOST_COUPLED}: send means of "
+            f"{together} frames each, with the noise's `read` divided by the root of {together}; "
+            "nothing of what they tell is lost"
+        )
+    if error.integrated and error.flux > 0:
+        raise RefusedError(
+            f"{of}, and with a discrepancy that is integrated out posteriors take {MOST_COUPLED}: "
+            "leave `discrepancy` out, and its part of every error is computed by linear response"
+        )
+    if scene.optional_terms:
+        raise RefusedError(
+            f"{of}, and optional terms are decided by up to {MOST_COUPLED}: leave `optional` out; "
+            "a term that is not there costs width alone, and of so many frames little"
+        )
 
 
 def _check_optional(scene: Scene, parameters: Parameters) -> None:

@@ -15,6 +15,7 @@ are first carried from the prior to the posterior, a map is fitted to them, and 
 its coordinates. What each stage does is in `inference.posterior.stages`.
 """
 
+import dataclasses
 from collections.abc import Sequence
 from typing import TypeVar
 
@@ -82,8 +83,7 @@ def start(job: Job) -> Checkpoint:
     """
     if job.scene.optional_terms:
         return Checkpoint(Selecting(), 0)
-    stage, calls = begin(job)
-    return Checkpoint(stage, calls)
+    return begin(job)
 
 
 def tasks(job: Job, checkpoint: Checkpoint, wall_s: float = 0.0) -> tuple[Task, ...]:
@@ -119,22 +119,24 @@ def run(task: Task) -> Piece:
 
 def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoint:
     """Take in the parts of a chunk, in the order of `tasks`, and judge the draws so far."""
-    calls, selection = checkpoint.calls, checkpoint.selection
+    calls = checkpoint.calls
     match checkpoint.stage:
         case Selecting():
             selection, used = selecting.merge(job, _all(Candidate, pieces))
             return Checkpoint(Starting(), calls + used, selection)
         case Starting():
             (started,) = _all(Checkpoint, pieces)
-            return Checkpoint(started.stage, calls + started.calls, selection)
+            return dataclasses.replace(
+                started, calls=calls + started.calls, selection=checkpoint.selection
+            )
         case Tempering() as stage:
             carried = _all(Population, pieces)
             after, used = tempering.merge(sampled(job, checkpoint), stage, carried)
-            return Checkpoint(after, calls + used, selection)
+            return dataclasses.replace(checkpoint, stage=after, calls=calls + used)
         case Walking() as stage:
             ensembles = _all(Ensemble, pieces)
             after, used = walking.merge(sampled(job, checkpoint), stage, ensembles)
-            return Checkpoint(after, calls + used, selection)
+            return dataclasses.replace(checkpoint, stage=after, calls=calls + used)
         case Weighted() | Settled():
             raise ValueError("the job is finished: there is nothing to take in")
 

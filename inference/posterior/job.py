@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.density.discrepant import with_discrepancy
+from inference.density.representatives import Representatives, standing_for
 from inference.density.static import with_common_range
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.posterior.checks import check_scene_for_posterior
@@ -19,7 +20,10 @@ from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor, parse_sensor
 from simulator.validated import parse
 
-__all__ = ["Job", "prepare"]
+__all__ = ["MOST_AT_ONCE", "MOST_SAMPLED", "Job", "prepare"]
+
+MOST_SAMPLED = 600  # frames; of more, some hundred are sampled in the name of all
+MOST_AT_ONCE = 2000  # frames whose ranges are drawn and judged together
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -34,12 +38,18 @@ class Job:
         As given, saturated ones included.
     settings : SamplerSettings
         With a seed.
+    representatives : Representatives or None
+        Usable frames that are sampled in the name of all; None where all are.
+    numbers : ndarray of int, shape (n,), or None
+        Of a part of a job: which of the frames that were sent these are.
     """
 
     sensor: Sensor
     scene: Scene
     frames: Frames
     settings: SamplerSettings
+    representatives: Representatives | None = None
+    numbers: NDArray[np.intp] | None = None
 
     @property
     def seed(self) -> int:
@@ -85,9 +95,45 @@ class Job:
         density = collapsed_density(self.sensor, self.scene, frames)
         if self.scene.motion == "static":
             return with_common_range(density)
+        if self.representatives is not None:
+            return standing_for(density, self.representatives)
         if error.integrated and error.flux > 0:
             return with_discrepancy(density, error.flux)
         return density
+
+    @property
+    def sampled_frames(self) -> int:
+        """How many frames a density is computed from."""
+        by = self.representatives
+        return int(self.usable.sum()) if by is None else len(by.chosen)
+
+    @property
+    def is_large(self) -> bool:
+        """Whether it has so many frames that a few of them are sampled in the name of all."""
+        integrated = self.scene.model_error.integrated and self.scene.model_error.flux > 0
+        coupled = integrated or self.scene.motion == "static"
+        return not coupled and int(self.usable.sum()) > MOST_SAMPLED
+
+    def parts(self) -> tuple["Job", ...]:
+        """Return jobs of a part of the frames each, none larger than what is judged at once.
+
+        Frames are dealt out at random: each part is a picture of the whole.
+        """
+        usable = np.flatnonzero(self.usable)
+        if not self.is_large or len(usable) <= MOST_AT_ONCE:
+            return (dataclasses.replace(self, representatives=None),)
+        count = -(-len(usable) // MOST_AT_ONCE)
+        dealt = self.stream(Stream.PARTS).permutation(usable)
+        return tuple(self.part(np.sort(dealt[k::count])) for k in range(count))
+
+    def of_sent(self, index: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Return indices of frames of this part as those of the frames that were sent."""
+        return index if self.numbers is None else self.numbers[index]
+
+    def part(self, numbers: NDArray[np.intp]) -> "Job":
+        """Return the job of some of the frames alone."""
+        frames = self.frames.select(numbers)
+        return dataclasses.replace(self, frames=frames, representatives=None, numbers=numbers)
 
     def seeds(self, purpose: Stream, *numbers: int) -> np.random.SeedSequence:
         """Return the seed of one purpose; those of different purposes are independent."""

@@ -34,5 +34,9 @@ class Stream(enum.IntEnum):
     """Draws at which the integrals over ranges are looked at."""
     MODEL_ERROR = 12
     """Errors of the model that draws are moved by."""
+    REPRESENTATIVES = 13
+    """Frames that are sampled in the name of all."""
+    PARTS = 14
+    """Which frames of many are judged together, and the draws of their ranges."""
     CANDIDATES = 1000
     """Assessment of the models with and without optional terms, each by its number."""

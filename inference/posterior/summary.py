@@ -17,9 +17,10 @@ from inference.posterior.answer.posterior import (
     LeftOutTerm,
     ParameterSummary,
     Posterior,
+    RangeSummary,
     Runtime,
 )
-from inference.posterior.answer.range_summary import range_summary
+from inference.posterior.answer.range_summary import joined, range_summary
 from inference.posterior.answer.whole import Whole, with_model_error
 from inference.posterior.criticism.cross_check import cross_check
 from inference.posterior.criticism.discrepancy_check import judge_fit, with_model_part
@@ -31,6 +32,7 @@ from inference.posterior.criticism.prior_sensitivity import mark_sensitive
 from inference.posterior.findings import Findings
 from inference.posterior.job import Job
 from inference.posterior.sample import Sample, sample_of
+from inference.posterior.sampling.represent import doubts
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.selection.selection import Selection, selection_summary
 from inference.posterior.stages.checkpoint import Checkpoint
@@ -136,6 +138,8 @@ class _Drawn:
 
     job: Job
     density: CollapsedDensity
+    parts: tuple[Job, ...]
+    own: CollapsedDensity  # of the first part, whose draws are kept
     stage: Drawing
     calls: int
     sample: Sample
@@ -148,15 +152,18 @@ def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
     """Draw what the answer of a job is made of: the one place where its stream is begun."""
     job, stage, calls = sampled(job, checkpoint), checkpoint.stage, checkpoint.calls
     if isinstance(stage, Selecting | Starting):  # there was no time for more
-        stage, used = begin(job)
-        calls += used
+        begun = begin(job)
+        stage, calls = begun.stage, calls + begun.calls
+        job = dataclasses.replace(job, representatives=begun.representatives)
+    assert not isinstance(stage, Selecting | Starting)  # noqa: S101  # sampling has begun
     density, rng = job.density(), job.stream(Stream.ANSWER)
-    sample = sample_of(density, stage, rng)
-    draws, whole = draws_of(density, job, sample, rng), None
+    sample, parts = sample_of(density, stage, rng), job.parts()
+    own = density if job.representatives is None else parts[0].density()
+    draws, whole = draws_of(own, parts[0], sample, rng, len(parts)), None
     if sample.drawn:
-        whole = with_model_error(job, density, sample, draws)
+        whole = with_model_error(parts[0], own, sample, draws, density)
         draws = whole.draws
-    return _Drawn(job, density, stage, calls, sample, draws, whole, rng)
+    return _Drawn(job, density, parts, own, stage, calls, sample, draws, whole, rng)
 
 
 def draw(job: Job, checkpoint: Checkpoint) -> tuple[Job, Draws]:
@@ -170,10 +177,11 @@ def draw(job: Job, checkpoint: Checkpoint) -> tuple[Job, Draws]:
     Returns
     -------
     (Job, Draws)
-        The job with the terms that were kept, and its draws.
+        The job with the terms that were kept, and its draws; of a job with more frames than are
+        judged at once that of a random part of them.
     """
     drawn = _drawn(job, checkpoint)
-    return drawn.job, drawn.draws
+    return drawn.parts[0], drawn.draws
 
 
 def _out_of_time(job: Job, checkpoint: Checkpoint, wall_s: float) -> tuple[str, ...]:
@@ -236,30 +244,51 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
     )
 
 
+def _ranges(drawn: _Drawn, whole: Whole) -> RangeSummary:
+    """Summarise the ranges of all frames, part by part."""
+    sample, found = drawn.sample, []
+    ess = None if sample.weighted is None else sample.weighted.ess
+    for k, part in enumerate(drawn.parts):
+        own = drawn.own
+        if k > 0:
+            own, rng = part.density(), part.stream(Stream.PARTS, k)
+            draws = draws_of(own, part, sample, rng, len(drawn.parts))
+            whole = with_model_error(part, own, sample, draws, drawn.density)
+        folds = near_fold(part, own, whole.chosen, whole.log_r)
+        shares = _of_all_frames(part, whole.budget.of_log_r)
+        found.append(range_summary(whole.draws, folds, ess, shares))
+    if len(found) == 1:
+        return found[0]
+    numbers = [part.of_sent(np.arange(len(part.frames))) for part in drawn.parts]
+    return joined(found, numbers, len(drawn.job.frames))
+
+
 def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
     """Say what draws say: of every unknown and range, of themselves, and of the model."""
-    job, stage, density, sample = drawn.job, drawn.stage, drawn.density, drawn.sample
+    job, stage, density, sample = drawn.parts[0], drawn.stage, drawn.density, drawn.sample
     chosen, log_r = whole.chosen, whole.log_r
     reasons, k_hat = stage.verdict.reasons, None
     if isinstance(stage, Weighted):
         k_hat = stage.draws.k_hat
     elif isinstance(stage, Walking) and sample.chains is not None:
         rng = job.stream(Stream.CROSS_CHECK)
-        doubts, k_hat = cross_check(density, sample.chains, stage.proposal, rng)
-        reasons = (*reasons, *doubts)
-    fit, judged = predictive_check(job, density, chosen, drawn.rng), _judged(job, density, whole)
+        found, k_hat = cross_check(density, sample.chains, stage.proposal, rng)
+        reasons = (*reasons, *found)
+    if drawn.job.representatives is not None:
+        everyone = dataclasses.replace(drawn.job, representatives=None).density()
+        reasons = (*reasons, *doubts(everyone, density, sample.flat))
+    fit = predictive_check(job, drawn.own, chosen, drawn.rng, drawn.parts[1:])
+    judged = _judged(job, drawn.own, whole)
     if whole.larger is not None:
         fit = judge_fit(fit, whole.larger)
-    conflicts = prior_conflicts(density, sample.flat, log_r)
+    conflicts = prior_conflicts(drawn.own, sample.flat, log_r, density)
     fit, judged = contradicted(fit, judged, conflicts)
-    reasons = (*reasons, *_unfinished(density, chosen, job.stream(Stream.INTEGRALS)))
-    folds = near_fold(job, density, chosen, log_r)
-    ess = None if sample.weighted is None else sample.weighted.ess
+    reasons = (*reasons, *_unfinished(drawn.own, chosen, job.stream(Stream.INTEGRALS)))
     return Findings(
         reasons,
         k_hat,
         _parameters(density, sample, whole),
-        range_summary(drawn.draws, folds, ess, _of_all_frames(job, whole.budget.of_log_r)),
+        _ranges(drawn, whole),
         judged,
         fit,
     )

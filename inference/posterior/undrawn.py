@@ -57,10 +57,13 @@ def without_draws(job: Job, density: CollapsedDensity, stage: Tempering | Walkin
     no_parts = ParameterErrorParts(nan, nan, nan)
     nothing = ParameterSummary(nan, nan, no_parts, nan, nan, nan, nan, nan, None, nan, ())
     best = optima[[int(np.argmax(density(optima)))]]
-    log_r = best_ranges(density, best)[:, :, 0]
-    n = len(job.frames)
+    n, folds, foreseen = len(job.frames), np.zeros(len(job.frames), dtype=bool), None
+    for part in job.parts():
+        own = part.density()
+        log_r = best_ranges(own, best)[:, :, 0]
+        folds[part.of_sent(np.arange(len(part.frames)))] = near_fold(part, own, best, log_r)
+        foreseen = foreseen or _foreseen(part, own, best, log_r[0])
     unknown = {name: np.full(n, nan) for name in RANGE_COLUMNS}
-    folds = near_fold(job, density, best, log_r)
     return Findings(
         (_NOTHING_DRAWN, *stage.verdict.reasons),
         None,
@@ -71,7 +74,7 @@ def without_draws(job: Job, density: CollapsedDensity, stage: Tempering | Walkin
             near_fold=folds,
             modes=((),) * n,
         ),
-        _foreseen(job, density, best, log_r[0]),
+        foreseen or (),
         Fit(nan, None, ("not checked: nothing was drawn yet",), nan, nan, (), ()),
     )
 

@@ -37,7 +37,8 @@ class DescribedDraws:
     columns : (str, str)
         Names of the two readings.
     frames : ndarray of int, shape (n,)
-        Indices of the frames that were used: those that are not saturated.
+        Indices of the frames that were used: those that are not saturated, and of more than are
+        judged at once a random part.
     readings : ndarray, shape (n, 2)
         Their readings.
     columns_of_frames : dict of str to ndarray, shape (n,)
@@ -91,4 +92,4 @@ def describe_draws(job: Job, method: str, draws: Draws) -> DescribedDraws:
     }
     first, second = job.sensor.columns
     readings = np.asarray(job.frames.readings[frames])
-    return DescribedDraws(draws, (first, second), frames, readings, also, attributes)
+    return DescribedDraws(draws, (first, second), job.of_sent(frames), readings, also, attributes)

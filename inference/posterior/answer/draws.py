@@ -20,7 +20,7 @@ _LEAST = 1000
 _PER_EFFECTIVE = 2.0  # draws of ranges for every effective draw: the error grows by a fifth
 _SHARE = 1.0 / 16.0  # of all draws: one with ranges costs four times as much as one without
 _MOST_FRAMES = 1_000_000  # draws times frames, some ten seconds, for which the least may be cut
-_FEWEST = 300
+_FEWEST = 100
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -81,7 +81,11 @@ def _count(sample: Sample, frames: int) -> int:
 
 
 def draws_of(
-    density: CollapsedDensity, job: Job, sample: Sample, rng: np.random.Generator
+    density: CollapsedDensity,
+    job: Job,
+    sample: Sample,
+    rng: np.random.Generator,
+    parts: int = 1,
 ) -> Draws:
     """Draw ranges and readings to a sample of the parameters.
 
@@ -95,6 +99,8 @@ def draws_of(
         What it has drawn.
     rng : numpy.random.Generator
         Source of randomness.
+    parts : int
+        How many jobs the frames were dealt out to, of which this is one: what all cost counts.
 
     Returns
     -------
@@ -102,7 +108,7 @@ def draws_of(
     """
     ensembles, walkers, steps = sample.log_density.shape
     d, frames = sample.z.shape[-1], len(job.frames)
-    count = _count(sample, len(density.frames))
+    count = _count(sample, parts * len(density.frames))
     each = min(max(math.ceil(count / (ensembles * walkers)), 1), steps)
     thinned = np.linspace(0, steps - 1, each).astype(np.intp)
     z = sample.z[:, :, thinned].reshape(ensembles * walkers * each, d)

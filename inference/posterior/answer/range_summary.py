@@ -1,5 +1,8 @@
 """Draws of the ranges in a few numbers each, of which none is an average over two modes."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +14,7 @@ from inference.posterior.answer.quantiles import QUANTILES, quantiles
 from inference.posterior.answer.separation import boundaries, labels
 from inference.posterior.answer.shares import resampled_share_error, share_error
 
-__all__ = ["range_summary"]
+__all__ = ["joined", "range_summary"]
 
 Array = NDArray[np.float64]
 
@@ -56,6 +59,34 @@ def range_summary(
             columns["mcse_mean"][frame] = mean_error(r, importance_ess)
     parts = of_sd(shares, columns["sd"])
     return RangeSummary(**columns, sd_parts=parts, near_fold=near_fold, modes=tuple(modes))
+
+
+def joined(
+    parts: Sequence[RangeSummary], numbers: Sequence[NDArray[np.intp]], n: int
+) -> RangeSummary:
+    """Put together the summaries of parts of n frames, given the numbers of the frames of each."""
+
+    def whole(values: Sequence[NDArray[Any]], empty: Any) -> NDArray[Any]:
+        result = np.full(n, empty)
+        for at, value in zip(numbers, values, strict=True):
+            result[at] = value
+        return result
+
+    columns = {
+        name: whole([getattr(part, name) for part in parts], np.nan) for name in RANGE_COLUMNS
+    }
+    shares = [
+        whole([getattr(part.sd_parts, name) for part in parts], np.nan)
+        for name in ("noise", "scene", "model")
+    ]
+    modes: list[tuple[RangeMode, ...]] = [()] * n
+    for at, part in zip(numbers, parts, strict=True):
+        for number, mode in zip(at.tolist(), part.modes, strict=True):
+            modes[number] = mode
+    folds = whole([part.near_fold for part in parts], empty=False)
+    return RangeSummary(
+        **columns, sd_parts=ErrorParts(*shares), near_fold=folds, modes=tuple(modes)
+    )
 
 
 def _modes(

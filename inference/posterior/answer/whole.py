@@ -73,7 +73,9 @@ class Whole:
         return float(np.sqrt(np.square(mean).sum(axis=1).mean()))
 
 
-def with_model_error(job: Job, density: CollapsedDensity, sample: Sample, draws: Draws) -> Whole:
+def with_model_error(
+    job: Job, density: CollapsedDensity, sample: Sample, draws: Draws, sampled: CollapsedDensity
+) -> Whole:
     """Move draws by the errors of the model.
 
     Parameters
@@ -86,6 +88,8 @@ def with_model_error(job: Job, density: CollapsedDensity, sample: Sample, draws:
         What it has drawn.
     draws : Draws
         The same, with ranges.
+    sampled : CollapsedDensity
+        That of which they are draws: of all frames, where the job is a part of a larger one.
 
     Returns
     -------
@@ -99,7 +103,7 @@ def with_model_error(job: Job, density: CollapsedDensity, sample: Sample, draws:
     larger = None
     if isinstance(density, DiscrepantDensity):
         larger = larger_discrepancy(density, chosen, log_r)
-    sensitivity = prior_sensitivity(density, chosen, log_r)
+    sensitivity = prior_sensitivity(sampled, chosen, log_r)
     budget = error_budget(job, density, chosen, log_r, larger, leaning(sensitivity), rng)
     errors = budget.errors(m, rng)
     z = budget.moved(sample.flat, budget.errors(len(sample.flat), rng)).reshape(sample.z.shape)

@@ -1,7 +1,7 @@
 """Posterior predictive checks: is the model able to make such readings at all."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 _MISFIT = 1e-3
 _DRAWS = 5  # of the parameters
 _REPLICATES = 200  # of each
+_FEWEST = 40  # of the frames of each part, where they were dealt out
 _TAIL = 0.1  # share of the replicates that tell how the tail falls
 _LENGTH = 0.5  # in log r, of a smooth error
 
@@ -63,6 +64,10 @@ _CHECKS: dict[str, Callable[[FitResiduals], Array]] = {
 }
 
 
+# how a statistic of all frames is made from those of parts; others are sums
+_TOGETHER: dict[str, Callable[..., Array]] = {"worst_frame": np.max, "neighbours": np.mean}
+
+
 def _survival(anew: Array, seen: Array) -> float:
     """Return how rarely replicates are as large, the tail taken for exponential.
 
@@ -81,7 +86,11 @@ def _survival(anew: Array, seen: Array) -> float:
 
 
 def predictive_check(
-    job: Job, density: CollapsedDensity, z: Array, rng: np.random.Generator
+    job: Job,
+    density: CollapsedDensity,
+    z: Array,
+    rng: np.random.Generator,
+    others: Sequence[Job] = (),
 ) -> Fit:
     """Check the frames against replicates of them.
 
@@ -102,22 +111,31 @@ def predictive_check(
         Draws of the parameters.
     rng : numpy.random.Generator
         Source of randomness.
+    others : sequence of Job
+        The other parts of a job whose frames were dealt out. Each is fitted on its own, and what
+        is looked at is that of all together.
 
     Returns
     -------
     Fit
     """
     chosen = np.linspace(0, len(z) - 1, min(_DRAWS, len(z))).astype(np.intp)
-    every = [fit_residuals(job, density, z[k], _REPLICATES, rng) for k in chosen]
+    replicates = max(_REPLICATES // (1 + len(others)), _FEWEST)
+    found, seen = [], []
+    for part, own in ((job, density), *((other, other.density()) for other in others)):
+        every = [fit_residuals(part, own, z[k], replicates, rng) for k in chosen]
+        found.append({name: [check(of) for of in every] for name, check in _CHECKS.items()})
+        seen.append(np.median([of.squared[0] for of in every], axis=0))
     checks = []
-    for name, statistic in _CHECKS.items():
-        values = np.array([statistic(of) for of in every])
+    for name in _CHECKS:
+        values = _TOGETHER.get(name, np.sum)([of[name] for of in found], axis=0)
         p = _survival(values[:, 1:].ravel(), values[:, 0])
         mean = float(values[:, 1:].mean())
         checks.append(FitCheck(name, float(np.median(values[:, 0])), mean, p))
     least = min(check.p_value for check in checks)
     p_value = -math.expm1(len(checks) * math.log1p(-min(least, 1.0 - 1e-12)))
-    outliers = _outliers(job, every)
+    worst = np.max([of["worst_frame"] for of in found], axis=0)[:, 1:].ravel()
+    outliers = _outliers((job, *others), seen, worst)
     failed = [c for c in checks if -math.expm1(len(checks) * math.log1p(-c.p_value)) < _MISFIT]
     return Fit(
         p_value,
@@ -130,14 +148,15 @@ def predictive_check(
     )
 
 
-def _outliers(job: Job, every: list[FitResiduals]) -> tuple[int, ...]:
+def _outliers(parts: Sequence[Job], seen: Sequence[Array], worst: Array) -> tuple[int, ...]:
     """Return the frames that are worse than all but one in a thousand worst frames should be."""
-    worst = np.concatenate([_worst(of)[1:] for of in every])
     start = float(np.quantile(worst, 1.0 - _TAIL))
     limit = start + float((worst[worst > start] - start).mean()) * math.log(_TAIL / _MISFIT)
-    seen = np.median([of.squared[0] for of in every], axis=0)
-    frames = np.flatnonzero(job.usable)[seen > limit]
-    return tuple(int(frame) for frame in frames)
+    found = [
+        part.of_sent(np.flatnonzero(part.usable))[of > limit]
+        for part, of in zip(parts, seen, strict=True)
+    ]
+    return tuple(np.sort(np.concatenate(found)).tolist())
 
 
 def _words(check: FitCheck, outliers: tuple[int, ...]) -> str:

@@ -39,7 +39,9 @@ _BEYOND = 100.0  # factor by which the ranges are widened
 _WIDER = 1.5  # at least
 
 
-def prior_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[str, ...]:
+def prior_conflicts(
+    density: CollapsedDensity, z: Array, log_r: Array, sampled: CollapsedDensity
+) -> tuple[str, ...]:
     """Find unknowns and ranges whose posterior piles up where their prior ends.
 
     Parameters
@@ -50,6 +52,8 @@ def prior_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
         Draws of equal weight.
     log_r : ndarray, shape (m, frames)
         Draws of the ranges; nan for a frame without object.
+    sampled : CollapsedDensity
+        That of which z are draws: of all frames, where those of the ranges are some of them.
 
     Returns
     -------
@@ -60,7 +64,7 @@ def prior_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
     names = density.parameters.names
 
     def linearised(x: Array) -> tuple[Array, Array]:
-        line = linearise(density, x, best_ranges(density, x[None])[0, :, 0])
+        line = linearise(sampled, x, best_ranges(sampled, x[None])[0, :, 0])
         return line.residual.ravel(), line.jacobian.reshape(-1, len(names))
 
     return (*parameter_conflicts(names, z, linearised), *range_conflicts(density, z, log_r))

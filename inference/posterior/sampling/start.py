@@ -60,7 +60,7 @@ class Optimum:
 def _profile(density: CollapsedDensity, z: Array) -> tuple[Array, Array]:
     """Log density at the best ranges, shape (n,), and those log ranges, shape (n, frames)."""
     found = best_ranges(density, z)
-    value = found[:, :, 1].sum(axis=1) + density.parameters.log_prior(z)
+    value = density.total(found[:, :, 1]) + density.parameters.log_prior(z)
     return np.where(np.isnan(value), -np.inf, value), found[:, :, 0]
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from inference.density.representatives import Representatives
 from inference.posterior.archive import (
     pack,
     pack_addition,
@@ -30,11 +31,14 @@ class Checkpoint:
         Density evaluations so far.
     selection : Selection or None
         Which optional terms of the scene stay; None where it has none, or nothing is decided.
+    representatives : Representatives or None
+        Frames that are sampled in the name of all; None where all are.
     """
 
     stage: Stage
     calls: int
     selection: Selection | None = None
+    representatives: Representatives | None = None
 
     @property
     def method(self) -> str:

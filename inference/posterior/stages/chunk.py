@@ -14,7 +14,7 @@ _STEP_S = 5e-4  # of an ensemble, beside its evaluations
 
 def _evaluation_s(job: Job) -> float:
     """Return about how long one parameter vector takes [s]."""
-    seconds = int(job.usable.sum()) * _EVALUATION_S
+    seconds = job.sampled_frames * _EVALUATION_S
     error = job.scene.model_error
     return seconds * _WITH_DISCREPANCY if error.integrated and error.flux > 0 else seconds
 

@@ -49,7 +49,8 @@ def merge(job: Job, candidates: Sequence[Candidate]) -> tuple[Selection, int]:
 
 
 def sampled(job: Job, checkpoint: Checkpoint) -> Job:
-    """Return the job in the scene that is sampled: all terms stay until they are decided."""
+    """Return the job as it is sampled: all terms stay until they are decided."""
+    job = dataclasses.replace(job, representatives=checkpoint.representatives)
     if not job.scene.optional_terms:
         return job
     selection = checkpoint.selection

@@ -14,6 +14,7 @@ from inference.posterior.sampling.ensemble import WALKERS
 from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
 from inference.posterior.sampling.population import carried
 from inference.posterior.sampling.proposal import Proposal, mixture_of
+from inference.posterior.sampling.represent import represent
 from inference.posterior.sampling.start import Optimum, climb, find_optima, refine
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.stages.checkpoint import Checkpoint
@@ -46,11 +47,10 @@ class StartTask:
 
     def run(self) -> Checkpoint:
         """Find starting points."""
-        stage, calls = begin(self.job)
-        return Checkpoint(stage, calls)
+        return begin(self.job)
 
 
-def begin(job: Job) -> tuple[Drawing, int]:
+def begin(job: Job) -> Checkpoint:
     """Find the optima, and set up ensembles or draw weighted samples.
 
     Parameters
@@ -60,7 +60,7 @@ def begin(job: Job) -> tuple[Drawing, int]:
 
     Returns
     -------
-    (Drawing, int)
+    Checkpoint
         The first stage, and the density evaluations that it took.
 
     Raises
@@ -69,21 +69,43 @@ def begin(job: Job) -> tuple[Drawing, int]:
         Where no parameters explain the frames at all, or importance sampling alone was asked for
         and cannot be trusted.
     """
-    density = job.density()
+    whole = density = job.density()
     if len(density.parameters) == 0:
         if not np.isfinite(density(np.empty((1, 0)))[0]):
             raise RefusedError("no range allowed by the scene explains every frame")
         check_ranges(density, job.scene, np.empty(0))
-        return Settled(), 1
-    optima, scouted, calls = _optima(job, density)
+        return Checkpoint(Settled(), 1)
+    some = _of_some_frames(job) if job.is_large else job
+    optima, scouted, calls = _optima(some, some.density())
+    if job.is_large and optima:
+        by, optima, used = represent(density, optima, job.stream(Stream.REPRESENTATIVES))
+        job, calls = dataclasses.replace(job, representatives=by), calls + used
+        density = job.density()
     if not optima:
         raise RefusedError(
             "no parameters within their priors explain the frames; widen the priors, or check the "
             "noise's `read` against the readings"
         )
-    check_ranges(density, job.scene, optima[0].z)
-    check_best_fit(density, optima[0].z)
-    proposal = Proposal(mixture_of(optima), None, _SHARE)
+    check_ranges(whole, job.scene, optima[0].z)
+    check_best_fit(whole, optima[0].z)
+    stage, used = _first_stage(job, density, optima, scouted)
+    return Checkpoint(stage, calls + used, None, job.representatives)
+
+
+def _of_some_frames(job: Job) -> Job:
+    """Return the job of so few frames that every branch is seen, with and without object."""
+    rng, usable = job.stream(Stream.REPRESENTATIVES, 0), np.flatnonzero(job.usable)
+    present = job.frames.object_present
+    holds = np.ones(len(usable), dtype=bool) if present is None else present[usable]
+    some = [rng.permutation(usable[flag])[:most] for flag, most in ((holds, 250), (~holds, 50))]
+    return job.part(np.sort(np.concatenate(some)))
+
+
+def _first_stage(
+    job: Job, density: CollapsedDensity, optima: list[Optimum], scouted: Array
+) -> tuple[Drawing, int]:
+    """Set up ensembles or draw weighted samples, from optima; with the evaluations it took."""
+    calls, proposal = 0, Proposal(mixture_of(optima), None, _SHARE)
     if job.settings.method in ("importance", "auto"):
         weighted, used = _importance(density, proposal, job)
         calls += used
@@ -136,7 +158,7 @@ def _thinned(density: CollapsedDensity) -> CollapsedDensity:
     chosen = np.linspace(0, n - 1, _SCOUTED_FRAMES).round().astype(int)
     present = None if density.present is None else density.present[chosen]
     frames = np.ascontiguousarray(density.frames[chosen])
-    return dataclasses.replace(density, frames=frames, present=present)
+    return dataclasses.replace(density, frames=frames, present=present, weights=None)
 
 
 def _with(optima: list[Optimum], found: Optimum | None) -> list[Optimum]:
