@@ -24,6 +24,7 @@ from inference.posterior.answer.range_summary import joined, range_summary
 from inference.posterior.answer.whole import Whole, with_model_error
 from inference.posterior.criticism.cross_check import cross_check
 from inference.posterior.criticism.discrepancy_check import judge_fit, with_model_part
+from inference.posterior.criticism.many_frames import bias_of_many_frames
 from inference.posterior.criticism.predictive_check import predictive_check
 from inference.posterior.criticism.prior_conflict import prior_conflicts
 from inference.posterior.criticism.prior_contradiction import contradicted
@@ -138,6 +139,7 @@ class _Drawn:
 
     job: Job
     density: CollapsedDensity
+    every: CollapsedDensity | None  # of all frames, where some were sampled in their name
     parts: tuple[Job, ...]
     own: CollapsedDensity  # of the first part, whose draws are kept
     stage: Drawing
@@ -145,6 +147,7 @@ class _Drawn:
     sample: Sample
     draws: Draws
     whole: Whole | None
+    bias: Array | None
     rng: np.random.Generator
 
 
@@ -160,10 +163,14 @@ def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
     sample, parts = sample_of(density, stage, rng), job.parts()
     own = density if job.representatives is None else parts[0].density()
     draws, whole = draws_of(own, parts[0], sample, rng, len(parts)), None
+    every, bias = None, None
+    if sample.drawn and job.representatives is not None:
+        every = dataclasses.replace(job, representatives=None).density()
+        bias = bias_of_many_frames(every, sample.flat, job.stream(Stream.PARTS))
     if sample.drawn:
-        whole = with_model_error(parts[0], own, sample, draws, density)
+        whole = with_model_error(parts[0], own, sample, draws, density, bias)
         draws = whole.draws
-    return _Drawn(job, density, parts, own, stage, calls, sample, draws, whole, rng)
+    return _Drawn(job, density, every, parts, own, stage, calls, sample, draws, whole, bias, rng)
 
 
 def draw(job: Job, checkpoint: Checkpoint) -> tuple[Job, Draws]:
@@ -253,7 +260,7 @@ def _ranges(drawn: _Drawn, whole: Whole) -> RangeSummary:
         if k > 0:
             own, rng = part.density(), part.stream(Stream.PARTS, k)
             draws = draws_of(own, part, sample, rng, len(drawn.parts))
-            whole = with_model_error(part, own, sample, draws, drawn.density)
+            whole = with_model_error(part, own, sample, draws, drawn.density, drawn.bias)
         folds = near_fold(part, own, whole.chosen, whole.log_r)
         shares = _of_all_frames(part, whole.budget.of_log_r)
         found.append(range_summary(whole.draws, folds, ess, shares))
@@ -274,9 +281,8 @@ def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
         rng = job.stream(Stream.CROSS_CHECK)
         found, k_hat = cross_check(density, sample.chains, stage.proposal, rng)
         reasons = (*reasons, *found)
-    if drawn.job.representatives is not None:
-        everyone = dataclasses.replace(drawn.job, representatives=None).density()
-        reasons = (*reasons, *doubts(everyone, density, sample.flat))
+    if drawn.every is not None:
+        reasons = (*reasons, *doubts(drawn.every, density, sample.flat))
     fit = predictive_check(job, drawn.own, chosen, drawn.rng, drawn.parts[1:])
     judged = _judged(job, drawn.own, whole)
     if whole.larger is not None:

@@ -160,11 +160,30 @@ def test_more_unknowns_than_were_tested_are_refused(monkeypatch: pytest.MonkeyPa
 
 
 def test_more_frames_than_were_tested_are_refused() -> None:
-    many = Frames(np.tile(FRAMES.readings, (101, 1)))
-    with pytest.raises(RefusedError, match="one frame in 2"):
-        fold.prepare(SENSOR, parse_scene({}), many, QUICK)
-    some = dataclasses.replace(many, object_present=np.ones(len(many), dtype=bool))
-    assert fold.prepare(SENSOR, parse_scene({}), some.select(slice(0, 2000)), QUICK).usable.all()
+    most = checks.MOST_FRAMES // len(FRAMES)
+    many = Frames(np.tile(FRAMES.readings, (most, 1)))
+    assert fold.prepare(SENSOR, parse_scene({}), many, QUICK).usable.all()
+    more = Frames(np.tile(FRAMES.readings, (most + 1, 1)))
+    with pytest.raises(RefusedError, match="several posteriors of a part each"):
+        fold.prepare(SENSOR, parse_scene({}), more, QUICK)
+
+
+@pytest.mark.parametrize(
+    ("scene", "remedy"),
+    [
+        ({"motion": "static"}, "means of 2 frames each"),
+        ({"discrepancy": 0.05}, "leave `discrepancy` out"),
+        ({"crosstalk": {"values": UNKNOWN_CROSSTALK, "optional": True}}, "leave `optional` out"),
+    ],
+)
+def test_more_frames_than_can_be_computed_together_are_refused(
+    scene: dict[str, Any], remedy: str
+) -> None:
+    many = Frames(np.tile(FRAMES.readings, (checks.MOST_COUPLED // len(FRAMES) + 1, 1)))
+    with pytest.raises(RefusedError, match=remedy):
+        fold.prepare(SENSOR, parse_scene(scene), many, QUICK)
+    some = many.select(slice(0, checks.MOST_COUPLED))
+    assert fold.prepare(SENSOR, parse_scene(scene), some, QUICK).usable.all()
 
 
 def test_frames_that_are_all_saturated_are_refused() -> None:

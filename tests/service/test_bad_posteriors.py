@@ -57,8 +57,8 @@ REFUSED: dict[str, tuple[Body, str]] = {
         "bring them into agreement",
     ),
     "too many frames": (
-        body({}, {"w1": [0.01] * 2001, "w2": [0.5] * 2001}),
-        "one frame in 2",
+        body({"motion": "static"}, {"w1": [0.01] * 2001, "w2": [0.5] * 2001}),
+        "send means of 2 frames each",
     ),
 }
 

@@ -12,6 +12,7 @@ from inference.identifiability.statuses import Spread
 from inference.posterior.answer.draws import Draws
 from inference.posterior.answer.error_budget import ErrorBudget, error_budget
 from inference.posterior.criticism.discrepancy_check import LargerDiscrepancy, larger_discrepancy
+from inference.posterior.criticism.many_frames import following
 from inference.posterior.criticism.prior_sensitivity import (
     PriorSensitivity,
     leaning,
@@ -74,7 +75,12 @@ class Whole:
 
 
 def with_model_error(
-    job: Job, density: CollapsedDensity, sample: Sample, draws: Draws, sampled: CollapsedDensity
+    job: Job,
+    density: CollapsedDensity,
+    sample: Sample,
+    draws: Draws,
+    sampled: CollapsedDensity,
+    bias: Array | None,
 ) -> Whole:
     """Move draws by the errors of the model.
 
@@ -90,6 +96,8 @@ def with_model_error(
         The same, with ranges.
     sampled : CollapsedDensity
         That of which they are draws: of all frames, where the job is a part of a larger one.
+    bias : ndarray, shape (d,), or None
+        By what the parameters are moved because there are many frames.
 
     Returns
     -------
@@ -104,6 +112,8 @@ def with_model_error(
     if isinstance(density, DiscrepantDensity):
         larger = larger_discrepancy(density, chosen, log_r)
     sensitivity = prior_sensitivity(sampled, chosen, log_r)
+    if bias is not None and leaning(sensitivity) is None:
+        sensitivity = following(bias, chosen, log_r)
     budget = error_budget(job, density, chosen, log_r, larger, leaning(sensitivity), rng)
     errors = budget.errors(m, rng)
     z = budget.moved(sample.flat, budget.errors(len(sample.flat), rng)).reshape(sample.z.shape)

@@ -27,6 +27,13 @@ _EVALUATIONS = 60_000  # of frames, above which fewer draws do
 _LEAST_DRAWS = 100
 _FEWEST_LEFT = 100.0  # effective draws under the weights: their mean errs by a tenth of a sd
 _MOVED = 1.0  # own standard deviations
+_WORDS = (
+    "under a law that takes nothing from how the ranges are spread it would move by {:.1f} "
+    "standard deviations of what was drawn, by which its interval is widened: it holds if every "
+    "range is an independent draw of range_m, which those of an object on its way are not; where "
+    "they are not, "
+    'leave range_m out or state {{"prior": "reference"}}'
+)
 _LOWEST = 1e-6  # of the highest range: a prior that begins at zero has next to nothing below
 
 
@@ -44,12 +51,15 @@ class PriorSensitivity:
         Of the coordinates in which every prior is standard normal.
     of_log_r : ndarray, shape (frames,)
         Of log r; 0 for a frame without object.
+    words : str
+        What to say of it, with a place for the number of standard deviations.
     """
 
     parameters: Array
     scale: float
     of_z: Array
     of_log_r: Array
+    words: str = _WORDS
 
 
 def prior_sensitivity(density: CollapsedDensity, z: Array, log_r: Array) -> PriorSensitivity | None:
@@ -153,13 +163,7 @@ def mark_sensitive(
         moved = abs(by_name[row.parameter])
         of_prior = row.parameter.startswith("range_m.")
         if moved > _MOVED and not of_prior:
-            reason = (
-                f"{row.reason}; but under a law that takes nothing from how the ranges are spread "
-                f"it would move by {moved:.1f} standard deviations of what was drawn, by which its "
-                "interval is widened: it holds if every range is an independent draw of range_m, "
-                "which those of an object on its way are not; where they are not, leave range_m "
-                'out or state {"prior": "reference"}'
-            )
+            reason = f"{row.reason}; but {sensitivity.words.format(moved)}"
             status = "weak" if row.status == "identified" else row.status
             judged.append(dataclasses.replace(row, status=status, reason=reason))
         else:
