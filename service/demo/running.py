@@ -42,6 +42,7 @@ def running_service() -> Iterator[str]:
     """
     # settings of somebody else's service are not meant for this one
     environment = {k: v for k, v in os.environ.items() if not k.startswith(PREFIX)}
+    environment[f"{PREFIX}WARM"] = "off"  # it is there for these few questions
     command = [sys.executable, "-m", "service.cli", "serve", "--port", "0"]
     process = subprocess.Popen(  # noqa: S603  # a fixed command
         command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment
