@@ -47,6 +47,7 @@ class Service:
 
     def __init__(self, command: Sequence[str], database: str) -> None:
         kept = {k: v for k, v in os.environ.items() if not k.startswith("HYBRIDTOF_")}
+        kept["HYBRIDTOF_WARM"] = "off"
         here = {"PYTHONPATH": str(Path(__file__).parents[1]), "HYBRIDTOF_DATABASE": database}
         self.process = subprocess.Popen(  # noqa: S603
             command, stderr=subprocess.PIPE, text=True, env=kept | here

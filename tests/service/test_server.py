@@ -30,6 +30,7 @@ def fake_server(max_body_bytes: int = 10**6, **orders: Any) -> tuple[str, ...]:
 def environment(**extra: str) -> dict[str, str]:
     """Environment without settings, coverage of the project's own folder."""
     kept = {k: v for k, v in os.environ.items() if not k.startswith("HYBRIDTOF_")}
+    kept["HYBRIDTOF_WARM"] = "off"
     return kept | {"PYTHONPATH": str(Path(__file__).parents[2])} | extra
 
 
