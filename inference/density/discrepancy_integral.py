@@ -266,6 +266,9 @@ def integrate_flux_error(
         if not math.isfinite(total):
             out[i, :] = -math.inf
             continue
-        share = (total - out[i].sum()) / n
+        parts = 0.0
+        for j in range(n):
+            parts += out[i, j]
+        share = (total - parts) / n
         for j in range(n):
             out[i, j] += share
