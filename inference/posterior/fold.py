@@ -10,8 +10,9 @@
 
 Between chunks a checkpoint may be stored and read again: the result is the same to the last bit.
 
-Where the Laplace shapes at the optima fit, ensembles walk at once. Where they do not, populations
-are first carried from the prior to the posterior, a map is fitted to them, and ensembles walk in
+Where weighted draws from the Laplace shapes at the optima, or from maps fitted to them, are even
+and points from the prior do not contradict them, ensembles walk at once. Where not, populations are
+first carried from the prior to the posterior, a map is fitted to them, and ensembles walk in
 its coordinates. What each stage does is in `inference.posterior.stages`.
 """
 

@@ -24,8 +24,8 @@ class Stream(enum.IntEnum):
     """Resampling, ranges and replicated readings of the answer."""
     CROSS_CHECK = 5
     """Importance sampling that the ensembles are held to."""
-    TRIAL = 8
-    """Importance sampling that tells whether the Laplace shapes fit."""
+    WARM = 8
+    """Importance draws that ensembles may start from."""
     POPULATIONS = 9
     """Populations, each by its number and that of the temperature."""
     MEMBERS = 10

@@ -279,7 +279,7 @@ def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
         k_hat = stage.draws.k_hat
     elif isinstance(stage, Walking) and sample.chains is not None:
         rng = job.stream(Stream.CROSS_CHECK)
-        found, k_hat = cross_check(density, sample.chains, stage.proposal, rng)
+        found, k_hat = cross_check(density, sample.chains, stage.proposal, stage.weighted, rng)
         reasons = (*reasons, *found)
     if drawn.every is not None:
         reasons = (*reasons, *doubts(drawn.every, density, sample.flat))

@@ -34,7 +34,7 @@ __all__ = ["ErrorBudget", "error_budget"]
 
 Array = NDArray[np.float64]
 
-_REFERENCES = 200  # draws at which the response is computed
+_REFERENCES = 100  # draws at which the response is computed
 _FRAMES = 20_000  # that this may cost
 _FEWEST = 20
 _STRAIGHT = 0.1  # share of the response that the next order adds, below which the first is all

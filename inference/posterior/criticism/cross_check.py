@@ -36,7 +36,11 @@ _ROUNDING = 1e-9
 
 
 def cross_check(
-    density: CollapsedDensity, chains: Chains, proposal: Proposal, rng: np.random.Generator
+    density: CollapsedDensity,
+    chains: Chains,
+    proposal: Proposal,
+    weighted: WeightedDraws | None,
+    rng: np.random.Generator,
 ) -> tuple[tuple[str, ...], float]:
     """Hold draws to the optima that are known, to importance sampling and to quadrature.
 
@@ -48,6 +52,8 @@ def cross_check(
         Kept draws.
     proposal : Proposal
         What they were proposed from.
+    weighted : WeightedDraws or None
+        Importance draws that there are already; None where they are to be drawn from the proposal.
     rng : numpy.random.Generator
         For importance sampling.
 
@@ -58,7 +64,8 @@ def cross_check(
     float
         Pareto k-hat of the importance weights.
     """
-    weighted = draw_weighted(density, proposal, rng, _CHECK_DRAWS)
+    if weighted is None:
+        weighted = draw_weighted(density, proposal, rng, _CHECK_DRAWS)
     points = _EVALUATIONS // max(len(density.frames), 1)
     found = (
         false_branch(density, chains, proposal.optima),
@@ -133,14 +140,15 @@ def moments_disagree(
     white = frame.white(chains.z)
     own = _own_moments(white)
     estimates: list[tuple[str, Moments]] = []
-    if white.shape[-1] <= MOST_DIMENSIONS:
+    trusted = weighted.k_hat < MAX_K_HAT and weighted.ess > _LEAST_ESS
+    if white.shape[-1] <= MOST_DIMENSIONS and not trusted:
         around = frame.white(_surroundings(density, chains, optima))
         low, high = np.quantile(white.reshape(-1, white.shape[-1]), _INNER, axis=0)
         low, high = np.minimum(low, around.min(axis=0)), np.maximum(high, around.max(axis=0))
         exact = lattice_moments(lambda y: density(frame.natural(y)), low, high, points)
         if exact is not None:
             estimates.append(("quadrature", exact))
-    if weighted.k_hat < MAX_K_HAT and weighted.ess > _LEAST_ESS:
+    if trusted:
         reason = _mode_weights(chains, optima, weighted)
         if reason is not None:
             return reason

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.proposal import Proposal
 
-__all__ = ["WALKERS", "Ensemble", "advance", "new_ensemble", "restart"]
+__all__ = ["WALKERS", "Ensemble", "advance", "new_ensemble", "restart", "warm_walkers"]
 
 Array = NDArray[np.float64]
 
 WALKERS = 32
+_FEW_WALKERS = 16  # that start from draws of the posterior and jump through a law that fits it
+_FEW_UNKNOWNS = 5  # at most: half of the walkers span what the others propose from
 _SHORT = 0.1  # times the step that suits a normal posterior (ter Braak 2006)
 
 Stream = tuple[NDArray[np.uint32], int, int, float]
@@ -54,10 +56,20 @@ class Ensemble:
         """Number of steps made."""
         return int(self.chain.shape[0])
 
+    @property
+    def walkers(self) -> int:
+        """Number of walkers."""
+        return len(self.coords)
+
 
 def _stream(state: Any) -> Stream:
     """Return what matters of a RandomState's own tuple."""
     return np.asarray(state[1], dtype=np.uint32), int(state[2]), int(state[3]), float(state[4])
+
+
+def warm_walkers(unknowns: int) -> int:
+    """Return how many walkers an ensemble needs that starts warm."""
+    return _FEW_WALKERS if unknowns <= _FEW_UNKNOWNS else WALKERS
 
 
 def new_ensemble(

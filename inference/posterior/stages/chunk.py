@@ -1,14 +1,15 @@
 """The size of a chunk: counted in evaluations, never timed, so that it is the same everywhere."""
 
 from inference.posterior.job import Job
-from inference.posterior.sampling.ensemble import WALKERS
 from inference.posterior.stages.stage import MOST_STEPS
 
 __all__ = ["evaluations", "steps_from"]
 
-_CHUNK_S = 0.33  # of the first chunk; later ones grow to about a second
-_EVALUATION_S = 1.2e-6  # a frame under one parameter vector, for sizing chunks only
+_CHUNK_S = 0.33  # half of the longest chunk
+_EVALUATION_S = 2.5e-6  # a frame under one parameter vector, for sizing chunks only
 _WITH_DISCREPANCY = 10.0  # times as long, where the flux's error is integrated out
+_EASIEST = 90  # steps: 50 times of a little more than one, and a burn-in of a fifth
+_GROWTH = 0.25
 _STEP_S = 5e-4  # of an ensemble, beside its evaluations
 
 
@@ -24,8 +25,13 @@ def evaluations(job: Job) -> int:
     return int(3 * _CHUNK_S / _evaluation_s(job))
 
 
-def steps_from(job: Job, done: int) -> int:
-    """Return how many steps an ensemble makes in a chunk after those that are done."""
-    step_s = _STEP_S + WALKERS * _evaluation_s(job)
-    seconds = _CHUNK_S if done == 0 else 2 * _CHUNK_S
-    return int(min(max(seconds / step_s, 20), 500, MOST_STEPS - done))
+def steps_from(job: Job, done: int, walkers: int) -> int:
+    """Return how many steps an ensemble makes in a chunk after those that are done.
+
+    The first ones are what the easiest posterior takes, then a share of those that are done: what
+    is made beyond need is no more than that.
+    """
+    step_s = _STEP_S + walkers * _evaluation_s(job)
+    wanted = _EASIEST if done == 0 else _GROWTH * done
+    most = 2 * _CHUNK_S / step_s
+    return int(min(max(min(wanted, most), 20), 500, MOST_STEPS - done))

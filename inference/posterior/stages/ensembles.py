@@ -8,12 +8,11 @@ from inference.posterior.sampling.ensemble import WALKERS, Ensemble, new_ensembl
 from inference.posterior.sampling.proposal import Proposal
 from simulator.errors import RefusedError
 
-__all__ = ["MAP_SHARE", "POPULATIONS", "new_ensembles"]
+__all__ = ["POPULATIONS", "new_ensembles"]
 
 Array = NDArray[np.float64]
 
 POPULATIONS = 2  # independent of one another, so that they can disagree
-MAP_SHARE = 0.55  # of the steps that are independent jumps through a map
 _TRIES = 50  # draws of as many points as there are walkers
 
 
@@ -22,6 +21,7 @@ def new_ensembles(
     proposal: Proposal,
     starts: tuple[Array, ...],
     seeds: np.random.SeedSequence,
+    walkers: int = WALKERS,
 ) -> tuple[Ensemble, ...]:
     """Set up ensembles that have not moved yet.
 
@@ -32,9 +32,11 @@ def new_ensembles(
     proposal : Proposal
         In whose coordinates they walk; points that are wanting are drawn around its optima.
     starts : tuple of ndarray, shape (n, d) each
-        Starting points of every ensemble, of which the first `WALKERS` count.
+        Starting points of every ensemble, of which the first `walkers` count.
     seeds : numpy.random.SeedSequence
         Of which every ensemble gets one.
+    walkers : int
+        Of every ensemble.
 
     Returns
     -------
@@ -48,19 +50,19 @@ def new_ensembles(
     ensembles = []
     for given, seed in zip(starts, seeds.spawn(len(starts)), strict=True):
         _, first = np.unique(given, axis=0, return_index=True)
-        coords = given[np.sort(first)][:WALKERS]
+        coords = given[np.sort(first)][:walkers]
         if np.linalg.matrix_rank(coords - coords[:1]) < coords.shape[1]:
             coords = coords[:0]  # walkers on a plane never leave it
         rng = np.random.default_rng(seed.spawn(1)[0])
         log_prob = density(coords) if len(coords) else np.empty(0)
         for _ in range(_TRIES):
-            if len(coords) >= WALKERS:
+            if len(coords) >= walkers:
                 break
-            more = proposal.optima.draw(rng, WALKERS)
+            more = proposal.optima.draw(rng, walkers)
             found = density(more)
             coords = np.concatenate([coords, more[np.isfinite(found)]])
             log_prob = np.concatenate([log_prob, found[np.isfinite(found)]])
-        if len(coords) < WALKERS:
+        if len(coords) < walkers:
             raise RefusedError("the prior leaves no room around its best parameters")
-        ensembles.append(new_ensemble(proposal, coords[:WALKERS], log_prob[:WALKERS], seed))
+        ensembles.append(new_ensemble(proposal, coords[:walkers], log_prob[:walkers], seed))
     return tuple(ensembles)

@@ -94,6 +94,9 @@ class Walking:
         How often the proposal was adapted; 0 where no populations were called for.
     ess, r_hat : float or None
         Least effective sample size and largest R-hat so far.
+    weighted : WeightedDraws or None
+        Importance draws that the ensembles started from, and are held to; None where there are
+        none to be trusted.
     """
 
     proposal: Proposal
@@ -102,6 +105,7 @@ class Walking:
     adaptations: int
     ess: float | None = None
     r_hat: float | None = None
+    weighted: WeightedDraws | None = None
 
     @property
     def steps(self) -> int:

@@ -10,14 +10,16 @@ from inference.posterior.checks import check_best_fit, check_ranges
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
 from inference.posterior.sampling.effort import scouts
-from inference.posterior.sampling.ensemble import WALKERS
+from inference.posterior.sampling.ensemble import WALKERS, Ensemble, warm_walkers
 from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
 from inference.posterior.sampling.population import carried
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.represent import represent
 from inference.posterior.sampling.start import Optimum, climb, find_optima, refine
 from inference.posterior.sampling.verdict import Verdict
+from inference.posterior.sampling.warm import Warm, warm_start
 from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.chunk import evaluations
 from inference.posterior.stages.ensembles import POPULATIONS, new_ensembles
 from inference.posterior.stages.stage import Drawing, Settled, Tempering, Walking, Weighted
 from inference.posterior.streams import Stream
@@ -32,11 +34,8 @@ _SCOUTS = 2 * WALKERS
 _IMPORTANCE_DRAWS = 2000
 _MOST_IMPORTANCE_DRAWS = 200_000
 _MOST_IMPORTANCE_FRAMES = 8_000_000  # draws times frames: ten seconds that nothing interrupts
-_TRIAL_DRAWS = 400
+_WARM_DRAWS = (400, 1000)  # fewest and most: a quarter of a second of them
 _SHARE = 0.5  # of an ensemble's steps that are independent jumps
-_FITTING = 0.5  # effective share of the trial above which jumps are mostly accepted
-_FITTING_SHARE = 0.8  # jumps that are mostly accepted forget fastest
-_MISFITTING = 0.1  # effective share below which the Laplace shapes are given up
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -111,17 +110,28 @@ def _first_stage(
         calls += used
         if weighted is not None:
             return weighted, calls
-    trial = draw_weighted(density, proposal, job.stream(Stream.TRIAL), _TRIAL_DRAWS)
-    calls += _TRIAL_DRAWS
+    draws = int(np.clip(evaluations(job) // 4, *_WARM_DRAWS))
+    warm = warm_start(density, proposal, scouted, job.stream(Stream.WARM), draws)
+    calls += warm.calls
     pending = Verdict(False, ("no steps were made",))
-    if not trial.ess > _MISFITTING * _TRIAL_DRAWS:
+    if not warm.fits:
         return Tempering(proposal, (None,) * POPULATIONS, pending), calls
-    if trial.ess > _FITTING * _TRIAL_DRAWS:
-        proposal = dataclasses.replace(proposal, share=_FITTING_SHARE)
-    starts = (np.empty((0, len(density.parameters))),) * (job.settings.ensembles - 1)
+    ensembles = _ensembles(job, density, warm, scouted)
+    walking = Walking(warm.proposal, ensembles, pending, adaptations=0, weighted=warm.draws)
+    return walking, calls + ensembles[0].walkers * len(ensembles)
+
+
+def _ensembles(
+    job: Job, density: CollapsedDensity, warm: Warm, scouted: Array
+) -> tuple[Ensemble, ...]:
+    """Start the last ensemble from the scouts, the others from different weighted draws."""
+    draws, count = warm.draws, job.settings.ensembles - 1
+    rng, walkers = job.stream(Stream.MEMBERS), warm_walkers(len(density.parameters))
+    most = min(walkers * count, int(np.count_nonzero(draws.weights)))
+    order = rng.choice(len(draws.z), size=most, replace=False, p=draws.weights)
+    starts = tuple(draws.z[order[k::count]] for k in range(count))
     seeds = job.seeds(Stream.ENSEMBLES)
-    ensembles = new_ensembles(density, proposal, (*starts, scouted), seeds)
-    return Walking(proposal, ensembles, pending, adaptations=0), calls + WALKERS * len(ensembles)
+    return new_ensembles(density, warm.proposal, (*starts, scouted), seeds, walkers)
 
 
 def _optima(job: Job, density: CollapsedDensity) -> tuple[list[Optimum], Array, int]:

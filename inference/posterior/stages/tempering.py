@@ -11,8 +11,9 @@ from inference.posterior.sampling.ensemble import WALKERS
 from inference.posterior.sampling.population import Population, first_population, temper
 from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.transport import fit_map
+from inference.posterior.sampling.warm import MAP_SHARE
 from inference.posterior.stages.chunk import evaluations
-from inference.posterior.stages.ensembles import MAP_SHARE, new_ensembles
+from inference.posterior.stages.ensembles import new_ensembles
 from inference.posterior.stages.stage import Tempering, Walking
 from inference.posterior.streams import Stream
 

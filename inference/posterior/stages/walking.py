@@ -12,13 +12,14 @@ from inference.posterior.sampling.diagnostics import (
     effective_sample_size,
     split_r_hat,
 )
-from inference.posterior.sampling.ensemble import WALKERS, Ensemble, advance, restart
+from inference.posterior.sampling.ensemble import Ensemble, advance, restart
 from inference.posterior.sampling.proposal import Proposal
 from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.sampling.verdict import Chains, Verdict, judge
+from inference.posterior.sampling.warm import MAP_SHARE
 from inference.posterior.stages.chunk import steps_from
-from inference.posterior.stages.ensembles import MAP_SHARE, POPULATIONS
+from inference.posterior.stages.ensembles import POPULATIONS
 from inference.posterior.stages.stage import Tempering, Walking
 from simulator.parameters import parameters_of
 
@@ -59,7 +60,7 @@ def tasks(job: Job, stage: Walking) -> tuple[WalkTask, ...]:
     """Return the steps of every ensemble; none where more would serve nothing."""
     if stage.finished:
         return ()
-    steps = steps_from(job, stage.steps)
+    steps = steps_from(job, stage.steps, stage.ensembles[0].walkers)
     return tuple(WalkTask(job, stage.proposal, ensemble, steps) for ensemble in stage.ensembles)
 
 
@@ -85,7 +86,7 @@ def merge(
     made = sum(ensemble.steps for ensemble in ensembles) - stage.steps * len(ensembles)
     stage = dataclasses.replace(stage, ensembles=tuple(ensembles))
     kept = stage.chains(parameters_of(job.sensor, job.scene).names)
-    return _judged(job, stage, kept), made * WALKERS
+    return _judged(job, stage, kept), made * stage.ensembles[0].walkers
 
 
 def _judged(job: Job, stage: Walking, kept: Chains) -> Tempering | Walking:
