@@ -46,6 +46,7 @@ from inference.posterior.stages.stage import (
     Walking,
     Weighted,
 )
+from inference.posterior.stages.standing import standing
 from inference.posterior.stages.starting import begin
 from inference.posterior.streams import Stream
 from inference.posterior.undrawn import without_draws
@@ -159,6 +160,7 @@ def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
         stage, calls = begun.stage, calls + begun.calls
         job = dataclasses.replace(job, representatives=begun.representatives)
     assert not isinstance(stage, Selecting | Starting)  # noqa: S101  # sampling has begun
+    stage = standing(stage)
     density, rng = job.density(), job.stream(Stream.ANSWER)
     sample, parts = sample_of(density, stage, rng), job.parts()
     own = density if job.representatives is None else parts[0].density()

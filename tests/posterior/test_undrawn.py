@@ -1,4 +1,4 @@
-"""A posterior that was stopped before its first draw: starting points are no intervals."""
+"""A posterior without draws that can be trusted: starting points are no intervals."""
 
 import dataclasses
 import json
@@ -11,6 +11,7 @@ import pytest
 
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages import standing
 from service.answers.posteriors import PosteriorResponse, full
 from service.cli import main
 from service.store.record import QUEUED, JobRecord
@@ -19,12 +20,24 @@ from tests.posterior.scenes import UNKNOWN_CROSSTALK, data, sensor_of
 
 NO_TIME = SamplerSettings(seed=1, max_seconds=1e-3)
 SENSOR = sensor_of("pulsed")
+# with crosstalk no law fits their posterior at once
+UNKNOWN_WALL = {
+    "strength": {"prior": "lognormal", "median": 0.02, "sigma": 1.0},
+    "distance_m": {"prior": "lognormal", "median": 3.0, "sigma": 0.5},
+}
 SIMULATED = data(SENSOR, {"crosstalk": [0.002, 0.01]}, frames=8).frames
 # the last without the object, so that it has no range to foresee anything at
 FRAMES = dataclasses.replace(SIMULATED, object_present=np.arange(8) < 7)
 
 
+@pytest.fixture
+def untrusted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no weighted draws be enough."""
+    monkeypatch.setattr(standing, "_LEAST_ESS", math.inf)
+
+
 # with an optional term nothing is decided yet: it stays
+@pytest.mark.usefixtures("untrusted")
 @pytest.mark.parametrize("crosstalk", [UNKNOWN_CROSSTALK, {"values": UNKNOWN_CROSSTALK}])
 def test_nothing_drawn_has_no_numbers_and_says_what_is_foreseen(crosstalk: Any) -> None:
     if isinstance(crosstalk, dict):
@@ -53,6 +66,7 @@ def test_nothing_drawn_has_no_numbers_and_says_what_is_foreseen(crosstalk: Any) 
     assert answer.model_dump(exclude={"problem"}) == full(record)
 
 
+@pytest.mark.usefixtures("untrusted")
 def test_an_object_at_rest_foresees_what_it_will_never_tell() -> None:
     still = data(SENSOR, frames=8, span=(0.241, 0.2411)).frames
     rows = infer(SENSOR, parse_scene({"motion": "static"}), still, NO_TIME).identifiability
@@ -69,7 +83,7 @@ def test_the_command_line_does_not_take_it_for_an_answer(
     frames.write_text(json.dumps(readings))
     stated = {
         "sensor": SENSOR.model_dump(mode="json", exclude_none=True),
-        "scene": {"crosstalk": UNKNOWN_CROSSTALK},
+        "scene": {"crosstalk": UNKNOWN_CROSSTALK, "background": UNKNOWN_WALL},
     }
     scene.write_text(json.dumps(stated))
     arguments = [str(frames), "--scene", str(scene), "--max-seconds", "0.001", "--seed", "1"]

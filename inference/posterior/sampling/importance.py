@@ -10,7 +10,14 @@ from scipy import special
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.proposal import Mixture, Proposal
 
-__all__ = ["MAX_K_HAT", "WeightedDraws", "draw_weighted", "generalised_pareto", "pareto_k_hat"]
+__all__ = [
+    "MAX_K_HAT",
+    "WeightedDraws",
+    "draw_weighted",
+    "generalised_pareto",
+    "pareto_k_hat",
+    "smoothed",
+]
 
 Array = NDArray[np.float64]
 
@@ -77,6 +84,11 @@ def generalised_pareto(excess: Array) -> tuple[float, float]:
     return (n * k + 10 * 0.5) / (n + 10), -k / best
 
 
+def _tail(n: int) -> int:
+    """Return how many of n weights are the tail that a Pareto law is fitted to."""
+    return int(min(0.2 * n, 3 * math.sqrt(n)))
+
+
 def pareto_k_hat(log_weights: Array) -> float:
     """Return the Pareto shape k-hat of importance weights.
 
@@ -92,7 +104,7 @@ def pareto_k_hat(log_weights: Array) -> float:
         all are equal.
     """
     finite = log_weights[np.isfinite(log_weights)]
-    tail = int(min(0.2 * log_weights.size, 3 * math.sqrt(log_weights.size)))
+    tail = _tail(log_weights.size)
     if finite.size < tail + 1 or tail < 5:
         return math.inf
     ordered = np.sort(finite)
@@ -103,6 +115,41 @@ def pareto_k_hat(log_weights: Array) -> float:
         return generalised_pareto(positive)[0]
     # equal weights, or a few that dwarf all others
     return -math.inf if excess[-1] <= _EQUAL else math.inf
+
+
+def smoothed(log_weights: Array) -> tuple[Array, float]:
+    """Return weights whose largest follow the Pareto law fitted to them (Vehtari et al. 2024).
+
+    Parameters
+    ----------
+    log_weights : ndarray, shape (n,)
+        -inf counts as weight zero.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Log weights in the same order; none above the largest.
+    float
+        Pareto k-hat of those given.
+    """
+    k_hat = pareto_k_hat(log_weights)
+    if not math.isfinite(k_hat):
+        return log_weights, k_hat
+    tail = _tail(log_weights.size)
+    order = np.argsort(log_weights)
+    top, cut = (
+        log_weights[order[-1]],
+        math.exp(log_weights[order[-tail - 1]] - log_weights[order[-1]]),
+    )
+    largest = np.exp(log_weights[order[-tail:]] - top)
+    shape, scale = generalised_pareto(np.maximum(largest - cut, 1e-300))
+    p = (np.arange(tail) + 0.5) / tail
+    excess = (
+        scale * -np.log1p(-p) if shape == 0.0 else scale * np.expm1(-shape * np.log1p(-p)) / shape
+    )
+    result = log_weights.copy()
+    result[order[-tail:]] = top + np.minimum(np.log(cut + excess), 0.0)
+    return result, k_hat
 
 
 def draw_weighted(

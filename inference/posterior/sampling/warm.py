@@ -56,7 +56,12 @@ class Warm:
     def fits(self) -> bool:
         """Whether walkers may start from the draws."""
         even = self.draws.ess > _LEAST_SHARE * len(self.draws.z)
-        return even and self.draws.k_hat < MAX_K_HAT and self.dissent < _MOST_DISSENT
+        return even and self.draws.k_hat < MAX_K_HAT and not self.contradicted
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the points from the prior stand where the draws say that nothing is."""
+        return self.dissent >= _MOST_DISSENT
 
 
 def warm_start(

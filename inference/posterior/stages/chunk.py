@@ -25,13 +25,14 @@ def evaluations(job: Job) -> int:
     return int(3 * _CHUNK_S / _evaluation_s(job))
 
 
-def steps_from(job: Job, done: int, walkers: int) -> int:
+def steps_from(job: Job, done: int, walkers: int, warm: bool) -> int:
     """Return how many steps an ensemble makes in a chunk after those that are done.
 
-    The first ones are what the easiest posterior takes, then a share of those that are done: what
-    is made beyond need is no more than that.
+    The first ones of a warm start are what the easiest posterior takes, then it is a share of those
+    that are done: what is made beyond need is no more than that.
     """
     step_s = _STEP_S + walkers * _evaluation_s(job)
-    wanted = _EASIEST if done == 0 else _GROWTH * done
+    first = _EASIEST if warm else 2 * _EASIEST
+    wanted = first if done == 0 else _GROWTH * done
     most = 2 * _CHUNK_S / step_s
     return int(min(max(min(wanted, most), 20), 500, MOST_STEPS - done))

@@ -69,6 +69,8 @@ class Tempering(_NotBegun):
         None before they are drawn.
     verdict : Verdict
         On what was drawn so far, which is nothing.
+    weighted : WeightedDraws or None
+        Importance draws that points from the prior do not contradict; None where they do.
     """
 
     phase: ClassVar[Phase] = "tempering"
@@ -76,6 +78,7 @@ class Tempering(_NotBegun):
     proposal: Proposal
     populations: tuple[Population | None, ...]
     verdict: Verdict
+    weighted: WeightedDraws | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -130,7 +133,10 @@ class Walking:
         if self.steps and self.ess is not None and self.ess < target_ess:
             wanted = min(self.steps * target_ess / self.ess, MOST_STEPS)
             target = max(math.ceil(wanted), self.steps + 1)
-        return Progress("sampling", self.steps, target, self.ess, self.r_hat, False)
+        ess = self.ess
+        if ess is None and self.steps == 0 and self.weighted is not None:
+            ess = self.weighted.ess  # what an answer would be made of now
+        return Progress("sampling", self.steps, target, ess, self.r_hat, False)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

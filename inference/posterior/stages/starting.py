@@ -115,7 +115,8 @@ def _first_stage(
     calls += warm.calls
     pending = Verdict(False, ("no steps were made",))
     if not warm.fits:
-        return Tempering(proposal, (None,) * POPULATIONS, pending), calls
+        known = None if warm.contradicted else warm.draws
+        return Tempering(proposal, (None,) * POPULATIONS, pending, known), calls
     ensembles = _ensembles(job, density, warm, scouted)
     walking = Walking(warm.proposal, ensembles, pending, adaptations=0, weighted=warm.draws)
     return walking, calls + ensembles[0].walkers * len(ensembles)

@@ -1,0 +1,96 @@
+"""What stands as an answer while populations and ensembles are on their way: weighted draws.
+
+Members of a population at some temperature are draws of the posterior by weight, whose tail is
+smoothed by a Pareto law (Vehtari et al. 2024). Copies of a member say as much as one of them, so
+that the effective sample size counts each place once. Where the shape of the tail says that the
+weights cannot be trusted, or a few places are all there is, nothing stands.
+"""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from inference.posterior.sampling.importance import WeightedDraws, smoothed
+from inference.posterior.sampling.population import Population
+from inference.posterior.sampling.verdict import Verdict
+from inference.posterior.stages.stage import Drawing, Tempering, Walking, Weighted
+
+__all__ = ["standing"]
+
+Array = NDArray[np.float64]
+
+_MOST_K_HAT = 0.7  # above it, not even the smoothed weights have a mean (Vehtari et al. 2024)
+_LEAST_ESS = 50.0  # below it, quantiles of 5 and 95 % are those of two or three draws
+_LEAST_STEPS = 4  # of ensembles, from which on they speak for themselves
+
+
+def standing(stage: Drawing) -> Drawing:
+    """Return what an answer is made of where a job stops at some stage.
+
+    Parameters
+    ----------
+    stage : Drawing
+        Where the job stands.
+
+    Returns
+    -------
+    Drawing
+        `Weighted` where nothing was drawn yet and weighted draws can be trusted; otherwise the
+        stage, with a verdict that says what is wanting.
+    """
+    if not isinstance(stage, Tempering | Walking):
+        return stage
+    if isinstance(stage, Walking) and stage.steps >= _LEAST_STEPS:
+        return stage
+    draws, what = stage.weighted, "importance draws"
+    if isinstance(stage, Tempering) and (draws is None or not _trusted(draws)):
+        members = _of_populations(stage.populations)
+        if members is not None:
+            draws, what = members, "weighted members of populations on their way"
+    if draws is None:
+        return stage
+    said = f"{what}: effective sample size {draws.ess:.0f}, Pareto k-hat {draws.k_hat:.2f}"
+    if not _trusted(draws):
+        reasons = (*stage.verdict.reasons, f"there are {said}: too few, or not to be trusted")
+        return dataclasses.replace(stage, verdict=Verdict(False, reasons))
+    verdict = Verdict(False, (f"no ensemble has walked yet: the answer is made of {said}",))
+    return Weighted(stage.proposal.optima, draws, verdict)
+
+
+def _trusted(draws: WeightedDraws) -> bool:
+    return draws.k_hat <= _MOST_K_HAT and draws.ess >= _LEAST_ESS
+
+
+def _of_populations(populations: tuple[Population | None, ...]) -> WeightedDraws | None:
+    """Return the members of all populations, each population by its effective sample size."""
+    found = [_weighted(each) for each in populations if each is not None and each.steps]
+    if not found:
+        return None
+    sizes = np.array([each.ess for each in found])
+    shares = sizes / sizes.sum()
+    return WeightedDraws(
+        np.concatenate([each.z for each in found]),
+        np.concatenate([each.log_density for each in found]),
+        np.concatenate([share * each.weights for share, each in zip(shares, found, strict=True)]),
+        max(each.k_hat for each in found),
+        float(shares @ [each.log_evidence for each in found]),
+    )
+
+
+def _weighted(population: Population) -> WeightedDraws:
+    """Return the places of a population's members, weighted from its power to the posterior."""
+    _, first, copies = np.unique(population.z, axis=0, return_index=True, return_counts=True)
+    likelihood = population.log_likelihood[first]
+    rest = (1.0 - population.power) * likelihood
+    log_weights, k_hat = smoothed(rest)
+    log_weights = log_weights + np.log(copies)
+    total = float(special.logsumexp(log_weights))
+    return WeightedDraws(
+        population.z[first],
+        likelihood + population.log_prior[first],
+        np.exp(log_weights - total),
+        k_hat,
+        population.log_evidence + total - float(np.log(copies.sum())),
+    )
