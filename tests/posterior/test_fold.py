@@ -60,12 +60,13 @@ def test_progress_ends_where_the_job_ends() -> None:
     assert after.ess >= 50
 
 
-def test_stopped_before_the_first_chunk_nothing_was_drawn_and_no_interval_is_given() -> None:
+def test_stopped_before_the_first_chunk_weighted_draws_are_the_answer() -> None:
     job = fold.prepare(*example("pulsed", crosstalk=False), QUICK)
     posterior = fold.summarise(job, fold.start(job), 0.0, 0.0)
     assert not posterior.verdict.converged
-    assert not posterior.drawn
-    assert np.isnan(posterior.range_m.q50).all()
+    assert posterior.drawn
+    assert posterior.method == "importance"
+    assert np.isfinite(posterior.range_m.q50).all()
 
 
 @pytest.mark.parametrize(
