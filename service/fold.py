@@ -106,11 +106,8 @@ class Fold(Protocol[J, C, T, P]):
         """Return the first checkpoint."""
         ...
 
-    def tasks(self, job: J, checkpoint: C, spent_s: float, /) -> Sequence[T]:
-        """Return the independent pieces of the next chunk; none when finished or out of time.
-
-        The service spends processor time.
-        """
+    def tasks(self, job: J, checkpoint: C, cpu_s: float, /) -> Sequence[T]:
+        """Return the independent pieces of the next chunk; none when finished or out of time."""
         ...
 
     def run(self, task: T, /) -> P:
@@ -125,8 +122,8 @@ class Fold(Protocol[J, C, T, P]):
         """Return steps, target, ess, rhat, finished."""
         ...
 
-    def summarise(self, job: J, checkpoint: C, spent_s: float, cpu_s: float, /) -> Summary:
-        """Return the posterior so far; ``spent_s`` as it was given to ``tasks``."""
+    def summarise(self, job: J, checkpoint: C, wall_s: float, cpu_s: float, /) -> Summary:
+        """Return the posterior so far; ``cpu_s`` as it was given to ``tasks``."""
         ...
 
     def draw(self, job: J, checkpoint: C, /) -> tuple[posterior_job.Job, Draws]:

@@ -21,8 +21,8 @@ from service.fold import C, Fold, J, P, Summary, T
 from service.problems import describe
 from service.store.job_store import JobStore
 from service.store.record import Claimed, JobRecord, Status
-from service.worker import timed
 from simulator.errors import HybridTofError
+from simulator.processor_time import timed
 
 __all__ = ["Runner", "Workers"]
 
@@ -220,15 +220,13 @@ class _Run(Generic[J, C, T, P]):
         if self.checkpoint is None:
             return None
         await self._tell("summarising")
-        # the time that was given to `Fold.tasks` is that of the processor
-        spent = self.cpu_s, self.cpu_s
+        spent = self.record.wall_s, self.cpu_s
         call = _summary, self.runner.fold.summarise, self.job, self.checkpoint, *spent
         try:
             (result,) = await self._execute(call, wanted=True)
         except _CancelledError:
             raise AssertionError("what is wanted is not given up") from None
-        found = dict(result)
-        return found | {"runtime": found["runtime"] | {"wall_s": self.record.wall_s}}
+        return dict(result)
 
     async def _fail(self, problem: dict[str, Any]) -> None:
         """End the job, with what was drawn before it failed."""

@@ -6,15 +6,13 @@ when it is unpickled.
 
 import pickle
 import signal
-import time
-from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
-from service.compile_watch import compiling_s, watch_compiling
 from service.parent_death import end_with_parent
+from simulator.processor_time import watch_compiling
 
-__all__ = ["COMPILING", "THREAD_VARIABLES", "timed", "work"]
+__all__ = ["COMPILING", "THREAD_VARIABLES", "work"]
 
 T = TypeVar("T")
 
@@ -83,23 +81,3 @@ def _portable(error: Exception) -> Exception:
     except Exception:
         return RuntimeError(f"{type(error).__name__}: {error}")
     return error
-
-
-def timed(function: Callable[..., T], *arguments: Any) -> tuple[T, float]:
-    """Run a function and measure it, the making of machine code apart.
-
-    Parameters
-    ----------
-    function : callable
-        What to run.
-    *arguments
-        Its arguments.
-
-    Returns
-    -------
-    tuple
-        The result, and the processor time of this process [s].
-    """
-    before, compiled = time.process_time(), compiling_s()
-    result = function(*arguments)
-    return result, time.process_time() - before - (compiling_s() - compiled)

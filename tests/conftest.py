@@ -8,14 +8,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("HYBRIDTOF_WARM", "off")
 
 
-import itertools
 import sys
-import time
 import uuid
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
+
+from tests.chunk_clock import timed
 
 # folders whose tests compile the same kernels, and the group that they make
 _TOGETHER = {
@@ -55,9 +54,7 @@ def _chunks_for_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
     """
     infer = sys.modules.get("inference.posterior.infer")
     if infer is not None:
-        ticks = itertools.count(0.0, 1.0)
-        clock = SimpleNamespace(perf_counter=ticks.__next__, process_time=time.process_time)
-        monkeypatch.setattr(infer, "time", clock)
+        monkeypatch.setattr(infer, "timed", timed)
 
 
 @pytest.fixture(autouse=True)

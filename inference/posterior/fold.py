@@ -87,18 +87,18 @@ def start(job: Job) -> Checkpoint:
     return begin(job)
 
 
-def tasks(job: Job, checkpoint: Checkpoint, wall_s: float = 0.0) -> tuple[Task, ...]:
+def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float = 0.0) -> tuple[Task, ...]:
     """Return the independent parts of the next chunk; none when the job is finished.
 
     Parameters
     ----------
     job, checkpoint : Job, Checkpoint
         The job and where it stands.
-    wall_s : float
-        Seconds since the job began, by the clock of who runs it; beyond `max_seconds` of the
-        settings no chunk begins. Left out, time plays no part.
+    cpu_s : float
+        Processor time that the job has taken so far [s], compiling apart; beyond `max_seconds` of
+        the settings no chunk begins. Left out, time plays no part.
     """
-    if wall_s >= job.settings.max_seconds:
+    if cpu_s >= job.settings.max_seconds:
         return ()
     match checkpoint.stage:
         case Selecting():

@@ -4,7 +4,6 @@ import functools
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor
-from typing import Any, TypeVar
 
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.fold import (
@@ -20,12 +19,11 @@ from inference.posterior.fold import (
 from inference.posterior.pace import Pace
 from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames
+from simulator.processor_time import timed
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
 __all__ = ["infer"]
-
-R = TypeVar("R")
 
 
 def infer(
@@ -66,24 +64,17 @@ def infer(
     tell(Progress("starting", 0, None, None, None, False))
     settings = SamplerSettings() if settings is None else settings
     job = prepare(sensor, scene, frames, settings)
-    checkpoint, cpu_s = _timed(start, job)
+    checkpoint, cpu_s = timed(start, job)
     wall_s = time.perf_counter() - begin
     reached = progress(job, checkpoint)
     tell(reached)
-    while chunk := tasks(job, checkpoint, wall_s):
-        timed_run = functools.partial(_timed, run)
+    while chunk := tasks(job, checkpoint, cpu_s):
+        timed_run = functools.partial(timed, run)
         done = list(map(timed_run, chunk) if executor is None else executor.map(timed_run, chunk))
-        checkpoint, spent = _timed(merge, job, checkpoint, [piece for piece, _ in done])
+        checkpoint, spent = timed(merge, job, checkpoint, [piece for piece, _ in done])
         cpu_s += spent + sum(seconds for _, seconds in done)
         wall_s = time.perf_counter() - begin
         reached = progress(job, checkpoint)
         pace = Pace.followed(pace, reached, wall_s)
         tell(pace.foretell(reached, wall_s))
     return summarise(job, checkpoint, wall_s, cpu_s)
-
-
-def _timed(function: Callable[..., R], *arguments: Any) -> tuple[R, float]:
-    """Call a function and return the processor time that it took, in whatever process it runs."""
-    begin = time.process_time()
-    result = function(*arguments)
-    return result, time.process_time() - begin

@@ -22,12 +22,11 @@ class SamplerSettings(Validated):
     target_ess : int
         Effective sample size wanted for every parameter.
     max_seconds : float
-        Wall time [s], over HTTP processor time of the chunks [s], after which no chunk begins and
-        an unfinished run is summarised as it is. What
-        has begun is ended first: a chunk of about a second, importance sampling of ten seconds at
-        most, or the search for starting points, which takes a second of processor time for 100
-        frames and half a minute for the most frames and nine unknowns, and several times as long
-        with a discrepancy.
+        Processor time [s], compiling apart, after which no chunk begins and an unfinished run is
+        summarised as it is: the sum over all ensembles, in whatever process they run. What has
+        begun is ended first: a chunk of about a second, importance sampling of ten seconds at
+        most, or the search for starting points, which takes a second for 100 frames and half a
+        minute for the most frames and nine unknowns, and several times as long with a discrepancy.
     seed : int, optional
         Left out: drawn, and returned with the answer.
     """

@@ -193,9 +193,9 @@ def draw(job: Job, checkpoint: Checkpoint) -> tuple[Job, Draws]:
     return drawn.parts[0], drawn.draws
 
 
-def _out_of_time(job: Job, checkpoint: Checkpoint, wall_s: float) -> tuple[str, ...]:
+def _out_of_time(job: Job, checkpoint: Checkpoint, cpu_s: float) -> tuple[str, ...]:
     limit = job.settings.max_seconds
-    if wall_s < limit or checkpoint.stage.progress(job.settings.target_ess).finished:
+    if cpu_s < limit or checkpoint.stage.progress(job.settings.target_ess).finished:
         return ()
     return (f"stopped at the time limit of {limit:g} s",)
 
@@ -222,7 +222,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
         The job and where it stands; where it was stopped before its optional terms were decided,
         all of them are kept.
     wall_s, cpu_s : float
-        What it has cost so far [s]; the wall time as it was given to `tasks`.
+        What it has cost so far [s]; the processor time as it was given to `tasks`.
 
     Returns
     -------
@@ -235,7 +235,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
         found = without_draws(drawn.job, drawn.density, stage)
     else:
         found = _of_draws(drawn, drawn.whole)
-    reasons = (*_out_of_time(job, checkpoint, wall_s), *found.reasons)
+    reasons = (*_out_of_time(job, checkpoint, cpu_s), *found.reasons)
     return Posterior(
         Checkpoint(stage, drawn.calls).method,
         job.seed,

@@ -2,6 +2,7 @@
 
 import asyncio
 import itertools
+import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -16,6 +17,7 @@ from inference.posterior.settings import SamplerSettings
 from service.jobs import Jobs
 from service.store.sql_store import Retention, SqlJobStore
 from simulator.scene import parse_scene
+from tests.chunk_clock import timed
 from tests.posterior.scenes import UNKNOWN_CROSSTALK, data, example, sensor_of
 
 R = TypeVar("R")
@@ -23,19 +25,11 @@ OUT_OF_TIME = "stopped at the time limit of {} s"
 
 
 class _Clock:
-    """A module `time` whose every reading is a second after the one before."""
+    """A module `time` by whose clock of a thread, which merges, every reading is a second later."""
 
     def __init__(self) -> None:
-        seconds = itertools.count().__next__
-        self.perf_counter: Callable[[], float] = seconds
-        self.monotonic: Callable[[], float] = seconds
-        self.process_time: Callable[[], float] = lambda: 0.0
-        self.thread_time: Callable[[], float] = seconds
-
-
-def _timed(function: Callable[..., R], *arguments: Any) -> tuple[R, float]:
-    """Let the start cost a second, and of a chunk nothing but its merging."""
-    return function(*arguments), float(function is fold.start)
+        self.monotonic = time.monotonic
+        self.thread_time: Callable[[], float] = itertools.count().__next__
 
 
 class _Threads(ThreadPoolExecutor):
@@ -66,8 +60,7 @@ async def _by_jobs(path: Path, request: Any, settings: SamplerSettings) -> dict[
     return record.result
 
 
-# of a call one reading at the beginning, one after the start and one after every chunk; the service
-# counts processor time: a second for the start, and one for every chunk
+# a second for the start, and one for every chunk
 @pytest.mark.parametrize("max_seconds", [1.0, 2.5, 1000.0])
 @pytest.mark.parametrize("optional", [False, True])
 def test_the_same_answer_from_a_call_and_from_the_service(
@@ -79,10 +72,9 @@ def test_the_same_answer_from_a_call_and_from_the_service(
     request = sensor, parse_scene({"crosstalk": crosstalk}), frames
     target = 1_000_000 if max_seconds < 100 else 50
     settings = SamplerSettings(seed=7, target_ess=target, max_seconds=max_seconds)
-    monkeypatch.setattr(inference.posterior.infer, "time", _Clock())
     called = inference.posterior.infer.infer(*request, settings).to_json()
     monkeypatch.setattr(service.job_runner, "time", _Clock())
-    monkeypatch.setattr(service.job_runner, "timed", _timed)
+    monkeypatch.setattr(service.job_runner, "timed", timed)
     served = asyncio.run(_by_jobs(tmp_path, request, settings))
     assert called.pop("runtime").keys() == served.pop("runtime").keys()
     assert called == served

@@ -184,7 +184,7 @@ def test_background_cancelling_three_roots_and_the_filter_that_leaves_one() -> N
     check(every, [0.0967908097246, 0.277915074546, 0.3])
     check(estimate(pulsed(), target, frames, ["background_cancelling"]).results[0], [0.3])
     # light that the object model misses by a few percent may be what the other one lacks
-    erring = target.model_copy(update={"discrepancy": "default"})
+    erring = target.model_copy(update={"discrepancy": 0.11})
     wide = estimate(pulsed(), erring, frames, ["background_cancelling"]).results[0]
     check(wide, [0.277915074546, 0.3])
 

@@ -113,8 +113,8 @@ def start(job: Job) -> Checkpoint:
     return Checkpoint(0, (0.0,) * job.settings.ensembles)
 
 
-def tasks(job: Job, checkpoint: Checkpoint, spent_s: float) -> tuple[Task, ...]:
-    if checkpoint.chunk == CHUNKS or spent_s >= job.settings.max_seconds:
+def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float) -> tuple[Task, ...]:
+    if checkpoint.chunk == CHUNKS or cpu_s >= job.settings.max_seconds:
         return ()
     assert job.settings.seed is not None
     return tuple(
@@ -168,9 +168,9 @@ def progress(_: Job, checkpoint: Checkpoint) -> Progress:
     return Progress(phase, done * STEPS, CHUNKS * STEPS, 10.0 * done, rhat, done == CHUNKS)
 
 
-def summarise(job: Job, checkpoint: Checkpoint, spent_s: float, cpu_s: float) -> Posterior:
+def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> Posterior:
     finished = checkpoint.chunk == CHUNKS
-    reason = "too few steps" if spent_s < job.settings.max_seconds else "out of time"
+    reason = "too few steps" if cpu_s < job.settings.max_seconds else "out of time"
     summary: dict[str, Any] = {
         "mean": checkpoint.sums[0],
         "sd": 1.0,
@@ -204,7 +204,7 @@ def summarise(job: Job, checkpoint: Checkpoint, spent_s: float, cpu_s: float) ->
                 "outliers": [],
             },
             "left_out": [],
-            "runtime": {"wall_s": spent_s, "cpu_s": cpu_s, "likelihood_calls": 1, "k_hat": None},
+            "runtime": {"wall_s": wall_s, "cpu_s": cpu_s, "likelihood_calls": 1, "k_hat": None},
         }
     )
 

@@ -1,12 +1,14 @@
-"""Notices when kernels are compiled in this process, and what that takes."""
+"""Processor time of what is computed, apart from that of compiling kernels."""
 
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from simulator.compiled import given_up_s, when_compiling
 
-__all__ = ["compiling_s", "watch_compiling"]
+__all__ = ["compiling_s", "timed", "watch_compiling"]
+
+T = TypeVar("T")
 
 _EVENT = "numba:compile"  # kernels whose machine code was found on the disk are not in it
 
@@ -48,6 +50,10 @@ def watch_compiling(tell: Callable[[bool], None]) -> None:
         Gets True at the beginning and False at the end; takes the place of the one before.
     """
     _watch.tell = tell
+    _watch_from_now()
+
+
+def _watch_from_now() -> None:
     if not _watch.listening:
         _watch.listening = True
         when_compiling(_listen)
@@ -74,3 +80,24 @@ def compiling_s() -> float:
     With it what was tried without a compiler, in vain.
     """
     return _watch.seconds + given_up_s()
+
+
+def timed(function: Callable[..., T], *arguments: Any) -> tuple[T, float]:
+    """Run a function and measure it, the making of machine code apart.
+
+    Parameters
+    ----------
+    function : callable
+        What to run.
+    *arguments
+        Its arguments.
+
+    Returns
+    -------
+    tuple
+        The result, and the processor time of this process [s].
+    """
+    _watch_from_now()
+    before, compiled = time.process_time(), compiling_s()
+    result = function(*arguments)
+    return result, time.process_time() - before - (compiling_s() - compiled)
