@@ -86,9 +86,9 @@ def _glass(above: Axes, below: Axes, episode: Episode) -> None:
     _label(above, words, (0.03, 0.95), _COLOURS["posterior"])
     _label(above, "grey line: the truth", (0.70, 0.52), _TRUTH)
     below.axhline(0, color=_TRUTH, lw=1.2, zorder=0)
-    below.set(xlabel="true range [m]", ylabel="error [% of the range]", ylim=(-4, 4))
+    below.set(xlabel="true range [m]", ylabel="error [% of the range]", ylim=(-9, 9))
     _label(below, "posterior, with 90 % intervals", (0.03, 0.95), _COLOURS["posterior"])
-    _label(below, "joint_fit, the same at once", (0.03, 0.16), _COLOURS["joint_fit"])
+    _label(below, "joint_fit, the same at once", (0.03, 0.14), _COLOURS["joint_fit"])
 
 
 def _phases(axes: Axes, episode: Episode) -> None:
