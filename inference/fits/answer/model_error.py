@@ -90,12 +90,16 @@ class Response:
 
     def chi_square_of_frames(self, of_x: Array) -> Array:
         """Return the chi-square of each frame, errors that x does not follow allowed for, (n,)."""
+        if self.exact:
+            return np.asarray(np.einsum("ni,ni->n", self.residual, self.residual))
         # followed to first order: a share of their size may be left besides
         parts = [self.errors - self.jacobian @ of_x, np.sqrt(self.share) * self.errors]
         errors = np.concatenate(parts, axis=2)
-        spread = np.eye(2) + errors @ errors.transpose(0, 2, 1)
-        left = np.linalg.solve(spread, self.residual[:, :, None])[:, :, 0]
-        return np.asarray(np.einsum("ni,ni->n", self.residual, left))
+        told = np.isfinite(errors).all(axis=(1, 2))
+        # by singular values: beside errors of 1e8 the noise's covariance of 1 would be lost
+        u, s, _ = np.linalg.svd(np.where(told[:, None, None], errors, 0.0), full_matrices=False)
+        left = np.einsum("nij,ni->nj", u, self.residual) / np.hypot(1.0, s)
+        return np.where(told, np.einsum("nj,nj->n", left, left), np.nan)
 
     def taken_of_frames(self, of_x: Array) -> Array:
         """Return what errors of the model take off the chi-square of each frame, shape (n,)."""
