@@ -19,6 +19,7 @@ __all__ = [
     "DISCREPANCY_LENGTH",
     "DISCREPANCY_SD",
     "NEGLECTED",
+    "SLOPE_SD",
     "DiscrepancyBasis",
     "discrepancy_basis",
     "matern",
@@ -30,6 +31,8 @@ Array = NDArray[np.float64]
 DISCREPANCY_LENGTH = 1.0
 # 3.046 % of misfit left by a fit ("all" of `simulator.optics.misfit_table`), 0.425 of the whole
 DISCREPANCY_SD = 0.072
+# of the slope of the process along log r, in units of its own
+SLOPE_SD = math.sqrt(5.0 / 3.0) / DISCREPANCY_LENGTH
 
 _SPACING = 0.05  # of the knots, in lengths: cubics between them err by 1e-6 of a path
 NEGLECTED = 1e-4
@@ -102,18 +105,20 @@ class DiscrepancyBasis:
 
 
 @functools.lru_cache(maxsize=16)
-def discrepancy_basis(low: float, high: float) -> DiscrepancyBasis:
+def discrepancy_basis(low: float, high: float, neglected: float = NEGLECTED) -> DiscrepancyBasis:
     """Make the basis for ranges between two bounds.
 
     Parameters
     ----------
     low, high : float
         [m], ``high`` positive.
+    neglected : float
+        Share of the variance that may be left out.
 
     Returns
     -------
     DiscrepancyBasis
-        As many functions as leave out a ten thousandth of the variance.
+        As few functions as leave out no more.
     """
     last = math.log(high)
     first = max(math.log(low), last - _LONGEST) if low > 0 else last - _LONGEST
@@ -124,7 +129,7 @@ def discrepancy_basis(low: float, high: float) -> DiscrepancyBasis:
     values, vectors = values[::-1], vectors[:, ::-1]
     # eigenvectors are known but for their signs, and draws must be the same everywhere
     vectors = vectors * np.where(vectors[0] < 0.0, -1.0, 1.0)
-    size = int(np.searchsorted(np.cumsum(values), (1.0 - NEGLECTED) * count)) + 1
+    size = int(np.searchsorted(np.cumsum(values), (1.0 - neglected) * count)) + 1
     values, vectors = values[:size], vectors[:, :size]
     knots = np.empty((count, 2, size))
     knots[:, 0] = vectors * np.sqrt(values)

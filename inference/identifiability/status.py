@@ -18,7 +18,7 @@ identified below 0.05, not identified from 0.3 on.
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,7 @@ __all__ = [
     "is_positive",
     "spread_of_fit",
     "status_of",
+    "weak_at_best",
 ]
 
 Array = NDArray[np.float64]
@@ -94,6 +95,16 @@ def status_of(parameter: str, spread: float) -> str:
     if spread < (NARROW_SCALE if scale else NARROW_SPREAD):
         return "identified"
     return "weak" if spread < (WIDE_SCALE if scale else WIDE_SPREAD) else "not_identified"
+
+
+def weak_at_best(rows: Iterable[Identifiability], because: str) -> tuple[Identifiability, ...]:
+    """Return rows of which none is `identified`: those that were are `weak`, and say why."""
+    return tuple(
+        dataclasses.replace(row, status="weak", reason=f"{row.reason}, {because}")
+        if row.status == "identified"
+        else row
+        for row in rows
+    )
 
 
 def contraction_of(spread: float) -> float:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.identifiability.after_data import statuses_of_draws
-from inference.identifiability.status import Identifiability
+from inference.identifiability.status import Identifiability, weak_at_best
 from inference.posterior.answer.draws import Draws, draws_of
 from inference.posterior.answer.error_parts import ErrorParts
 from inference.posterior.answer.folds import near_fold
@@ -109,22 +109,6 @@ def _judged(job: Job, density: CollapsedDensity, whole: Whole) -> tuple[Identifi
     rows = with_model_part(rows, whole.scale_error, whole.spread.scale, whole.budget.curvature)
     rows = mark_sensitive(density.parameters.names, rows, whole.sensitivity)
     return mark_dark(density, rows, chosen, log_r)
-
-
-def _settled(
-    rows: tuple[Identifiability, ...], reasons: tuple[str, ...]
-) -> tuple[Identifiability, ...]:
-    """Call nothing identified by draws that there is a reason not to believe."""
-    if not reasons:
-        return rows
-    return tuple(
-        dataclasses.replace(
-            row, status="weak", reason=f"{row.reason}, by draws that have not converged"
-        )
-        if row.status == "identified"
-        else row
-        for row in rows
-    )
 
 
 def _of_all_frames(job: Job, shares: ErrorParts) -> ErrorParts:
@@ -236,6 +220,9 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
     else:
         found = _of_draws(drawn, drawn.whole)
     reasons = (*_out_of_time(job, checkpoint, cpu_s), *found.reasons)
+    rows = found.identifiability
+    if sample.drawn and reasons:
+        rows = weak_at_best(rows, "by draws that have not converged")
     return Posterior(
         Checkpoint(stage, drawn.calls).method,
         job.seed,
@@ -244,7 +231,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
         found.parameters,
         mode_summary(drawn.density, stage, sample),
         found.range_m,
-        _settled(found.identifiability, reasons) if sample.drawn else found.identifiability,
+        rows,
         found.fit,
         _left_out(job.scene, checkpoint.selection),
         Runtime(wall_s, cpu_s, drawn.calls, found.k_hat),

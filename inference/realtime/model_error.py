@@ -10,15 +10,12 @@ from inference.realtime.solving.curves import dispatch
 from inference.realtime.solving.curves.curve import CurveParameters
 from inference.technique import Task
 from simulator.compiled import compiled
-from simulator.discrepancy import DISCREPANCY_LENGTH
+from simulator.discrepancy import SLOPE_SD
 from simulator.model_error import ModelError
 
-__all__ = ["SLOPE_SD", "PointError", "model_error_of", "point_error", "sd_of_roots"]
+__all__ = ["PointError", "model_error_of", "point_error", "sd_of_roots"]
 
 Array = NDArray[np.float64]
-
-# of the slope of a Matern 5/2 process along log r, in units of its own and of its length
-SLOPE_SD = math.sqrt(5.0 / 3.0) / DISCREPANCY_LENGTH
 
 
 class PointError(NamedTuple):

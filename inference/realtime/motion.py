@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.realtime.model_error import SLOPE_SD
 from inference.realtime.net import Net
 from simulator.compiled import compiled
+from simulator.discrepancy import SLOPE_SD
 from simulator.object_model import log_slope
 from simulator.sensor import PulsedSensor, Sensor
 

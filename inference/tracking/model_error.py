@@ -1,62 +1,32 @@
 """What smooth errors of the model do to what a tracker reads (docs/model.md, model-error)."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.frame.delayed import delayed
 from inference.tracking.observed import Observed
 from inference.tracking.tabulate import MEAN, OBJECT, OBJECT_SLOPE, SLOPE, Knots, means_over
-from simulator.discrepancy import DISCREPANCY_LENGTH, matern
+from simulator.discrepancy import SLOPE_SD, discrepancy_basis
 from simulator.model_error import ModelError
 from simulator.parameters import Terms
-from simulator.sensor import PulsedSensor, Sensor
+from simulator.sensor import PulsedSensor, Sensor, instrument
 
-__all__ = ["model_changes", "principal_shapes", "sd_by_derivatives"]
+__all__ = ["model_changes", "sd_by_derivatives"]
 
 Array = NDArray[np.float64]
 
-_SLOPE = math.sqrt(5.0 / 3.0) / DISCREPANCY_LENGTH  # sd of a Matern 5/2 process' slope over its own
+_NEGLECTED = 1e-3  # of the variance: every function is another state of the filter
 _WIDEST = 10.0  # of log r: nothing is known
 
 
-def principal_shapes(positions: Array, sd: float) -> Array:
-    """Return the principal shapes of a smooth error along the range.
-
-    Its covariance is `simulator.discrepancy.matern`. The shapes hold all but a thousandth of its
-    variance.
-
-    Parameters
-    ----------
-    positions : ndarray, shape (n,)
-        u = log r.
-    sd : float
-        Standard deviation of the error.
-
-    Returns
-    -------
-    ndarray, shape (k, n)
-    """
-    nodes = np.linspace(positions[0], positions[-1], 200)
-    values, vectors = np.linalg.eigh(matern(nodes[:, None] - nodes))
-    values, vectors = values[::-1], vectors[:, ::-1]
-    kept = int(np.searchsorted(np.cumsum(values), 0.999 * values.sum())) + 1
-    shapes = sd * np.sqrt(values[:kept]) * vectors[:, :kept]
-    return np.array([np.interp(positions, nodes, shape) for shape in shapes.T])
-
-
-def _by_delay(sensor: Sensor, light: Array, positions: Array) -> Array:
-    """Return the change of an object's readings with its effective distance, shape (n, 2) [1/m].
-
-    Linear in the readings of a wave and in the light of a pulse, so that slopes go in as well.
-    """
-    if isinstance(sensor, PulsedSensor):
-        return np.column_stack([light[:, 1] / sensor.r0, np.zeros(positions.size)])
-    return sensor.wave_number * np.column_stack([-light[:, 1], light[:, 0]])
+def _shapes(positions: Array, sd: float) -> Array:
+    """Return the functions of a smooth error along the range, shape (k, n), in ascending u."""
+    low, high = np.exp(positions[[0, -1]]).tolist()
+    return sd * discrepancy_basis(low, high, _NEGLECTED).values(positions).T
 
 
 def model_changes(sensor: Sensor, error: ModelError, knots: Knots, scale: Array) -> list[Array]:
-    """Return what every principal shape of the model's errors does to the readings.
+    """Return what every function of the model's errors does to the readings.
 
     Parameters
     ----------
@@ -77,14 +47,14 @@ def model_changes(sensor: Sensor, error: ModelError, knots: Knots, scale: Array)
     light = knots.means[:, OBJECT]
     changes = []
     if error.flux > 0:
-        changes += [light * s[:, None] for s in principal_shapes(knots.positions, error.flux)]
+        changes += [light * s[:, None] for s in _shapes(knots.positions, error.flux)]
     if error.range_m > 0:
         with np.errstate(divide="ignore", invalid="ignore"):
             raw = np.where(scale > 0, light / scale, 0.0)
         if isinstance(sensor, PulsedSensor) and not scale[1] > 0:
             raw[:, 1] = raw[:, 0] * sensor.r0 / np.exp(knots.positions)
-        delayed = _by_delay(sensor, raw, knots.positions) * scale
-        changes += [delayed * s[:, None] for s in principal_shapes(knots.positions, error.range_m)]
+        late = delayed(raw, knots.positions, *instrument(sensor)) * scale
+        changes += [late * s[:, None] for s in _shapes(knots.positions, error.range_m)]
     return changes
 
 
@@ -117,12 +87,12 @@ def sd_by_derivatives(
     rates = means_over(knots.positions, sensor, terms, True)
     along, bend = rates[:, MEAN], rates[:, SLOPE]
     light, change = plain[:, OBJECT], plain[:, OBJECT_SLOPE]
-    delayed = _by_delay(sensor, light, knots.positions)
+    at = knots.positions, *instrument(sensor)
     parts = (
         (error.beside_numbers().flux, change),
-        (error.flux * _SLOPE, light),
-        (error.range_m, _by_delay(sensor, change, knots.positions)),
-        (error.range_m * _SLOPE, delayed),
+        (error.flux * SLOPE_SD, light),
+        (error.range_m, delayed(change, *at)),
+        (error.range_m * SLOPE_SD, delayed(light, *at)),
     )
     with np.errstate(all="ignore"):
         turn = _cross(along, bend)

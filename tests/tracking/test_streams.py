@@ -11,12 +11,11 @@ from scipy import stats
 
 from inference.estimate import estimate
 from inference.estimates import Status
-from inference.tracking.model_error import principal_shapes
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import state_from_bytes
 from inference.tracking.track import step, track
 from inference.tracking.tracker import tracker
-from simulator.discrepancy import DISCREPANCY_SD
+from simulator.discrepancy import DISCREPANCY_SD, discrepancy_basis
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.model_error import FITTED_SHARE, RANGE_ERROR_SD
@@ -198,11 +197,11 @@ def test_a_smooth_discrepancy_widens_and_stays() -> None:
     assert result.best_sd_m[-1] > 3 * known.best_sd_m[-1]
     assert result.sd_parts_m.model[-1] > 0.5 * result.best_sd_m[-1]
     positions = np.linspace(np.log(0.1), np.log(3.0), 50)
-    shapes = principal_shapes(positions, 0.05)
+    shapes = 0.05 * discrepancy_basis(0.1, 3.0, 1e-3).values(positions)
     lag = np.sqrt(5.0) * np.abs(positions[:, None] - positions[None, :])
     wanted = 0.05**2 * (1 + lag + lag**2 / 3) * np.exp(-lag)
     # a thousandth of the variance is left out, more of it at the ends
-    assert np.abs(shapes.T @ shapes - wanted).max() < 0.02 * 0.05**2
+    assert np.abs(shapes @ shapes.T - wanted).max() < 0.02 * 0.05**2
 
 
 @pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])

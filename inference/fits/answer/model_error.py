@@ -17,6 +17,7 @@ from inference.fits.likelihood.arguments import CROSSTALK, SLOTS
 from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.linearisation import whitened_slopes
 from inference.fits.likelihood.problem import FitProblem
+from inference.frame.delayed import delayed
 from inference.frame.sensitivity import Value
 from inference.identifiability.elimination import eliminate
 from inference.identifiability.information import Information
@@ -166,12 +167,7 @@ def errors_of_readings(
 
 def _moved(problem: FitProblem, light: Array, positions: Array, functions: Array) -> Array:
     """Return light of which flux and effective distance err by functions, shape (n, 2, k)."""
-    late, wave = np.zeros_like(light), problem.instrument.wave
-    if wave is None:  # the late window, which holds no more than the whole pulse
-        r0 = problem.instrument.r0
-        late[:, 0] = np.where(positions < np.log(r0), light[:, 1] / r0, 0.0)
-    else:
-        late[:, 0], late[:, 1] = -wave[0] * light[:, 1], wave[0] * light[:, 0]
+    late = delayed(light, positions, problem.instrument.r0, problem.instrument.wave)
     parts = [problem.error.flux * light, problem.error.range_m * late]
     return np.concatenate([part[:, :, None] * functions[:, None, :] for part in parts], axis=2)
 

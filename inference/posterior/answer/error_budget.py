@@ -219,7 +219,14 @@ def error_budget(
         log_r[chosen],
         of_z,
         of_log_r,
-        *_parts(z, log_r, responses, (of_z, of_log_r), integrated=larger is not None),
+        *_parts(
+            z,
+            log_r,
+            responses,
+            (of_z, of_log_r),
+            integrated=larger is not None,
+            leaning=sensitivity is not None,
+        ),
         curvature,
     )
 
@@ -264,24 +271,28 @@ def _parts(
     moved: tuple[Array, Array],
     *,
     integrated: bool,
+    leaning: bool,
 ) -> tuple[ErrorParts, ErrorParts]:
-    """Divide the variance of z and of log r."""
+    """Divide the variance of z and of log r; what rests on the law of the ranges is the scene's."""
     mean = {
         name: np.mean(np.square([getattr(each, name) for each in responses]), axis=0)
         for name in ("own", "alone", "shared", "sd")
     }
-    response = [np.square(part[:, :, 1:]).sum(axis=2).mean(axis=0) for part in moved]
+    last = -1 if leaning else None
     found = []
-    for values, own, shared, added in (
-        (z, mean["alone"], mean["sd"] - mean["alone"], response[0]),
-        (log_r, mean["own"], mean["shared"], response[1]),
+    for values, own, shared, part in (
+        (z, mean["alone"], mean["sd"] - mean["alone"], moved[0]),
+        (log_r, mean["own"], mean["shared"], moved[1]),
     ):
+        added = np.square(part[:, :, 1:last]).sum(axis=2).mean(axis=0)
+        of_law = np.square(part[:, :, last:]).sum(axis=2).mean(axis=0) if leaning else 0.0
         variance = values.var(axis=0)
         first = np.fmin(own, variance)
         scene = variance - first
         if integrated:  # the draws have the error: what an exact model would leave is the scene's
             scene = np.clip(shared, 0.0, scene)
         model = variance - first - scene + added
+        scene = scene + of_law
         whole = first + scene + model
         unit = np.where(whole > 0, whole, 1.0)
         found.append(ErrorParts(*(np.sqrt(part / unit) for part in (first, scene, model))))

@@ -20,7 +20,7 @@ class ErrorParts:
         Of the frame's noise, everything that frames share being known; of a parameter with all
         other unknowns known.
     scene : ndarray, shape (n,)
-        Of what all frames share and is not known.
+        Of what all frames share and is not known, and of what rests on the law of the ranges.
     model : ndarray, shape (n,)
         Of the errors of flux and effective distance that the scene allows for.
     """

@@ -6,7 +6,7 @@ far from believing it is a finding of the model, of which the prior is a part.
 
 import dataclasses
 
-from inference.identifiability.status import Identifiability
+from inference.identifiability.status import Identifiability, weak_at_best
 from inference.posterior.answer.posterior import Fit
 
 __all__ = ["contradicted"]
@@ -36,9 +36,4 @@ def contradicted(
         return fit, rows
     fit = dataclasses.replace(fit, misfit=True, reasons=(*fit.reasons, *conflicts))
     because = f"but the data contradict a prior ({conflicts[0]})"
-    return fit, tuple(
-        dataclasses.replace(row, status="weak", reason=f"{row.reason}, {because}")
-        if row.status == "identified"
-        else row
-        for row in rows
-    )
+    return fit, weak_at_best(rows, because)

@@ -5,15 +5,13 @@ other unknowns depends on how ranges are supposed to be spread out there, which 
 leaves open (docs/model.md, reference-prior).
 """
 
-import dataclasses
-
 import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.frame.range_prior import LEAST_INFORMATION
 from inference.identifiability.experiment import Experiment
-from inference.identifiability.status import Identifiability
+from inference.identifiability.status import Identifiability, weak_at_best
 from simulator.scene import Reference
 
 __all__ = ["mark_dark"]
@@ -59,13 +57,8 @@ def mark_dark(
     if not dark > _MANY * present.sum():
         return rows
     reason = (
-        f", but {dark} of {int(present.sum())} frames tell their range to worse than a fifth of "
+        f"but {dark} of {int(present.sum())} frames tell their range to worse than a fifth of "
         "itself, and what so many say together rests on where ranges in the dark are supposed to "
         "lie: leave these frames out, or measure with more light"
     )
-    return tuple(
-        dataclasses.replace(row, status="weak", reason=row.reason + reason)
-        if row.status == "identified"
-        else row
-        for row in rows
-    )
+    return weak_at_best(rows, reason)

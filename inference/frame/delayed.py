@@ -1,0 +1,36 @@
+"""What an error of the effective distance does to an object's readings."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.frame.arguments import Pair
+
+__all__ = ["delayed"]
+
+Array = NDArray[np.float64]
+
+
+def delayed(light: Array, log_r: Array, r0: float, wave: Pair | None) -> Array:
+    """Return the change of an object's readings with the distance that its light seems to come.
+
+    Linear in the light, so that of its slopes or rates it is the change of these.
+
+    Parameters
+    ----------
+    light : ndarray, shape (n, 2)
+        The object's part of the readings; of a pulse w2 alone counts.
+    log_r : ndarray, shape (n,)
+        nan for a frame without object.
+    r0, wave
+        As in `inference.frame.arguments.Instrument`.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        In the unit of ``light`` per metre.
+    """
+    if wave is not None:
+        return wave[0] * np.column_stack([-light[:, 1], light[:, 0]])
+    # the late window holds no more than the whole pulse
+    late = np.where(log_r < np.log(r0), light[:, 1] / r0, 0.0)
+    return np.column_stack([late, np.zeros(log_r.size)])
