@@ -118,9 +118,12 @@ def write_keys(path: Path, keys: tuple[Key, ...]) -> None:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         # made with mode 0600
         descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name)
-        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(name).replace(path)
+        try:
+            with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+                file.write(text)
+            Path(name).replace(path)
+        finally:
+            Path(name).unlink(missing_ok=True)  # on a full disk a part of it
     except OSError as error:
         raise InvalidInputError.at(POINTER, f"{path} cannot be written: {error.strerror}") from None
 

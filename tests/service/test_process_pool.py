@@ -140,3 +140,4 @@ def test_end_does_not_wait_for_a_task() -> None:
 
 def test_unused_pool_ends() -> None:
     ProcessPool(2).shutdown()
+    assert not multiprocessing.active_children()
