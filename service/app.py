@@ -23,7 +23,8 @@ from service.routes import ROUTERS
 from service.service_settings import ServiceSettings
 from service.shared import Shared
 from service.store.database import default_url
-from service.store.sql_store import Retention, SqlJobStore
+from service.store.retention import Retention
+from service.store.sql_store import SqlJobStore
 from service.warm.warming import Warming
 
 __all__ = ["create_app"]

@@ -108,7 +108,8 @@ async def _infer(
     from inference.posterior import fold
     from service.jobs import Jobs
     from service.process_pool import ProcessPool
-    from service.store.sql_store import Retention, SqlJobStore
+    from service.store.retention import Retention
+    from service.store.sql_store import SqlJobStore
 
     with TemporaryDirectory(prefix="hybridtof-") as folder:
         store = SqlJobStore(f"sqlite:///{folder}/jobs.sqlite", Retention(jobs=1))

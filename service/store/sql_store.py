@@ -12,13 +12,14 @@ import sqlalchemy as sa
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.errors import BusyError, IdempotencyError, StoreError
+from service.errors import IdempotencyError, StoreError
 from service.store.database import brief, engine_of, is_sqlite, ready
 from service.store.holder import has_ended
-from service.store.record import FINISHED, QUEUED, Claimed, JobRecord, NewJob, Status
+from service.store.record import QUEUED, Claimed, JobRecord, NewJob, Status
+from service.store.retention import Retention, drop_draws, forget, make_room
 from service.store.tables import CHECKPOINT, JOB, SERVED
 
-__all__ = ["Retention", "SqlJobStore"]
+__all__ = ["SqlJobStore"]
 
 _LEASE_S = 15.0
 _BRIEF = tuple(
@@ -27,25 +28,6 @@ _BRIEF = tuple(
     if field.name not in ("result", "problem")
 )
 _ALL = (*_BRIEF, JOB.c.result, JOB.c.problem)
-
-
-@dataclasses.dataclass(frozen=True, slots=True)
-class Retention:
-    """What is kept of jobs that have ended; the oldest go first.
-
-    Attributes
-    ----------
-    jobs : int
-        Jobs, unfinished ones included.
-    draws_bytes : int
-        Bytes of the checkpoints of finished jobs, from which draws are made.
-    age_s : float
-        Seconds since the end.
-    """
-
-    jobs: int
-    draws_bytes: int = 2**30
-    age_s: float = 30 * 86_400.0
 
 
 def _text(value: dict[str, Any] | None) -> str | None:
@@ -121,7 +103,7 @@ class SqlJobStore:
             known = self._of_key(connection, job)
             if known is not None:
                 return known
-            self._make_room(connection, job.client)
+            make_room(connection, self._retention, job.client)
             row = dataclasses.asdict(job) | {
                 "status": "queued",
                 "cancel_requested": False,
@@ -151,32 +133,6 @@ class SqlJobStore:
         if row.digest != job.digest:
             raise IdempotencyError("the key came before with another request")
         return SqlJobStore._one(connection, row.id)
-
-    def _make_room(self, connection: sa.Connection, client: str) -> None:
-        """Forget what has ended of the client that has most; refuse one that fills half of it all.
-
-        Where there are no keys there is one client, which may fill it all.
-        """
-        waiting = (JOB.c.client == client, JOB.c.ended.is_(None))
-        own = connection.scalar(sa.select(sa.func.count()).select_from(JOB).where(*waiting)) or 0
-        if client and own >= max(1, self._retention.jobs // 2):
-            raise BusyError(f"{own} posteriors of this key are waiting or running")
-        count = connection.scalar(sa.select(sa.func.count()).select_from(JOB)) or 0
-        surplus = count - self._retention.jobs + 1
-        if surplus <= 0:
-            return
-        counts = sa.select(JOB.c.client, sa.func.count().label("jobs")).group_by(JOB.c.client)
-        most = counts.subquery()
-        oldest = (
-            sa.select(JOB.c.sequence)
-            .join(most, most.c.client == JOB.c.client)
-            .where(JOB.c.ended.is_not(None))
-            .order_by(most.c.jobs.desc(), JOB.c.sequence)
-        )
-        going = connection.scalars(oldest.limit(surplus)).all()
-        if len(going) < surplus:
-            raise BusyError(f"{self._retention.jobs} posteriors are waiting or running")
-        connection.execute(sa.delete(JOB).where(JOB.c.sequence.in_(going)))
 
     @staticmethod
     def _one(connection: sa.Connection, job_id: str) -> JobRecord:
@@ -355,7 +311,7 @@ class SqlJobStore:
                 holder=None,
                 held_until=0.0,
             )
-            self._drop_draws(connection)
+            drop_draws(connection, self._retention)
             return after
 
     def restart(self, record: JobRecord, version: str) -> JobRecord | None:
@@ -393,27 +349,7 @@ class SqlJobStore:
     def sweep(self) -> None:
         """See `JobStore.sweep`."""
         with self._write() as connection:
-            old = JOB.c.ended < self._clock() - self._retention.age_s
-            connection.execute(sa.delete(JOB).where(old))
-            self._drop_draws(connection)
-
-    def _drop_draws(self, connection: sa.Connection) -> None:
-        """Forget the checkpoints of the oldest jobs that have ended, where they are too many."""
-        finished = JOB.c.status.in_(sorted(FINISHED))
-        sizes = connection.execute(
-            sa.select(JOB.c.id, JOB.c.size)
-            .where(finished, JOB.c.size > 0)
-            .order_by(JOB.c.sequence.desc())
-        ).all()
-        kept, going = 0, []
-        for job_id, size in sizes:
-            kept += size
-            if kept > self._retention.draws_bytes:
-                going.append(job_id)
-        if going:
-            gone = CHECKPOINT.c.job_id.in_(going)
-            connection.execute(sa.delete(CHECKPOINT).where(gone))
-            connection.execute(sa.update(JOB).where(JOB.c.id.in_(going)).values(size=0))
+            forget(connection, self._retention, self._clock())
 
     def close(self) -> None:
         """See `JobStore.close`."""

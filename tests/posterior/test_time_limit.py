@@ -15,7 +15,8 @@ import service.job_runner
 from inference.posterior import fold
 from inference.posterior.settings import SamplerSettings
 from service.jobs import Jobs
-from service.store.sql_store import Retention, SqlJobStore
+from service.store.retention import Retention
+from service.store.sql_store import SqlJobStore
 from simulator.scene import parse_scene
 from tests.chunk_clock import timed
 from tests.posterior.scenes import UNKNOWN_CROSSTALK, data, example, sensor_of

@@ -15,7 +15,8 @@ from service.errors import BusyError, IdempotencyError, NotFoundError, StoreErro
 from service.jobs import Jobs
 from service.process_pool import ProcessPool
 from service.store.record import QUEUED, JobRecord
-from service.store.sql_store import Retention, SqlJobStore
+from service.store.retention import Retention
+from service.store.sql_store import SqlJobStore
 from simulator.frames import Frames, frames_from_columns
 from simulator.scene import Scene
 from simulator.sensor import Sensor, parse_sensor

@@ -20,7 +20,8 @@ from service.jobs import Jobs
 from service.process_pool import ProcessPool
 from service.requests import PosteriorRequest, SimulationRequest
 from service.service_settings import ServiceSettings
-from service.store.sql_store import Retention, SqlJobStore
+from service.store.retention import Retention
+from service.store.sql_store import SqlJobStore
 from simulator.frames import frames_from_columns
 from simulator.validated import parse
 from tests.service.conftest import SENSOR

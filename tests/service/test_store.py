@@ -12,7 +12,8 @@ import sqlalchemy as sa
 from service.errors import BusyError, StoreError
 from service.store.holder import has_ended, holder_name
 from service.store.record import JobRecord, NewJob
-from service.store.sql_store import Retention, SqlJobStore
+from service.store.retention import Retention
+from service.store.sql_store import SqlJobStore
 from service.store.tables import METADATA
 from simulator.errors import InvalidInputError
 
