@@ -16,6 +16,7 @@ the range follows it, as far as the readings tell the range at all.
 import dataclasses
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,11 +29,21 @@ from inference.identifiability.response_rows import FluxStep, Rows, flux_step
 __all__ = ["FluxError", "ModelResponse", "common_pull", "curvature_of_response", "model_response"]
 
 Array = NDArray[np.float64]
-Point = tuple[Array, Array, Array]  # change of z and of log r, coefficients of the flux's error
-
 _STEPS = 10
 _SHORTEST = 0.1  # share of a step
 _SETTLED = 0.1  # of the deviance, that the last step gained
+
+
+class _Point(NamedTuple):
+    """A place about a draw: change of z and of log r, coefficients of the flux's error."""
+
+    z: Array
+    log_r: Array
+    error: Array
+
+    def plus(self, way: "_Point", share: float) -> "_Point":
+        """Return the place some share of a way further."""
+        return _Point(*(here + share * there for here, there in zip(self, way, strict=True)))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -116,7 +127,7 @@ def model_response(
     step = flux_step(rows, rows.residual(readings), -experiment.z)
     k = step.across.shape[1]
     mean = step.coefficients(np.zeros(k))
-    point = step.by_error[0] @ mean, step.by_error[1] @ mean, mean
+    point = _Point(step.by_error[0] @ mean, step.by_error[1] @ mean, mean)
     followed = step.followed
     if pull is not None:
         point, step = _settled(rows, step, point, pull)
@@ -128,9 +139,9 @@ def model_response(
         told[~np.isfinite(experiment.log_r)] = 0.0
     else:
         told = np.divide(along[:, :2].sum(axis=1), whole, out=np.zeros(whole.size), where=whole > 0)
-    error = FluxError(point[2], spread)
+    error = FluxError(point.error, spread)
     follow = step.by_error[0] @ spread, step.by_error[1] @ spread
-    return ModelResponse(*follow, point[:2], error, told, *rows.spreads(), followed)
+    return ModelResponse(*follow, (point.z, point.log_r), error, told, *rows.spreads(), followed)
 
 
 def common_pull(responses: Sequence[ModelResponse]) -> Array:
@@ -146,12 +157,12 @@ def common_pull(responses: Sequence[ModelResponse]) -> Array:
     return np.asarray(mean * (1.0 - unknowns / size if size > unknowns else 0.0))
 
 
-def _moved(experiment: Experiment, by: Point) -> Experiment:
-    z, log_r = experiment.z + by[0], experiment.log_r + by[1]
-    return dataclasses.replace(experiment, z=z, log_r=log_r, error=by[2])
+def _moved(experiment: Experiment, by: _Point) -> Experiment:
+    z, log_r = experiment.z + by.z, experiment.log_r + by.log_r
+    return dataclasses.replace(experiment, z=z, log_r=log_r, error=by.error)
 
 
-def _settled(rows: Rows, first: FluxStep, point: Point, pull: Array) -> tuple[Point, FluxStep]:
+def _settled(rows: Rows, first: FluxStep, point: _Point, pull: Array) -> tuple[_Point, FluxStep]:
     """Repeat steps until they settle: where they lead, and the last one's derivatives.
 
     A draw of the exact model's posterior lies beside its mode by what noise lets it. That stays as
@@ -166,15 +177,15 @@ def _settled(rows: Rows, first: FluxStep, point: Point, pull: Array) -> tuple[Po
     readings = e.readings.mean + np.linalg.solve(whitener, left[:, :2, None])[:, :, 0]
     of_prior = off_by[3 * n : 3 * n + d]
 
-    def cost(by: Point) -> float:
+    def cost(by: _Point) -> float:
         with np.errstate(all="ignore"):
             mean = _moved(e, by).readings.mean
             off = np.einsum("nij,nj->ni", whitener, readings - mean)
-        pulls = of_prior - by[0], by[2]
+        pulls = of_prior - by.z, by.error
         value = float(np.square(off).sum() + sum(np.square(pull).sum() for pull in pulls))
         return value if math.isfinite(value) else math.inf
 
-    start, none = point, (np.zeros(d), np.zeros(n), np.zeros(point[2].size))
+    start, none = point, _Point(np.zeros(d), np.zeros(n), np.zeros(point.error.size))
     step, last = first, cost(none)
     if not cost(point) < last:  # half the way is nearer
         point = none
@@ -183,21 +194,17 @@ def _settled(rows: Rows, first: FluxStep, point: Point, pull: Array) -> tuple[Po
     for _ in range(_STEPS):
         here = Rows(_moved(e, point))
         off = here.residual(readings)
-        off[:, 2] = left[:, 2] - rows.along[:, 2] * point[1]
-        tried = flux_step(here, off, of_prior - point[0])
-        by = tried.coefficients(point[2])
-        way = (
+        off[:, 2] = left[:, 2] - rows.along[:, 2] * point.log_r
+        tried = flux_step(here, off, of_prior - point.z)
+        by = tried.coefficients(point.error)
+        way = _Point(
             tried.by_readings[0] + tried.by_error[0] @ by,
             tried.by_readings[1] + tried.by_error[1] @ by,
             by,
         )
         share = 1.0
         while share > _SHORTEST:
-            following = (
-                point[0] + share * way[0],
-                point[1] + share * way[1],
-                point[2] + share * way[2],
-            )
+            following = point.plus(way, share)
             if cost(following) < last:
                 break
             share *= 0.5
@@ -233,7 +240,7 @@ def curvature_of_response(experiment: Experiment, response: ModelResponse, norma
     if e.discrepancy is None or not present.any():
         return 0.0
     of = response
-    by = (
+    by = _Point(
         of.shift[0] + of.parameters @ normal,
         np.where(present, of.shift[1] + of.log_r @ normal, 0.0),
         of.error.mean + of.error.spread @ normal,
@@ -241,11 +248,11 @@ def curvature_of_response(experiment: Experiment, response: ModelResponse, norma
     with np.errstate(all="ignore"):
         off = rows.residual(2.0 * e.readings.mean - _moved(e, by).readings.mean)
     # to first order the readings stay where they are, but for what across leaves of the error
-    linear = rows.by_error @ by[2] + rows.jacobian @ by[0] + rows.along * by[1][:, None]
+    linear = rows.by_error @ by.error + rows.jacobian @ by.z + rows.along * by.log_r[:, None]
     off[:, :2] += linear[:, :2]
     off[:, 2] = 0.0
     if not np.isfinite(off).all():
         return math.inf
     step = flux_step(rows, off, np.zeros(e.z.size))
-    again = step.by_readings[1] + step.by_error[1] @ step.coefficients(np.zeros(by[2].size))
+    again = step.by_readings[1] + step.by_error[1] @ step.coefficients(np.zeros(by.error.size))
     return float(np.sqrt(np.mean(np.square(again[present]))))
