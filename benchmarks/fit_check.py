@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from inference.posterior.answer.posterior import Fit
+from inference.posterior.answer.fit import Fit
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
 from simulator.catalogue import plate_scene

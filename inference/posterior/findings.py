@@ -3,7 +3,8 @@
 import dataclasses
 
 from inference.identifiability.status import Identifiability
-from inference.posterior.answer.posterior import Fit, ParameterSummary, RangeSummary
+from inference.posterior.answer.fit import Fit
+from inference.posterior.answer.posterior import ParameterSummary, RangeSummary
 
 __all__ = ["Findings"]
 

@@ -16,13 +16,9 @@ from inference.frame.blocks import GAIN
 from inference.identifiability.before_data import identifiability
 from inference.identifiability.status import Identifiability
 from inference.posterior.answer.error_parts import ErrorParts, ParameterErrorParts
+from inference.posterior.answer.fit import Fit
 from inference.posterior.answer.folds import near_fold
-from inference.posterior.answer.posterior import (
-    RANGE_COLUMNS,
-    Fit,
-    ParameterSummary,
-    RangeSummary,
-)
+from inference.posterior.answer.posterior import RANGE_COLUMNS, ParameterSummary, RangeSummary
 from inference.posterior.findings import Findings
 from inference.posterior.job import Job
 from inference.posterior.stages.stage import Tempering, Walking

@@ -6,13 +6,8 @@ import pydantic
 
 from inference.identifiability.status import Identifiability
 from inference.posterior.answer.error_parts import ParameterErrorParts
-from inference.posterior.answer.posterior import (
-    Fit,
-    FitCheck,
-    ParameterSummary,
-    Posterior,
-    Runtime,
-)
+from inference.posterior.answer.fit import Fit, FitCheck
+from inference.posterior.answer.posterior import ParameterSummary, Posterior, Runtime
 from inference.posterior.selection.selection import CandidateSummary
 from service.answers.shape import Shape, model_of
 from service.store.record import JobRecord, Status

@@ -14,7 +14,7 @@ from scipy import special
 
 from inference.density.discrepant import DiscrepantDensity
 from inference.identifiability.status import Identifiability
-from inference.posterior.answer.posterior import Fit
+from inference.posterior.answer.fit import Fit
 
 __all__ = ["LargerDiscrepancy", "judge_fit", "larger_discrepancy", "with_model_part"]
 

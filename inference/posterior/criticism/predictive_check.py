@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.posterior.answer.posterior import Fit, FitCheck
+from inference.posterior.answer.fit import Fit, FitCheck
 from inference.posterior.criticism.fit_residuals import FitResiduals, fit_residuals
 from inference.posterior.job import Job
 from simulator.discrepancy import matern

@@ -7,7 +7,7 @@ far from believing it is a finding of the model, of which the prior is a part.
 import dataclasses
 
 from inference.identifiability.status import Identifiability, weak_at_best
-from inference.posterior.answer.posterior import Fit
+from inference.posterior.answer.fit import Fit
 
 __all__ = ["contradicted"]
 

@@ -10,7 +10,7 @@ import pytest
 from inference.density.collapsed import collapsed_density
 from inference.density.discrepant import DiscrepantDensity, with_discrepancy
 from inference.identifiability.status import Identifiability
-from inference.posterior.answer.posterior import Fit
+from inference.posterior.answer.fit import Fit
 from inference.posterior.answer.ranges import draw_ranges
 from inference.posterior.criticism.discrepancy_check import (
     LargerDiscrepancy,

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from inference.posterior.answer.posterior import Fit
+from inference.posterior.answer.fit import Fit
 from inference.posterior.criticism.predictive_check import predictive_check
 from inference.posterior.job import prepare
 from inference.posterior.sampling.start import Optimum, refine
