@@ -48,6 +48,7 @@ ALLOWED: dict[str, str] = {
     "inference/posterior/stages": _POSTERIOR,
     "inference/tracking": f"{_POSTERIOR} inference.estimates",
     "service": "service inference simulator.optics",
+    "service/adapters": "service.errors",
     "service/answers": "service inference",
     "service/border": "service",
     "service/commands": "service inference",

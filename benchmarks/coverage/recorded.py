@@ -9,7 +9,7 @@ from benchmarks.coverage.classes import TERMS
 from benchmarks.coverage.intervals import interval_row
 from benchmarks.resumable import Row
 from inference.posterior.settings import SamplerSettings
-from service.recordings import pulsed, sine_wave
+from service.adapters.histograms import pulsed, sine_wave
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.simulate import simulate

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from service import reproduce
 from service.commands import (
+    convert,
     estimate,
     identifiability,
     infer,
@@ -29,6 +30,7 @@ AddParser = Callable[["Subparsers[argparse.ArgumentParser]"], None]
 COMMANDS: tuple[AddParser, ...] = (
     serve.add_parser,
     simulate.add_parser,
+    convert.add_parser,
     estimate.add_parser,
     infer.add_parser,
     track.add_parser,

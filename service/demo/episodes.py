@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from service.adapters.histograms import calibrate, pulsed, read_recording
 from service.demo.answers import Answer, Episode, of_estimates, of_posterior
 from service.demo.running import Client
-from service.recordings import calibrate, pulsed, read_recording
 
 __all__ = ["EPISODES", "crosstalk", "derivatives", "nearest", "phases"]
 

@@ -7,8 +7,15 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
+from service.adapters.histograms import (
+    Calibration,
+    Recording,
+    calibrate,
+    pulsed,
+    read_recording,
+    sine_wave,
+)
 from service.errors import MalformedError
-from service.recordings import Calibration, Recording, calibrate, pulsed, read_recording, sine_wave
 from simulator.errors import InvalidInputError
 
 WIDTH_S = 1e-10

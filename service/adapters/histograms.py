@@ -20,7 +20,15 @@ from simulator.frames import Frames
 from simulator.sensor import Noise, PulsedSensor, SineWaveSensor
 from simulator.validated import problems_of
 
-__all__ = ["Calibration", "Recording", "calibrate", "pulsed", "read_recording", "sine_wave"]
+__all__ = [
+    "Calibration",
+    "Recording",
+    "calibrate",
+    "pulsed",
+    "read_recording",
+    "recording_of",
+    "sine_wave",
+]
 
 Array = NDArray[np.float64]
 Count = int | float
@@ -28,7 +36,7 @@ SPEED_OF_LIGHT: float = speed_of_light  # [m/s]
 
 
 class _Position(pydantic.BaseModel):
-    distance_m: float
+    distance_m: float | None = None
     zone_histograms: list[list[Count]]
 
 
@@ -44,7 +52,7 @@ class Recording:
     Attributes
     ----------
     distance_m : ndarray, shape (n,)
-        True distances [m], ascending.
+        True distances [m], ascending; nan where the file has none, positions then in its order.
     counts : ndarray, shape (n, bins)
         Photons in each bin.
     bin_width_s : float
@@ -107,13 +115,32 @@ class Calibration:
 
 
 def read_recording(path: Path) -> Recording:
-    """Read a file of histograms and pool the zones.
+    """Read a file of histograms with their distances; see `recording_of`.
+
+    Raises
+    ------
+    OSError
+        Where it cannot be opened.
+    InvalidInputError, MalformedError
+        As `recording_of`, naming the file, and where a position has no distance.
+    """
+    try:
+        recording = recording_of(path.read_bytes())
+    except MalformedError as error:
+        raise MalformedError(f"{path}: {error}") from None
+    if np.isnan(recording.distance_m).any():
+        raise InvalidInputError.at("/positions", "each must have a distance_m")
+    return recording
+
+
+def recording_of(raw: bytes) -> Recording:
+    """Read histograms and pool the zones.
 
     Parameters
     ----------
-    path : Path
-        JSON with ``bin_width_s`` and ``positions``, each with ``distance_m`` and
-        ``zone_histograms``.
+    raw : bytes
+        JSON with ``bin_width_s`` and ``positions``, each with ``zone_histograms`` and, where it is
+        known, ``distance_m``.
 
     Returns
     -------
@@ -121,14 +148,11 @@ def read_recording(path: Path) -> Recording:
 
     Raises
     ------
-    OSError
-        Where it cannot be opened.
     InvalidInputError
         Naming the field that is missing or of the wrong type.
     MalformedError
         Where it is not JSON, or histograms are not all of one length.
     """
-    raw = path.read_bytes()
     try:
         file = _File.model_validate_json(raw)
     except pydantic.ValidationError as error:
@@ -138,10 +162,12 @@ def read_recording(path: Path) -> Recording:
     }
     if len(shapes) != 1 or next(iter(shapes))[1] < Recording.FLOOR_BINS.stop:
         least = Recording.FLOOR_BINS.stop
-        raise MalformedError(f"{path}: histograms must have one length, {least} bins or more")
-    distance = np.array([p.distance_m for p in file.positions])
+        raise MalformedError(f"histograms must have one length, {least} bins or more")
+    distance = np.array([p.distance_m for p in file.positions], dtype=np.float64)
     counts = np.array([p.zone_histograms for p in file.positions], dtype=np.float64).sum(axis=1)
     order = np.argsort(distance, kind="stable")
+    if np.isnan(distance).any():
+        order = np.arange(distance.size)
     return Recording(distance[order], counts[order], file.bin_width_s)
 
 
@@ -161,7 +187,8 @@ def calibrate(range_m: Array, truth_m: Array) -> Calibration:
 
 def _frames(recording: Recording, readings: Array, speed_m_s: float) -> Frames:
     start = recording.distance_m[0]
-    return Frames(readings, time_s=(recording.distance_m - start) / speed_m_s)
+    time_s = (recording.distance_m - start) / speed_m_s
+    return Frames(readings, time_s=None if np.isnan(time_s).any() else time_s)
 
 
 def _noise(recording: Recording, weights: Array) -> Noise:
