@@ -39,7 +39,7 @@ RUN python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder
 
 FROM base AS runtime
 RUN useradd --uid 10001 --no-create-home --shell /usr/sbin/nologin hybridtof \
-    && install -d -m 700 -o hybridtof /var/cache/hybridtof /var/lib/hybridtof
+    && install -d -m 700 -o hybridtof /var/cache/hybridtof /var/lib/hybridtof /var/lib/tls
 COPY --from=build /opt/hybridtof /opt/hybridtof
 # machine code of the kernels is part of the image: for any processor of its kind
 # jobs: for as long as the volume, or where HYBRIDTOF_DATABASE says

@@ -47,9 +47,10 @@ coverage: $(READY) ## Intervals against exact optics, recorded photons and paths
 	$(BIN)/python -m benchmarks.coverage --workers 2
 	$(BIN)/python -m benchmarks.coverage.path_study --sets 50 --random 500
 
-kills: $(READY) ## Kill services and workers 50 times during 20 posteriors: SQLite, then PostgreSQL
+kills: $(READY) ## Kill services and workers 50 times during 20 posteriors: SQLite, PostgreSQL, Dask
 	$(BIN)/python -m benchmarks.kills
 	$(BIN)/python -m benchmarks.kills --postgres
+	$(BIN)/python -m benchmarks.kills --dask
 
 # two processes on two cores: a library that starts threads of its own only makes them wait
 calibrate coverage test fast: export OPENBLAS_NUM_THREADS = 1
@@ -77,5 +78,5 @@ clean: ## Remove what the targets made
 	rm -rf $(VENV) build dist out *.egg-info .mypy_cache .ruff_cache .pytest_cache
 
 lock: ## Resolve the dependencies anew into requirements/ (needs uv)
-	uv pip compile pyproject.toml --extra postgres --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate --output-file requirements/runtime.txt
+	uv pip compile pyproject.toml --extra postgres --extra cluster --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate --output-file requirements/runtime.txt
 	uv pip compile pyproject.toml --extra postgres --extra plots --extra notebooks --extra cluster --extra dev --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate --output-file requirements/dev.txt

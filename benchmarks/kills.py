@@ -2,10 +2,11 @@
 
     python -m benchmarks.kills                     an SQLite file, one service
     python -m benchmarks.kills --postgres          a PostgreSQL of its own, two services
+    python -m benchmarks.kills --dask              chunks on a Dask cluster of two workers, with TLS
 
-Jobs are asked for, services and workers are killed at random moments while they run, and a service
-is started anew. No accepted job may be lost or doubled, none may fail, and answers (their run times
-apart) and draws must be those of an undisturbed run, byte for byte.
+Jobs are asked for, services and workers (and a scheduler) are killed at random moments while they
+run, and started anew. No accepted job may be lost or doubled, none may fail, and answers (their run
+times apart) and draws must be those of an undisturbed run, byte for byte.
 """
 
 import argparse
@@ -21,36 +22,28 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import httpx
 
+from benchmarks.cluster import Cluster, children, command_of
+
 SERVE = (sys.executable, "-m", "service.cli", "serve", "--port", "0")
 ENDED = {"done", "cancelled", "failed"}
-
-
-def children(pid: int) -> list[int]:
-    """Return the processes that another one has started, as Linux tells it."""
-    found = []
-    for path in Path("/proc").iterdir():
-        if path.name.isdigit():
-            with contextlib.suppress(OSError):
-                if int((path / "stat").read_text().rsplit(")", 1)[1].split()[1]) == pid:
-                    found.append(int(path.name))
-    return found
 
 
 class Service:
     """A service in a process of its own, on a port that the system picks."""
 
-    def __init__(self, command: Sequence[str], database: str) -> None:
+    def __init__(self, command: Sequence[str], settings: Mapping[str, str]) -> None:
         kept = {k: v for k, v in os.environ.items() if not k.startswith("HYBRIDTOF_")}
         kept["HYBRIDTOF_WARM"] = "off"
-        here = {"PYTHONPATH": str(Path(__file__).parents[1]), "HYBRIDTOF_DATABASE": database}
+        here = {"PYTHONPATH": str(Path(__file__).parents[1])}
         self.process = subprocess.Popen(  # noqa: S603
-            command, stderr=subprocess.PIPE, text=True, env=kept | here
+            command, stderr=subprocess.PIPE, text=True, env=kept | here | dict(settings)
         )
         assert self.process.stderr is not None
         said = []
@@ -66,7 +59,7 @@ class Service:
 
     def workers(self) -> list[int]:
         """Return its worker processes."""
-        return [pid for pid in children(self.process.pid) if "spawn_main" in _command(pid)]
+        return [pid for pid in children(self.process.pid) if "spawn_main" in command_of(pid)]
 
     def kill(self) -> None:
         """End it as a power cut would."""
@@ -77,28 +70,22 @@ class Service:
         self.process.stderr.close()
 
 
-def _command(pid: int) -> str:
-    with contextlib.suppress(OSError):
-        return Path(f"/proc/{pid}/cmdline").read_text()
-    return ""
-
-
 @dataclasses.dataclass
 class Fleet:
-    """Services that share a database.
+    """Services that share a store.
 
     Attributes
     ----------
     command : sequence of str
         Starts one.
-    database : str
-        Its address.
+    settings : mapping
+        Of each, as variables of its environment.
     services : list of Service
         Those that live.
     """
 
     command: Sequence[str]
-    database: str
+    settings: Mapping[str, str]
     services: list[Service]
 
     def ask(self, method: str, path: str, **options: Any) -> httpx.Response:
@@ -119,7 +106,7 @@ class Fleet:
         pids = [service.process.pid, *service.workers()]
         if (pid := rng.choice(pids)) == service.process.pid:
             service.kill()
-            self.services[index] = Service(self.command, self.database)
+            self.services[index] = Service(self.command, self.settings)
             return "service"
         with contextlib.suppress(ProcessLookupError):
             os.kill(pid, signal.SIGKILL)
@@ -132,12 +119,12 @@ class Fleet:
 
 
 @contextlib.contextmanager
-def fleet(command: Sequence[str], database: str, services: int) -> Iterator[Fleet]:
+def fleet(command: Sequence[str], settings: Mapping[str, str], services: int) -> Iterator[Fleet]:
     """Start services, and kill them at the end."""
-    running = Fleet(command, database, [])
+    running = Fleet(command, settings, [])
     try:
         for _ in range(services):
-            running.services.append(Service(command, database))
+            running.services.append(Service(command, settings))
         yield running
     finally:
         for service in running.services:
@@ -147,9 +134,8 @@ def fleet(command: Sequence[str], database: str, services: int) -> Iterator[Flee
 def survived(
     running: Fleet,
     bodies: Mapping[str, Any],
-    kills: int,
+    kills: Sequence[Callable[[], object]],
     wait: Callable[[Fleet], None],
-    rng: random.Random,
 ) -> dict[str, tuple[Any, bytes]]:
     """Ask for jobs, kill, and return each job's answer and draws when all have ended.
 
@@ -159,20 +145,18 @@ def survived(
         The services.
     bodies : mapping
         Requests by their idempotency keys.
-    kills : int
-        How many.
+    kills : sequence of callable
+        Each kills something.
     wait : callable
         Is called before each.
-    rng : random.Random
-        Says what is killed.
     """
     ids = {}
     for key, body in bodies.items():
         response = _create(running, key, body)
         ids[key] = response["id"]
-    for _ in range(kills):
+    for kill in kills:
         wait(running)
-        running.kill(rng)
+        kill()
     found = {}
     for key, name in ids.items():
         path = f"/v1/posteriors/{name}"
@@ -256,32 +240,48 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=20)
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--postgres", action="store_true")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--postgres", action="store_true")
+    where.add_argument("--dask", action="store_true")
     args = parser.parse_args()
     bodies, rng = requests(args.jobs), random.Random(args.seed)
     with contextlib.ExitStack() as stack:
-        folder = stack.enter_context(tempfile.TemporaryDirectory())
-        address = f"sqlite:///{folder}/jobs.sqlite"
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        settings = {"HYBRIDTOF_DATABASE": f"sqlite:///{folder}/jobs.sqlite"}
         if args.postgres:
             found = stack.enter_context(postgres())
             if found is None:
                 sys.exit("PostgreSQL is not installed")
-            address = found
+            settings = {"HYBRIDTOF_DATABASE": found}
         begin = time.monotonic()
-        with fleet(SERVE, f"sqlite:///{folder}/undisturbed.sqlite", 1) as alone:
-            expected = survived(alone, bodies, 0, lambda _: None, rng)
+        undisturbed = {"HYBRIDTOF_DATABASE": f"sqlite:///{folder}/undisturbed.sqlite"}
+        with fleet(SERVE, undisturbed, 1) as alone:
+            expected = survived(alone, bodies, (), lambda _: None)
         between = time.monotonic()
-        with fleet(SERVE, address, 2 if args.postgres else 1) as running:
-            disturbed = survived(
-                running, bodies, args.kills, lambda _: time.sleep(rng.uniform(0.5, 5.0)), rng
-            )
+        cluster = None
+        if args.dask:
+            cluster = stack.enter_context(Cluster.running(folder))
+            settings |= cluster.settings
+        killed: Counter[str] = Counter()
+        with fleet(SERVE, settings, 2 if args.postgres else 1) as running:
+
+            def kill() -> None:
+                if cluster is not None and rng.random() < 0.75:
+                    killed[cluster.kill(rng)] += 1
+                else:
+                    killed[running.kill(rng)] += 1
+
+            def pause(_: Fleet) -> None:
+                time.sleep(rng.uniform(0.5, 5.0))
+
+            disturbed = survived(running, bodies, [kill] * args.kills, pause)
         same = sum(disturbed[key] == expected[key] for key in expected)
         print(
             json.dumps(
                 {
-                    "database": "postgresql" if args.postgres else "sqlite",
+                    "on": "postgresql" if args.postgres else "dask" if args.dask else "sqlite",
                     "jobs": args.jobs,
-                    "kills": args.kills,
+                    "kills": killed,
                     "identical": same,
                     "undisturbed_s": round(between - begin, 1),
                     "disturbed_s": round(time.monotonic() - between, 1),

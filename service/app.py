@@ -15,12 +15,13 @@ from service.border.authorities import Authorities
 from service.border.held import Room
 from service.border.keys import KeyRing
 from service.border.traces import Traces
+from service.cluster import Cluster
 from service.fold import Fold
 from service.jobs import Jobs
 from service.lanes import Processes, Threads
 from service.process_pool import ProcessPool
 from service.routes import ROUTERS
-from service.service_settings import ServiceSettings
+from service.service_settings import LOCAL, ServiceSettings
 from service.shared import Shared
 from service.store.database import default_url
 from service.store.retention import Retention
@@ -54,13 +55,14 @@ def create_app(
     Raises
     ------
     InvalidInputError
-        Where the database or the keys of the settings cannot be used.
+        Where the database, the keys or the cluster of the settings cannot be used.
     """
     settings = settings or ServiceSettings()
-    pool = ProcessPool(settings.workers)
     retention = Retention(settings.max_jobs, settings.max_draws_bytes, settings.keep_days * 86_400)
     store = SqlJobStore(settings.database or default_url(), retention)
-    jobs = Jobs(fold, store, pool, running=settings.workers)
+    local = settings.executor == LOCAL
+    workers = ProcessPool(settings.workers) if local else Cluster(settings.executor)
+    jobs = Jobs(fold, store, workers, running=settings.workers)
     traces = Traces(store.counts)
     parsing, threads = (Threads(settings.threads, settings.queue) for _ in range(2))
     processes = Processes(settings.threads, settings.queue, settings.request_s)

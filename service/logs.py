@@ -105,5 +105,10 @@ def log_config(level: str) -> dict[str, Any]:
         "loggers": {
             name: {"handlers": ["stderr"], "level": level.upper(), "propagate": False}
             for name in ("hybridtof", "uvicorn")
+        }
+        # of a cluster, which says what it does by loggers of its own
+        | {
+            name: {"handlers": ["stderr"], "level": "WARNING", "propagate": False}
+            for name in ("distributed", "distributed.client")
         },
     }

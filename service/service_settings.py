@@ -9,9 +9,10 @@ import pydantic
 
 from simulator.errors import InvalidInputError, Problem
 
-__all__ = ["PREFIX", "ServiceSettings"]
+__all__ = ["LOCAL", "PREFIX", "ServiceSettings"]
 
 PREFIX = "HYBRIDTOF_"
+LOCAL = "local"
 Count = Annotated[int, pydantic.Field(ge=1)]
 Host = Annotated[
     str, pydantic.Field(max_length=255, pattern=r"^(\*|[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?)$")
@@ -30,8 +31,11 @@ class ServiceSettings(pydantic.BaseModel):
 
     Attributes
     ----------
+    executor : str
+        Where posteriors are computed: ``local``, or the address of a Dask scheduler
+        (`service.cluster`).
     workers : int
-        Processes for posteriors, each of one thread.
+        Processes for posteriors, each of one thread; with a cluster, posteriors at a time.
     threads : int
         Threads for estimates and simulations.
     queue : int
@@ -76,6 +80,7 @@ class ServiceSettings(pydantic.BaseModel):
 
     model_config = pydantic.ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
+    executor: str = LOCAL
     workers: Count = pydantic.Field(default_factory=lambda: os.cpu_count() or 1)
     threads: Count = 2
     queue: Count = 256

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from service.parent_death import end_with_parent
 from simulator.processor_time import watch_compiling
 
-__all__ = ["COMPILING", "THREAD_VARIABLES", "work"]
+__all__ = ["COMPILING", "THREAD_VARIABLES", "run", "work"]
 
 T = TypeVar("T")
 
@@ -57,7 +57,7 @@ def work(pipe: "Connection[object, object]") -> None:
             answer: tuple[bool, object] = (False, _portable(error))
         else:
             watch_compiling(lambda going: pipe.send((COMPILING, going)))
-            answer = _run(task)
+            answer = run(task)
         try:
             pipe.send(answer)
         except (BrokenPipeError, ConnectionError):
@@ -66,7 +66,8 @@ def work(pipe: "Connection[object, object]") -> None:
             pipe.send((False, _portable(error)))
 
 
-def _run(task: Any) -> tuple[bool, object]:
+def run(task: Any) -> tuple[bool, object]:
+    """Run a function with its arguments; tell whether it succeeded, and with what."""
     function, arguments = task
     try:
         return True, function(*arguments)

@@ -20,8 +20,9 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
         "folder, or where HYBRIDTOF_DATABASE says. Beyond loopback it needs HYBRIDTOF_API_KEYS, a "
         "file that hybridtof keys makes, and HYBRIDTOF_ALLOWED_HOSTS, its names there. Other "
         "environment variables are optional: "
-        "HYBRIDTOF_WORKERS, HYBRIDTOF_THREADS, HYBRIDTOF_MAX_BODY_BYTES, HYBRIDTOF_MAX_JOBS, "
-        "HYBRIDTOF_MAX_DRAWS_BYTES, HYBRIDTOF_KEEP_DAYS, HYBRIDTOF_WARM, HYBRIDTOF_SHUTDOWN_S.",
+        "HYBRIDTOF_EXECUTOR, HYBRIDTOF_WORKERS, HYBRIDTOF_THREADS, HYBRIDTOF_MAX_BODY_BYTES, "
+        "HYBRIDTOF_MAX_JOBS, HYBRIDTOF_MAX_DRAWS_BYTES, HYBRIDTOF_KEEP_DAYS, "
+        "HYBRIDTOF_WARM, HYBRIDTOF_SHUTDOWN_S.",
         examples="""
             hybridtof serve
             hybridtof serve --port 8080

@@ -40,9 +40,11 @@ def test_kills_change_nothing(database: tuple[str, int]) -> None:
             time.sleep(0.02)
         reached[0] = steps
 
-    with fleet(fake_server(sleep=0.2), address, services) as running:
+    rng = random.Random(2)
+    settings = {"HYBRIDTOF_DATABASE": address}
+    with fleet(fake_server(sleep=0.2), settings, services) as running:
         bodies = dict.fromkeys("abc", body)
-        found = survived(running, bodies, 4, further, random.Random(2))
+        found = survived(running, bodies, [lambda: running.kill(rng)] * 4, further)
     answers = [answer for answer, _ in found.values()]
     assert [a["parameters"]["object.c0"]["mean"] for a in answers] == [undisturbed()] * 3
     assert all(one == found["a"] for one in found.values())

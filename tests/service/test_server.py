@@ -35,9 +35,11 @@ def environment(**extra: str) -> dict[str, str]:
 
 
 @contextmanager
-def server(*command: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+def server(*command: str, **settings: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """A server on a port that the system picks, and its address."""
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment())
+    process = subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, env=environment(**settings)
+    )
     assert process.stderr is not None
     try:
         for line in process.stderr:

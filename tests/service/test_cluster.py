@@ -1,0 +1,76 @@
+"""Chunks on a real Dask cluster, with TLS: its workers and its scheduler may die."""
+
+import random
+import time
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("distributed", reason="Dask is not installed: hybridtof[cluster]")
+
+from benchmarks.cluster import Cluster, certificate
+from benchmarks.kills import Fleet, fleet, survived
+from service import cluster
+from service.cli import main
+from tests.service.conftest import FRAMES, SENSOR
+from tests.service.fake_fold import CHUNKS, STEPS
+from tests.service.test_jobs import undisturbed
+from tests.service.test_server import fake_server
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("ftp://127.0.0.1:8786", "must be local, tls://host:port"),
+        ("tcp://127.0.0.1", "must be local, tls://host:port"),
+        ("tcp://127.0.0.1:99999", "must be local, tls://host:port"),
+        ("tcp://cluster.example:8786", "tcp is for loopback alone"),
+        ("tls://127.0.0.1:8786", "tls needs DASK_DISTRIBUTED__COMM__TLS__CA_FILE, "),
+        ("tcp://127.0.0.1:1", "there is no scheduler to be reached at tcp://127.0.0.1:1: "),
+    ],
+)
+def test_refused_at_the_start(
+    address: str,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("HYBRIDTOF_DATABASE", f"sqlite:///{tmp_path}/jobs.sqlite")
+    monkeypatch.setenv("HYBRIDTOF_EXECUTOR", address)
+    monkeypatch.setattr(cluster, "_CONNECT_S", 0.5)
+    assert main(["serve", "--port", "0"]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith(f"hybridtof: error: /HYBRIDTOF_EXECUTOR: {said}")
+    assert captured.err.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_kills_of_a_cluster_change_nothing(tmp_path: Path) -> None:
+    """A chunk's process, then a worker, then the scheduler."""
+    dask = certificate(tmp_path)
+    if dask is None:
+        pytest.skip("no openssl is installed to make certificates")
+    body = {
+        "sensor": SENSOR,
+        "scene": {},
+        "frames": FRAMES,
+        "sampler": {"seed": 5, "ensembles": 2},
+    }
+    rng, reached = random.Random(2), [0]
+
+    def further(running: Fleet) -> None:
+        """Wait until something was computed since the last kill, or all is."""
+        while reached[0] >= (steps := sum(running.steps())) < 2 * CHUNKS * STEPS:
+            time.sleep(0.02)
+        reached[0] = steps
+
+    settings = {"HYBRIDTOF_DATABASE": f"sqlite:///{tmp_path}/jobs.sqlite"}
+    with Cluster.running(tmp_path) as run:
+        kills = [partial(run.kill, rng, what) for what in ("process", "worker", "scheduler")]
+        with fleet(fake_server(sleep=0.2), settings | run.settings, 1) as running:
+            found = survived(running, dict.fromkeys("ab", body), kills, further)
+    answers = [answer for answer, _ in found.values()]
+    assert [a["parameters"]["object.c0"]["mean"] for a in answers] == [undisturbed()] * 2
+    assert found["a"] == found["b"]
