@@ -54,6 +54,7 @@ ALLOWED: dict[str, str] = {
     "service/commands": "service inference",
     "service/demo": "service inference",
     "service/exports": "service.fold inference",
+    "service/messages": "service inference",
     "service/report": "service inference",
     "service/routes": "service inference",
     "service/store": "service",

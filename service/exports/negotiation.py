@@ -1,9 +1,11 @@
 """Which form of draws a client accepts (RFC 9110, 12.5.1)."""
 
-from service.exports import EXPORTS
+from collections.abc import Iterable
+
+from service.exports import EXPORTS, export_by
 from service.exports.export import Export
 
-__all__ = ["accepted_export"]
+__all__ = ["accepted_export", "accepted_type"]
 
 
 def accepted_export(accept: str) -> Export | None:
@@ -19,11 +21,17 @@ def accepted_export(accept: str) -> Export | None:
     Export or None
         The one of highest quality, the first of equals; None where none is accepted.
     """
+    media_type = accepted_type(accept, (form.media_type for form in EXPORTS))
+    return None if media_type is None else export_by(media_type)
+
+
+def accepted_type(accept: str, media_types: Iterable[str]) -> str | None:
+    """Choose a media type by an ``Accept`` header; see `accepted_export`."""
     best, found = 0.0, None
-    for form in EXPORTS:
-        quality = _quality(accept or "*/*", form.media_type)
+    for media_type in media_types:
+        quality = _quality(accept or "*/*", media_type)
         if quality > best:
-            best, found = quality, form
+            best, found = quality, media_type
     return found
 
 

@@ -12,6 +12,9 @@ from service.answers.estimates import EstimatesResponse, encode_estimates
 from service.bodies import BodyOf
 from service.checked_system import aliases_of, checked_frames
 from service.errors import OverdueError
+from service.exports.negotiation import accepted_type
+from service.messages import MESSAGES
+from service.messages.answering import message_answer
 from service.problems import problem_responses
 from service.requests import EstimateRequest
 from service.service_settings import ServiceSettings
@@ -21,6 +24,7 @@ from simulator.errors import InvalidInputError
 __all__ = ["answer", "quick_answer", "router"]
 
 router = APIRouter(prefix="/v1/estimates", tags=["estimates"])
+_FORMS = ("application/json", *(message.media_type for message in MESSAGES))
 Body = Annotated[tuple[EstimateRequest, bytes], Depends(BodyOf(EstimateRequest))]
 
 
@@ -84,11 +88,21 @@ def quick_answer(request: EstimateRequest, settings: ServiceSettings) -> bytes |
 @router.post(
     "",
     response_model=None,
-    responses={200: {"model": EstimatesResponse}, **problem_responses(400, 413, 415, 422, 503)},
+    responses={
+        200: {
+            "model": EstimatesResponse,
+            "content": {message.media_type: {} for message in MESSAGES},
+        },
+        **problem_responses(400, 413, 415, 422, 503),
+    },
 )
 async def create(request: Request, body: Body) -> Response:
-    """Return all physical roots of every frame."""
+    """Return all physical roots of every frame, or one message a frame by ``Accept``."""
     shared = shared_of(request)
+    form = accepted_type(",".join(request.headers.getlist("accept")), _FORMS) or _FORMS[0]
+    if form != _FORMS[0]:
+        messages = await shared.processes.run(request, message_answer, body[0], form)
+        return Response(messages, headers={"Vary": "Accept"}, media_type=form)
     content = await shared.threads.run(request, quick_answer, body[0], shared.settings)
     if content is None:
         try:

@@ -13,6 +13,7 @@ from service.answers.estimates import EstimatesResponse
 from service.answers.posteriors import PosteriorPage, PosteriorResponse
 from service.answers.simulations import SimulationResponse
 from service.app import create_app
+from service.messages import MESSAGES
 from service.service_settings import ServiceSettings
 from tests.service import fake_fold
 from tests.service.conftest import JSON
@@ -54,6 +55,28 @@ async def test_estimates(client: httpx.AsyncClient, request_body: dict[str, Any]
     assert {item["technique"] for item in body["left_out"]} >= {"posterior", "object_fit"}
     assert all(item["reason"] for item in body["left_out"])
     EstimatesResponse.model_validate(body)
+
+
+async def test_estimates_as_messages(
+    client: httpx.AsyncClient, request_body: dict[str, Any]
+) -> None:
+    plain = (await client.post("/v1/estimates", json=request_body)).json()
+    for message in MESSAGES:
+        headers = {"Accept": f"application/json;q=0.5, {message.media_type}"}
+        response = await client.post("/v1/estimates", json=request_body, headers=headers)
+        assert response.status_code == 200, response.text
+        assert response.headers["content-type"] == message.media_type
+        assert response.headers["vary"] == "Accept"
+        body = response.json()
+        assert body["technique"] == plain["chosen"]
+        assert len(body["messages"]) == len(plain["results"][0]["frames"])
+    request_body["scene"] = {
+        "crosstalk": [{"prior": "halfnormal", "sd": 1.0}] * 2,
+        "motion": "static",
+    }
+    refused = await client.post("/v1/estimates", json=request_body, headers=headers)
+    assert_problem(refused, 422)
+    assert "no technique serves this scene" in refused.json()["detail"]
 
 
 async def test_conventional_range(client: httpx.AsyncClient, request_body: dict[str, Any]) -> None:

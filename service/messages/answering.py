@@ -1,0 +1,82 @@
+"""Estimates as messages: the answer to a request that accepts one of their forms."""
+
+import json
+
+from inference.estimate import estimate
+from inference.estimates import Estimates
+from inference.known import known_of
+from inference.techniques import ALL_TECHNIQUES
+from service.checked_system import checked_frames
+from service.messages import MESSAGES
+from service.messages.measured import limits_of, measured_of
+from service.messages.message import Message
+from service.requests import EstimateRequest
+from simulator.errors import RefusedError
+from simulator.frames import Frames
+from simulator.scene import Scene
+from simulator.sensor import Sensor
+
+__all__ = ["encode_messages", "message_answer"]
+
+
+def encode_messages(
+    message: Message, sensor: Sensor, scene: Scene, frames: Frames, estimates: Estimates
+) -> bytes:
+    """Return the answers of the chosen technique, one message a frame.
+
+    Parameters
+    ----------
+    message : Message
+        The form.
+    sensor, scene, frames
+        As they were asked of.
+    estimates : Estimates
+        What came of them.
+
+    Returns
+    -------
+    bytes
+        JSON: ``technique`` and ``messages``.
+
+    Raises
+    ------
+    RefusedError
+        Where no technique has a result, with the reasons.
+    """
+    if estimates.chosen is None:
+        reasons = "; ".join(f"{item.name}: {item.reason}" for item in estimates.left_out)
+        raise RefusedError(f"no technique serves this scene: {reasons}")
+    (result,) = (r for r in estimates.results if r.technique == estimates.chosen)
+    limits = limits_of(ALL_TECHNIQUES[estimates.chosen], sensor, known_of(scene))
+    time_s = None if frames.time_s is None else frames.time_s.tolist()
+    written = [message.write(measured) for measured in measured_of(result, time_s, limits)]
+    body = {"technique": estimates.chosen, "messages": written}
+    return json.dumps(body, allow_nan=False).encode("ascii")
+
+
+def message_answer(request: EstimateRequest, media_type: str) -> bytes:
+    """Estimate, and encode as messages.
+
+    Parameters
+    ----------
+    request : EstimateRequest
+        Sensor, scene, frames and techniques.
+    media_type : str
+        Of one of `MESSAGES`.
+
+    Returns
+    -------
+    bytes
+        As of `encode_messages`.
+
+    Raises
+    ------
+    InvalidInputError
+        With pointers into the request.
+    RefusedError
+        As of `encode_messages`.
+    """
+    sensor, scene, frames = checked_frames(request.sensor, request.scene, request.frames)
+    estimates = estimate(sensor, scene, frames, request.techniques)
+    form = {message.media_type: message for message in MESSAGES}[media_type]
+    return encode_messages(form, sensor, scene, frames, estimates)

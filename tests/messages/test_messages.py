@@ -1,0 +1,194 @@
+"""Ranges as messages of ROS 2 and MAVLink, read by what defines these."""
+
+import json
+import math
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import common
+
+from inference.estimate import estimate
+from inference.fits.techniques.registry import FITS
+from inference.realtime.registry import TECHNIQUES
+from service.messages import MESSAGES
+from service.messages.answering import encode_messages
+from service.messages.measured import SIDES, Measured, measured_line, total
+from simulator.frames import frames_from_columns
+from simulator.scene import parse_scene
+from simulator.sensor import parse_sensor
+
+ROS, MAVLINK = MESSAGES
+SENSOR = {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [2e-5, 1e-3]}}
+WAVE = {"kind": "sine_wave", "frequency_hz": 2e7, "noise": {"read": [5e-6, 5e-6]}}
+TWO_ROOTS = {
+    "object": {"c0": 0.0817, "c1": 0.0574, "c2": 0.103},
+    "background": {
+        "strength": {"prior": "lognormal", "median": 0.0075, "sigma": 0.3},
+        "distance_m": 5.0, "shadow": {"c0": 0.0596, "c1": 0.0132},
+    },
+}  # fmt: skip
+
+# https://docs.ros.org/en/jazzy/p/sensor_msgs/msg/Range.html, and std_msgs/Header
+RANGE_FIELDS = {
+    "header": dict, "radiation_type": int, "field_of_view": float, "min_range": float,
+    "max_range": float, "range": float, "variance": float,
+}  # fmt: skip
+
+limits = st.tuples(st.floats(0.0, 1.0), st.sampled_from([1.0, 15.0, 700.0, math.inf]))
+measured = st.builds(
+    Measured,
+    status=st.sampled_from(["unique", "ambiguous", "none", "saturated"]),
+    range_m=st.none() | st.floats(1e-6, 1e6),
+    variance_m2=st.none() | st.floats(1e-300, 1e300),
+    side=st.sampled_from(["near", "far", None]),
+    certain=st.booleans(),
+    time_s=st.none() | st.floats(-1e9, 1e9),
+    limits_m=limits,
+).filter(lambda m: not m.certain or (m.range_m is not None and m.variance_m2 is not None))
+
+
+def mavlink(fields: dict[str, Any]) -> Any:
+    """Packed and parsed by pymavlink, as a client sends it and an autopilot reads it."""
+    sender, reader = (common.MAVLink(None, srcSystem=1, srcComponent=2) for _ in range(2))
+    reader.robust_parsing = False
+    packet = common.MAVLink_distance_sensor_message(**fields).pack(sender)
+    (message,) = reader.parse_buffer(packet)
+    assert message.get_type() == "DISTANCE_SENSOR"
+    for name, value in fields.items():
+        assert getattr(message, name) == value
+    return message
+
+
+def ros(fields: dict[str, Any]) -> dict[str, Any]:
+    """The message as a bridge makes it: numbers for what JSON does not have."""
+    assert fields.keys() == {*RANGE_FIELDS, "rep117", "status"}
+    stamp = fields["header"]["stamp"]
+    assert isinstance(stamp["sec"], int)
+    assert 0 <= stamp["nanosec"] < 10**9
+    word = fields["rep117"]
+    assert (fields["range"] is None) == (word in ("+inf", "-inf", "nan"))
+    whole = dict(fields)
+    whole["range"] = float(word) if fields["range"] is None else fields["range"]
+    whole["max_range"] = math.inf if fields["max_range"] is None else fields["max_range"]
+    for name, kind in RANGE_FIELDS.items():
+        assert isinstance(whole[name], kind), name
+    return whole
+
+
+@given(measured=measured)
+def test_every_answer_is_a_message(measured: Measured) -> None:
+    """Fields that their systems read, and valid only what is certain."""
+    body = json.loads(json.dumps([m.write(measured) for m in MESSAGES], allow_nan=False))
+    reading, distance = ros(body[0]), mavlink(body[1])
+    assert reading["variance"] == (measured.variance_m2 or 0.0)
+    assert math.isfinite(reading["range"]) == measured.certain
+    assert distance.signal_quality in (1, 100)
+    assert distance.covariance >= 1
+    if measured.variance_m2 is None:
+        assert distance.covariance == 255
+    elif distance.covariance < 255:
+        assert distance.covariance >= 1e4 * measured.variance_m2 * (1 - 1e-12)
+    inside = distance.min_distance <= distance.current_distance <= distance.max_distance
+    assert inside == (distance.signal_quality == 100)
+    if inside:
+        assert measured.certain
+        assert measured.range_m is not None
+        assert abs(distance.current_distance - 100 * measured.range_m) <= 0.5
+
+
+def messages_of(sensor: Any, scene: Any, columns: Any) -> tuple[list[Any], list[Any]]:
+    parsed, world = parse_sensor(sensor), parse_scene(scene)
+    frames = frames_from_columns(parsed, columns)
+    found = estimate(parsed, world, frames)
+    bodies = [json.loads(encode_messages(m, parsed, world, frames, found)) for m in MESSAGES]
+    assert {body["technique"] for body in bodies} == {found.chosen}
+    return [ros(m) for m in bodies[0]["messages"]], [mavlink(m) for m in bodies[1]["messages"]]
+
+
+def test_one_range_too_near_none_and_saturated() -> None:
+    sensor = SENSOR | {"full_scale": [1.0, 1.0]}
+    columns = {
+        "w1": [0.0242, 0.0, 0.014, 0.304, 2.0], "w2": [0.4230, -0.1, 0.021, 0.52, 2.0],
+        "time_s": [0.0, 0.1, 0.2, 1.75, 3.0],
+    }  # fmt: skip
+    reading, distance = messages_of(sensor, {"crosstalk": [0.004, 0.02]}, columns)
+    # 0.7513 m, sd 2.2 mm: 0.05 cm^2 and the rounding of the distance
+    assert reading[0]["range"] == pytest.approx(0.7513, abs=5e-5)
+    assert math.sqrt(reading[0]["variance"]) == pytest.approx(0.00216, rel=0.05)
+    assert reading[0]["min_range"] == 0.0
+    assert reading[0]["max_range"] == pytest.approx(14.99, abs=0.01)
+    assert (distance[0].current_distance, distance[0].covariance) == (75, 1)
+    assert distance[0].signal_quality == 100
+    # no light, and late light beyond all light: nothing within reach
+    assert [m["range"] for m in reading[1:3]] == [math.inf] * 2
+    assert [m.current_distance for m in distance[1:3]] == [distance[0].max_distance + 1] * 2
+    assert reading[3]["range"] == pytest.approx(8.994, abs=1e-3)
+    assert reading[3]["header"]["stamp"] == {"sec": 1, "nanosec": 750_000_000}
+    assert distance[3].time_boot_ms == 1750
+    assert math.isnan(reading[4]["range"])
+    assert reading[4]["status"] == "saturated"
+    assert (distance[4].signal_quality, distance[4].covariance) == (1, 255)
+
+
+def test_two_ranges_are_no_range_and_the_variance_is_that_of_both() -> None:
+    reading, distance = messages_of(WAVE, TWO_ROOTS, {"i": [-0.003174], "q": [-0.004943]})
+    # 1.4552 and 1.9987 m, each with an sd of centimetres: half their distance is 0.27 m
+    assert reading[0]["status"] == "ambiguous"
+    assert math.isnan(reading[0]["range"])
+    assert math.sqrt(reading[0]["variance"]) == pytest.approx(0.272, abs=0.01)
+    assert (distance[0].signal_quality, distance[0].covariance) == (1, 255)
+    assert distance[0].current_distance < distance[0].min_distance
+
+
+def test_a_line_of_a_stream() -> None:
+    line = {
+        "time_s": 0.5, "status": "unique", "range_m": 0.68, "sd_m": 0.002, "misfit": False,
+        "hypotheses": [
+            {"range_m": 0.68, "sd_m": 0.002, "weight": 0.9},
+            {"range_m": 0.78, "sd_m": 0.004, "weight": 0.1},
+        ],
+    }  # fmt: skip
+    one = measured_line(line, (0.02, 15.0))
+    # within 0.9 4e-6 + 0.1 16e-6, between 0.09 0.01
+    assert one.variance_m2 == pytest.approx(5.2e-6 + 9e-4)
+    assert one.certain
+    assert not measured_line({**line, "misfit": True}, (0.02, 15.0)).certain
+    two = measured_line({**line, "status": "ambiguous", "range_m": None}, (0.02, 15.0))
+    assert (two.range_m, two.variance_m2) == (None, one.variance_m2)
+    gone = measured_line({"status": "none", "hypotheses": [], "range_m": None}, (0.02, 15.0))
+    assert ROS.write(gone)["rep117"] == "+inf"
+    bad = measured_line({"sequence": 1, "error": {"title": "not finite"}}, (0.02, 15.0))
+    assert MAVLINK.write(bad)["signal_quality"] == 1
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(0.1, 10.0), st.floats(1e-4, 1.0), st.floats(0.01, 1.0)), min_size=1
+    )
+)
+def test_total_variance(modes: list[tuple[float, float, float]]) -> None:
+    """E[x^2] - E[x]^2 of the mixture, to rounding of the larger of the two."""
+    means, sds, weights = (np.array(column) for column in zip(*modes, strict=True))
+    share = weights / weights.sum()
+    second = share @ (means**2 + sds**2)
+    found = total(means.tolist(), sds.tolist(), weights.tolist())
+    assert found == pytest.approx(second - (share @ means) ** 2, abs=1e-13 * second * len(modes))
+    assert total(means.tolist(), [None, *sds.tolist()[1:]], weights.tolist()) is None
+    assert total([], [], []) is None
+
+
+def test_reasons_that_tell_a_side_are_reasons_of_techniques() -> None:
+    """A reason that is worded anew has to be worded anew here."""
+    said: set[str] = set()
+    for technique in {**TECHNIQUES, **FITS}.values():
+        module = sys.modules[technique.solve.__module__]
+        said.update(getattr(module, "_REASONS", ()))
+    assert set(SIDES) <= said
+
+
+def test_names_and_media_types_differ() -> None:
+    assert len({m.name for m in MESSAGES}) == len({m.media_type for m in MESSAGES}) == len(MESSAGES)
