@@ -27,7 +27,7 @@ GROUPS = {
     ),
     "Simulation": ("simulate", "RadialTrajectory", "SampledTrajectory"),
     "Ranges at once": ("estimate", "all_roots", "plan", "Status"),
-    "Posteriors": ("infer", "SamplerSettings", "fold"),
+    "Posteriors": ("infer", "SamplerSettings", "calibrated_scene", "fold"),
     "What could be told": ("identifiability",),
     "Streams": (
         "track",

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from inference.identifiability.before_data import identifiability
     from inference.plan import plan
     from inference.posterior import fold
+    from inference.posterior.calibrated import calibrated_scene
     from inference.posterior.infer import infer
     from inference.posterior.settings import SamplerSettings
     from inference.tracking.settings import TrackingSettings
@@ -52,6 +53,7 @@ __all__ = [
     "TrackingSettings",
     "__version__",
     "all_roots",
+    "calibrated_scene",
     "estimate",
     "fold",
     "frames_from_columns",
@@ -81,6 +83,7 @@ _HOMES = {
     "Status": "inference.estimates",
     "TrackingSettings": "inference.tracking.settings",
     "all_roots": "inference.estimate",
+    "calibrated_scene": "inference.posterior.calibrated",
     "estimate": "inference.estimate",
     "fold": "inference.posterior",
     "frames_from_columns": "simulator.frames",

@@ -6,15 +6,17 @@ two of them the job is in the store, which other processes may share.
 
 import asyncio
 import contextlib
+import functools
 import logging
 import uuid
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from importlib.metadata import version
 from typing import Generic
 
 from inference.posterior.settings import SamplerSettings
 from service.errors import BusyError, ConflictError, GoneError, NotFoundError, StoreError
-from service.exports.writing import write_draws
+from service.exports.scene import findings_of, write_scene
+from service.exports.writing import write_draws, write_file
 from service.fold import C, Fold, J, P, T
 from service.job_runner import Runner, Workers
 from service.store.holder import holder_name
@@ -233,12 +235,42 @@ class Jobs(Generic[J, C, T, P]):
         GoneError
             Where the draws had to make room for others, or were made by another version.
         """
+        record = await self._ended(job_id, client)
+        return await self._written(record, functools.partial(write_file, media_type))
+
+    async def scene(self, job_id: str, date: str, client: str = "") -> bytes:
+        """Return a job that has ended as a document of sensor and scene, made from its draws.
+
+        Parameters
+        ----------
+        job_id : str
+            Which job.
+        date : str
+            To be written into it.
+        client : str
+            To whom it belongs.
+
+        Returns
+        -------
+        bytes
+            JSON; for what is raised see `draws`.
+        """
+        record = await self._ended(job_id, client)
+        findings = findings_of(record.result or {}, record.seed, date)
+        return await self._written(record, functools.partial(write_scene, findings))
+
+    async def _ended(self, job_id: str, client: str) -> JobRecord:
+        """Return a job that has draws."""
         record = await self.get(job_id, client)
         if record.status not in FINISHED:
             raise ConflictError("the posterior is not finished: wait for it, or cancel it")
         if record.result is None or not record.result["drawn"]:
             raise ConflictError("this posterior ended before anything was drawn")
-        kept = await asyncio.to_thread(self._store.drawn, job_id)
+        return record
+
+    async def _written(self, record: JobRecord, write: Callable[..., bytes]) -> bytes:
+        """Return what a worker makes of the draws of a job."""
+        kept = await asyncio.to_thread(self._store.drawn, record.id)
         if kept is None:
             raise NotFoundError("there is no posterior of this id")
         if not kept.pieces or record.format != self._version:
@@ -250,7 +282,7 @@ class Jobs(Generic[J, C, T, P]):
             raise BusyError("too many requests for draws wait for their turn")
         call = write_draws, self._fold.Job.from_bytes, self._fold.Checkpoint.from_bytes
         future = self._workers.submit_within(
-            _DRAWS_LIMIT_S, *call, self._fold.draw, media_type, kept.job, kept.pieces
+            _DRAWS_LIMIT_S, *call, self._fold.draw, write, kept.job, kept.pieces
         )
         self._drawing += 1
         try:

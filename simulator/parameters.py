@@ -1,7 +1,8 @@
 """The unknowns of a scene: their names, their map from the standard normal, their prior.
 
 An unknown exists only where the scene gives a prior, or leaves out a member of a term that it has.
-In the coordinates z every unknown has, given those before it, the standard normal prior.
+In the coordinates z every unknown has, given those before it, the standard normal prior; where a
+scene has a joint law of them, z are independent of one another under that law.
 """
 
 import dataclasses
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulator.errors import RefusedError
+from simulator.joint_law import JointLaw, joint_law
 from simulator.range_prior import RangePrior, range_prior, range_prior_rows, stroke_unknowns
 from simulator.scene import Reference, Scene, Stroke
 from simulator.scene_checks import check_scene
@@ -56,6 +58,8 @@ class Parameters:
     ----------
     names : tuple of str
         Scene paths of the unknowns.
+    law : JointLaw or None
+        Of unknowns whose priors are not independent.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -64,6 +68,7 @@ class Parameters:
     has_background: bool
     shadow_is_object: bool
     range_prior: RangePrior
+    law: JointLaw | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -84,6 +89,7 @@ class Parameters:
 
     def _values(self, z: Array) -> Values:
         values = {name: np.full(z.shape[0], value) for name, value in self.known.items()}
+        z = self.marginal(z)
         # far out in z values overflow to inf or 0; log_prior and the likelihood judge them
         with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
             for j, unknown in enumerate(self.unknowns):
@@ -102,11 +108,19 @@ class Parameters:
         for j, unknown in enumerate(self.unknowns):
             columns.append(unknown.to_normal(natural[:, j], values))
             values[unknown.name] = natural[:, j]
-        return np.column_stack(columns or [np.empty((len(natural), 0))])
+        t = np.column_stack(columns or [np.empty((len(natural), 0))])
+        return t if self.law is None else self.law.joint(t)
+
+    def marginal(self, z: Array) -> Array:
+        """Return coordinates of one unknown each, of mean 0 and variance 1 under their priors.
+
+        They are z itself where the priors are independent.
+        """
+        return z if self.law is None else self.law.marginal(z)
 
     def log_prior(self, z: Array) -> Array:
         """Return the log prior density of z, shape (n,), up to one constant of the scene."""
-        density = -0.5 * np.einsum("ij,ij->i", z, z)
+        density = self._log_law(z)
         if any(unknown.log_correction for unknown in self.unknowns):
             values = self._values(z)
             with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
@@ -114,6 +128,12 @@ class Parameters:
                     if unknown.log_correction is not None:
                         density = density + unknown.log_correction(values)
         return np.where(np.isnan(density), -np.inf, density)
+
+    def _log_law(self, z: Array) -> Array:
+        """Return the log density before the joint truncations, shape (n,)."""
+        if self.law is not None:
+            return self.law.log_density(z)
+        return np.asarray(-0.5 * np.einsum("ij,ij->i", z, z))
 
     def terms(self, z: Array) -> Terms:
         """Return the physical terms of n vectors z of shape (n, d)."""
@@ -168,8 +188,11 @@ class Parameters:
                     "the priors of c0 and c1 leave less than a millionth of their mass where "
                     "c1 > -2 sqrt(c0); bring them into agreement with one another"
                 )
-            z = rng.standard_normal((size, len(self)))
-            log_weight = self.log_prior(z) + 0.5 * np.einsum("ij,ij->i", z, z)
+            if self.law is None:
+                z = rng.standard_normal((size, len(self)))
+            else:
+                z = self.law.sample(rng, size)
+            log_weight = self.log_prior(z) - self._log_law(z)
             z = z[np.log(rng.uniform(size=size)) < log_weight]
             accepted.append(z)
             count += len(z)
@@ -224,6 +247,13 @@ def parameters_of(sensor: Sensor, scene: Scene) -> Parameters:
     prior = range_prior(sensor, scene)
     if isinstance(prior, Stroke):
         unknowns += stroke_unknowns(prior)
+    law = None
+    if scene.joint is not None:
+        law = joint_law(scene.joint, tuple(unknown.name for unknown in unknowns))
+        unknowns = [
+            law.unknown(j, unknown) if unknown.name in scene.joint.unknowns else unknown
+            for j, unknown in enumerate(unknowns)
+        ]
     return Parameters(
         tuple(unknowns),
         known,
@@ -231,4 +261,5 @@ def parameters_of(sensor: Sensor, scene: Scene) -> Parameters:
         scene.background is not None,
         scene.shadow_is_object,
         prior,
+        law,
     )

@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 
 import pydantic
 
+from simulator.joint import Calibration, Joint
 from simulator.model_error import Discrepancy, ModelError
 from simulator.priors import Prior
 from simulator.validated import Number, Positive, Validated, parse
@@ -186,6 +187,10 @@ class Scene(Validated):
         flux and of a smooth error of the effective distance, both along log r; one number is the
         flux's alone, 0 is an exact model. Left out: "default", the sizes that were measured
         (`simulator.model_error`), since no object is exactly as the model.
+    joint : Joint, optional
+        One law of several unknowns, in place of their independent priors.
+    calibration : Calibration, optional
+        Where that law comes from.
     """
 
     object: ObjectTerm = ObjectTerm()
@@ -212,6 +217,8 @@ class Scene(Validated):
     ) = None
     motion: Motion = "radial"
     discrepancy: Discrepancy | None = None
+    joint: Joint | None = None
+    calibration: Calibration | None = None
 
     @property
     def model_error(self) -> ModelError:

@@ -3,6 +3,7 @@
 import math
 
 from simulator.errors import InvalidInputError, Problem
+from simulator.joint_checks import check_calibration, check_joint
 from simulator.model_error import ErrorSizes
 from simulator.priors import LEAST_LOG_MASS
 from simulator.scene import Quantity, Reference, Scene, Shadow, Stroke
@@ -122,5 +123,6 @@ def check_scene(sensor: Sensor, scene: Scene) -> None:
             )
     if not problems:
         problems += _check_range_error(sensor, scene, limit)
+    problems += check_joint(sensor, scene) + check_calibration(sensor, scene)
     if problems:
         raise InvalidInputError(*dict.fromkeys(problems))

@@ -36,6 +36,9 @@ class ExpectedPosterior:
     ----------
     factor : ndarray, shape (d, k)
         F with F F^T the covariance of z, in which every prior is standard normal.
+    sd : ndarray, shape (d,)
+        Of each unknown's own coordinate (`Parameters.marginal`): 1 where the readings add nothing
+        to the prior.
     range_sd : ndarray, shape (n,)
         Of log r of every frame; nan for a frame without object.
     scale_sd : float
@@ -43,13 +46,9 @@ class ExpectedPosterior:
     """
 
     factor: Array
+    sd: Array
     range_sd: Array
     scale_sd: float
-
-    @property
-    def sd(self) -> Array:
-        """Of z, shape (d,): 1 where the readings add nothing to the prior."""
-        return np.asarray(np.linalg.norm(self.factor, axis=1))
 
 
 def log_range_spread(parameters: Parameters) -> float:
@@ -99,15 +98,16 @@ def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
         rows = np.concatenate([across.reshape(-1, unknowns), *extra])
         triangle = linalg.qr(rows, mode="r")[0][:unknowns]
         factor = np.asarray(linalg.solve_triangular(triangle, np.eye(unknowns)))
+    sd = np.linalg.norm(p.marginal(factor[:d].T), axis=0)
     range_sd = np.sqrt(variance + np.linalg.norm(response @ factor, axis=1) ** 2)
     range_sd = np.where(present, _limited(range_sd, log_range_spread(p)), np.nan)
     if not present.any():
-        return ExpectedPosterior(factor[:d], range_sd, math.nan)
+        return ExpectedPosterior(factor[:d], sd, range_sd, math.nan)
     own = float(variance[present].mean()) / independent
     shared = np.linalg.norm(response[present].mean(axis=0) @ factor)
     scale = np.array([math.sqrt(own + shared**2)])
     limit = min(room, log_range_spread(p))
-    return ExpectedPosterior(factor[:d], range_sd, float(_limited(scale, limit)[0]))
+    return ExpectedPosterior(factor[:d], sd, range_sd, float(_limited(scale, limit)[0]))
 
 
 def rows_of(experiment: Experiment) -> tuple[Array, Array, list[Array]]:

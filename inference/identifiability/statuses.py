@@ -42,7 +42,8 @@ class Spread:
     Attributes
     ----------
     parameters : ndarray, shape (d,)
-        Standard deviations in z, where those of the prior are one.
+        Standard deviations of each unknown's own coordinate (`Parameters.marginal`), where those of
+        the prior are one.
     scale : float
         Of the mean of log r over the frames; nan where none has an object.
     """

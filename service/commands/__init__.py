@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from service import reproduce
 from service.commands import (
+    calibrate,
     convert,
     estimate,
     identifiability,
@@ -33,6 +34,7 @@ COMMANDS: tuple[AddParser, ...] = (
     convert.add_parser,
     estimate.add_parser,
     infer.add_parser,
+    calibrate.add_parser,
     track.add_parser,
     identifiability.add_parser,
     keys.add_parser,

@@ -5,12 +5,14 @@ import asyncio
 import json
 import os
 import sys
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from inference.posterior.settings import SamplerSettings
+    from service.jobs import Jobs
     from service.store.record import JobRecord
     from simulator.frames import Frames
     from simulator.scene import Scene
@@ -18,7 +20,13 @@ if TYPE_CHECKING:
 
 from service.commands.command import FRAMES_HELP, Subparsers, add_command, note
 
-__all__ = ["add_parser"]
+__all__ = [
+    "add_parser",
+    "add_posterior_arguments",
+    "exit_code_of",
+    "posterior_of",
+    "settings_of",
+]
 
 
 def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
@@ -37,6 +45,12 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
             hybridtof infer frames.csv --scene scene.json --seed 7 --max-seconds 60 --draws draws.nc
         """,
     )
+    add_posterior_arguments(parser)
+    parser.add_argument("--draws", type=Path, help="write the draws here, as .nc (NetCDF), .ndjson")
+
+
+def add_posterior_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what every posterior wants to be told."""
     parser.add_argument("frames", type=Path, help=FRAMES_HELP)
     parser.add_argument(
         "--scene", type=Path, required=True, help="JSON file with members sensor and scene"
@@ -45,29 +59,41 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     parser.add_argument("--ensembles", type=int)
     parser.add_argument("--target-ess", type=int)
     parser.add_argument("--max-seconds", type=float)
-    parser.add_argument("--draws", type=Path, help="write the draws here, as .nc (NetCDF), .ndjson")
     parser.add_argument("--seed", type=int, help="left out: drawn and printed")
 
 
-def _run(args: argparse.Namespace) -> int:
+def settings_of(args: argparse.Namespace) -> "SamplerSettings":
+    """Return the sampler's settings that the arguments state, checked."""
     from inference.posterior.settings import SamplerSettings
-    from service.answers.posteriors import full
-    from service.commands.files import naming, source
-    from service.commands.frames import checked_whole
-    from service.commands.output import write_result
+    from service.commands.files import naming
     from simulator.validated import parse
 
-    form = None if args.draws is None else _format_of(args.draws)
     names = ("method", "ensembles", "target_ess", "max_seconds", "seed")
     sampler = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
     with naming({"": "sampler"}):
-        settings = parse(SamplerSettings, sampler)
+        return parse(SamplerSettings, sampler)
+
+
+def _run(args: argparse.Namespace) -> int:
+    from service.answers.posteriors import full
+    from service.commands.frames import checked_whole
+    from service.commands.output import write_result
+
+    form = None if args.draws is None else _format_of(args.draws)
+    settings = settings_of(args)
     system = checked_whole(args)
-    with naming({"/frames": source(args.frames), "": str(args.scene)}):
-        record, draws = asyncio.run(_infer(args, system, settings, form))
+    make = None if form is None else lambda jobs, record: jobs.draws(record.id, form)
+    record, draws = posterior_of(args, system, settings, make)
     if draws is not None:
         args.draws.write_bytes(draws)
+    elif form is not None and record.result is not None:
+        note(args, f"{args.draws} is not written: nothing was drawn")
     write_result(json.dumps(full(record), allow_nan=False).encode())
+    return exit_code_of(args, record)
+
+
+def exit_code_of(args: argparse.Namespace, record: "JobRecord") -> int:
+    """Return the exit code of a posterior that has ended, having said on standard error why."""
     if record.problem is not None:
         for error in record.problem["errors"]:
             at = f"{args.scene}#{error['pointer']}: {error['detail']}"
@@ -98,13 +124,40 @@ def _format_of(path: Path) -> str:
     raise InvalidInputError(Problem(f"--draws {path}", f"draws are written as {known}"))
 
 
-async def _infer(
+def posterior_of(
     args: argparse.Namespace,
     system: "tuple[Sensor, Scene, Frames]",
     settings: "SamplerSettings",
-    form: str | None,
+    make: "Callable[[Jobs[Any, Any, Any, Any], JobRecord], Awaitable[bytes]] | None",
 ) -> tuple["JobRecord", bytes | None]:
-    """Run one job of the service, without the service."""
+    """Run one job of the service, without the service.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        With ``frames``, ``scene`` and ``quiet``.
+    system, settings
+        What is asked, and how it is sampled.
+    make : callable, optional
+        What is to be made of its draws.
+
+    Returns
+    -------
+    (JobRecord, bytes or None)
+        None where there are no draws, or nothing is to be made of them.
+    """
+    from service.commands.files import naming, source
+
+    with naming({"/frames": source(args.frames), "": str(args.scene)}):
+        return asyncio.run(_posterior(args, system, settings, make))
+
+
+async def _posterior(
+    args: argparse.Namespace,
+    system: "tuple[Sensor, Scene, Frames]",
+    settings: "SamplerSettings",
+    make: "Callable[[Jobs[Any, Any, Any, Any], JobRecord], Awaitable[bytes]] | None",
+) -> tuple["JobRecord", bytes | None]:
     from inference.posterior import fold
     from service.jobs import Jobs
     from service.process_pool import ProcessPool
@@ -120,12 +173,9 @@ async def _infer(
             async for now in jobs.follow(record.id, record.revision):
                 note(args, _described(now.progress))
                 record = now
-            if form is None or record.result is None:
+            if make is None or record.result is None or not record.result["drawn"]:
                 return record, None
-            if not record.result["drawn"]:
-                note(args, f"{args.draws} is not written: nothing was drawn")
-                return record, None
-            return record, await jobs.draws(record.id, form)
+            return record, await make(jobs, record)
         finally:
             await jobs.close()
 

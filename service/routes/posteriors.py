@@ -3,6 +3,7 @@
 import hashlib
 import re
 from collections.abc import AsyncIterable, AsyncIterator
+from datetime import UTC, datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Query, Request
@@ -19,7 +20,7 @@ from service.exports import EXPORTS
 from service.exports.negotiation import accepted_export
 from service.lanes import while_wanted
 from service.problems import problem_responses
-from service.requests import PosteriorRequest
+from service.requests import PosteriorRequest, SystemDescription
 from service.shared import client_of, shared_of
 from service.store.record import FINISHED, JobRecord
 
@@ -146,6 +147,18 @@ async def draws(request: Request, job_id: str) -> Response:
     name = f'attachment; filename="{job_id}{form.suffix}"'
     headers = {"Content-Disposition": name, "Vary": "Accept"}
     return Response(data, headers=headers, media_type=form.media_type)
+
+
+@router.get(
+    "/{job_id}/scene",
+    response_model=None,
+    responses={200: {"model": SystemDescription}, **problem_responses(404, 409, 410, 503)},
+)
+async def scene(request: Request, job_id: str) -> Response:
+    """Return sensor and scene as a finished posterior knows them, for whatever takes a scene."""
+    date = datetime.now(UTC).isoformat(timespec="seconds")
+    making = shared_of(request).jobs.scene(job_id, date, client_of(request))
+    return Response(await while_wanted(request, making), media_type="application/json")
 
 
 @router.post(

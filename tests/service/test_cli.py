@@ -208,3 +208,29 @@ def test_a_service_without_a_store_does_not_start(
     err = capsys.readouterr().err
     assert err.startswith("hybridtof: error: /HYBRIDTOF_DATABASE: ")
     assert err.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_calibrate_writes_a_scene_that_every_command_takes(
+    capsys: pytest.CaptureFixture[str], scene: Path, tmp_path: Path
+) -> None:
+    _, simulated, _ = run(capsys, "simulate", "--scene", scene, "--from-m", "0.2", "--to-m", "1",
+                          "--frames", "6", "--seed", "1")  # fmt: skip
+    frames = tmp_path / "frames.json"
+    frames.write_text(json.dumps(json.loads(simulated)["frames"]))
+    scene, output = tmp_path / "scene.json", tmp_path / "calibrated.json"
+    known = {"object": SCENE["object"] | {"c2": {"prior": "lognormal", "median": 0.1, "sigma": 1}}}
+    scene.write_text(json.dumps({"sensor": SENSOR, "scene": known | {"discrepancy": 0}}))
+    code, out, err = run(capsys, "calibrate", frames, "--scene", scene, "--output", output,
+                         "--seed", "1", "--method", "importance")  # fmt: skip
+    assert (code, out) == (0, ""), err
+    document = json.loads(output.read_text())
+    assert document["scene"]["joint"]["unknowns"] == ["object.c2"]
+    assert [path.name for path in tmp_path.glob("calibrated*")] == ["calibrated.json"]
+    code, out, err = run(capsys, "identifiability", "--scene", output, "--ranges", "0.5")
+    assert (code, err) == (0, "")
+    document["scene"]["calibration"]["converged"] = False
+    output.write_text(json.dumps(document))
+    code, _, err = run(capsys, "estimate", frames, "--scene", output)
+    assert code == 2
+    assert "calibrated.json#/scene/calibration/accept: " in err

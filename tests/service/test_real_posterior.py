@@ -58,12 +58,26 @@ async def test_over_http() -> None:
         while (body := (await client.get(location)).json())["status"] in {"queued", "running"}:
             await asyncio.sleep(0.2)
         netcdf = (await client.get(location + "/draws")).content
+        calibrated = (await client.get(location + "/scene")).json()
+        asked = calibrated | {"ranges_m": [0.5, 1.0]}
+        foreseen = await client.post("/v1/identifiability", json=asked)
+        other = asked | {"sensor": SENSOR | {"pulse_width_s": 2e-7}}
+        refused = await client.post("/v1/identifiability", json=other)
     with h5netcdf.File(io.BytesIO(netcdf), "r") as file:
         drawn = file["posterior"]["object.c0"][...].ravel()
         assert file["posterior_predictive"]["range_m"].shape[2] == 40
     # made anew from the checkpoint: the draws that the summary is of
     assert body["parameters"]["object.c0"]["mean"] == pytest.approx(drawn.mean(), rel=1e-12)
     assert body["status"] == "done", body
+    # known beforehand what the posterior has told: its interval is the law's
+    law = calibrated["scene"]["calibration"]["unknowns"][0]
+    assert law["mean"] == pytest.approx(drawn.mean(), rel=1e-12)
+    assert calibrated["scene"]["joint"]["unknowns"] == list(body["parameters"])
+    assert foreseen.status_code == 200, foreseen.text
+    bound = foreseen.json()["parameters"]["object.c0"]
+    assert bound["value"] == pytest.approx(law["mean"], abs=law["sd"])
+    assert bound["posterior_sd"] < 1.1 * law["sd"]
+    assert refused.json()["errors"][0]["pointer"] == "/scene/calibration/sensor"
     assert body["seed"] == 2
     answer = PosteriorResponse.model_validate(body)
     # what OpenAPI says is what is sent, no more and no less

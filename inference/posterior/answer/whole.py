@@ -136,7 +136,7 @@ def with_model_error(
         log_r,
         dataclasses.replace(draws, parameters=parameters, range_m=range_m),
         reported,
-        Spread(flat.std(axis=0), scale),
+        Spread(density.parameters.marginal(flat).std(axis=0), scale),
         budget,
         larger,
         sensitivity,

@@ -1,0 +1,179 @@
+"""A posterior as a scene: what frames have told, for all frames to come."""
+
+import dataclasses
+import hashlib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from inference.posterior.answer.draws import Draws
+from inference.posterior.answer.posterior import Posterior
+from inference.posterior.selection.models import reduced
+from simulator.errors import RefusedError
+from simulator.frames import Frames
+from simulator.joint import Joint
+from simulator.parameters import Parameters, parameters_of
+from simulator.scene import Scene, parse_scene
+from simulator.sensor import Sensor
+
+__all__ = ["calibrated_scene", "scene_of_draws"]
+
+Array = NDArray[np.float64]
+
+_LEAST_SHARE = 0.01  # of the draws, of a mode that counts
+_LEAST_DRAWS = 5  # an unknown, of a mode that counts
+_FARTHEST = 9.0  # standard deviations of a prior: beyond, a draw at its end has no coordinate
+_RIDGE = 1e-9  # of a variance: what keeps a law of two unknowns that are one a law
+
+
+def calibrated_scene(
+    sensor: Sensor, scene: Scene, frames: Frames, posterior: Posterior, date: str | None = None
+) -> Scene:
+    """Make a scene of what a posterior knows, to be used wherever a scene is.
+
+    Parameters
+    ----------
+    sensor, scene, frames : Sensor, Scene, Frames
+        What `infer` was given.
+    posterior : Posterior
+        Its answer.
+    date : str, optional
+        To be written into the calibration.
+
+    Returns
+    -------
+    Scene
+        With the priors as they were, the terms that the posterior kept, and ``joint`` and
+        ``calibration``. Where the posterior has not converged or is a misfit it is refused
+        wherever it is used, until ``calibration.accept`` says otherwise.
+
+    Raises
+    ------
+    RefusedError
+        Where nothing was drawn.
+    """
+    kept = () if posterior.selection is None else posterior.selection.decisions
+    findings = {
+        "converged": posterior.verdict.converged,
+        "misfit": posterior.fit.misfit,
+        "reasons": posterior.verdict.reasons,
+        "left_out": [dataclasses.asdict(row) for row in posterior.left_out],
+        "seed": posterior.seed,
+        "date": date,
+    }
+    if not posterior.drawn:
+        raise RefusedError("nothing was drawn: there is nothing that this posterior knows")
+    stays = [decision.term for decision in kept if decision.kept]
+    return scene_of_draws(sensor, reduced(scene, stays), frames, posterior.draws, findings)
+
+
+def scene_of_draws(
+    sensor: Sensor, scene: Scene, frames: Frames, draws: Draws, findings: Mapping[str, Any]
+) -> Scene:
+    """Make a scene of draws.
+
+    Parameters
+    ----------
+    sensor, scene, frames : Sensor, Scene, Frames
+        As sampled: the terms that were kept.
+    draws : Draws
+        Of their posterior, moved by the errors of the model.
+    findings : mapping
+        Members of `simulator.joint.Calibration` that are not in the draws.
+
+    Returns
+    -------
+    Scene
+    """
+    prior = scene.model_copy(update={"joint": None, "calibration": None})
+    parameters = parameters_of(sensor, prior)
+    kept = [j for j, name in enumerate(draws.names) if not name.startswith("range_m.")]
+    names = [draws.names[j] for j in kept]
+    natural = draws.parameters.reshape(-1, len(draws.names))
+    error = scene.model_error
+    document = prior.model_dump(mode="json", exclude_none=True)
+    calibration = {
+        "sensor": sensor.model_dump(mode="json", exclude_none=True),
+        "frames": {"count": len(frames), "sha256": _digest(frames)},
+        "model_error": [error.flux, error.range_m],
+        **{key: value for key, value in findings.items() if value is not None},
+    }
+    if names:
+        z = _coordinates(parameters, natural)[:, kept]
+        modes = _modes(z, draws.mode.reshape(-1))
+        joint = {"unknowns": names, "modes": modes}
+        document["joint"] = joint
+        law = Joint.model_validate(joint)
+        calibration["unknowns"] = list(_learnt(names, natural[:, kept]))
+        calibration["distance"] = _distance(law, z)
+    document["calibration"] = calibration
+    return parse_scene(document)
+
+
+def _digest(frames: Frames) -> str:
+    """Return the digest of all columns, whatever there are."""
+    digest = hashlib.sha256()
+    for field in dataclasses.fields(frames):
+        column = getattr(frames, field.name)
+        if column is not None:
+            digest.update(f"{field.name}:{column.dtype.str}:{column.shape}".encode())
+            digest.update(np.ascontiguousarray(column).tobytes())
+    return digest.hexdigest()
+
+
+def _coordinates(parameters: Parameters, natural: Array) -> Array:
+    """Return z under the independent priors; a draw at the end of a support is held near it."""
+    with np.errstate(all="ignore"):
+        z = parameters.standard(natural)
+    return np.clip(
+        np.nan_to_num(z, nan=0.0, posinf=_FARTHEST, neginf=-_FARTHEST), -_FARTHEST, _FARTHEST
+    )
+
+
+def _modes(z: Array, mode: NDArray[np.intp]) -> list[dict[str, Any]]:
+    """Return a normal law for each mode that draws enough lie in."""
+    least = max(_LEAST_SHARE * len(z), _LEAST_DRAWS * z.shape[1])
+    found = [part for k in np.unique(mode) if len(part := z[mode == k]) >= least] or [z]
+    total = sum(len(part) for part in found)
+    laws = []
+    for part in found:
+        off = part - part.mean(axis=0)
+        covariance = off.T @ off / len(part)
+        covariance += np.diag(_RIDGE * np.maximum(np.diagonal(covariance), _RIDGE))
+        laws.append(
+            {
+                "weight": len(part) / total,
+                "mean": _numbers(part.mean(axis=0)),
+                "covariance": [_numbers(row) for row in covariance],
+            }
+        )
+    return laws
+
+
+def _numbers(values: Array) -> list[float]:
+    """Return plain numbers; what is next to nothing is zero."""
+    return [0.0 if abs(value) < 1e-40 else value for value in values.tolist()]
+
+
+def _learnt(names: list[str], natural: Array) -> Iterable[dict[str, Any]]:
+    """Describe each unknown for a reader."""
+    for name, column in zip(names, natural.T, strict=True):
+        low, high = np.quantile(column, [0.05, 0.95])
+        values = _numbers(np.array([column.mean(), column.std(), low, high]))
+        yield {"unknown": name, **dict(zip(("mean", "sd", "q05", "q95"), values, strict=True))}
+
+
+def _distance(law: Joint, z: Array) -> float:
+    """Return the greatest of Kolmogorov's distances between unknowns' draws and their law."""
+    n, greatest = len(z), 0.0
+    for j, column in enumerate(np.sort(z, axis=0).T):
+        share = np.zeros(n)
+        for mode in law.modes:
+            sd = mode.covariance[j][j] ** 0.5
+            share += mode.weight * special.ndtr((column - mode.mean[j]) / sd)
+        steps = np.arange(n + 1) / n
+        greatest = max(greatest, *np.abs(share - steps[1:]), *np.abs(share - steps[:-1]))
+    return float(greatest)

@@ -1,0 +1,79 @@
+"""``hybridtof calibrate``: a scene file of what the frames in a file tell."""
+
+import argparse
+import os
+import tempfile
+from datetime import UTC, datetime
+from pathlib import Path
+
+from service.commands.command import Subparsers, add_command, note
+from service.commands.infer import (
+    add_posterior_arguments,
+    exit_code_of,
+    posterior_of,
+    settings_of,
+)
+
+__all__ = ["add_parser"]
+
+
+def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
+    """Add the command to the command line."""
+    parser = add_command(
+        subparsers,
+        "calibrate",
+        _run,
+        brief="learn a scene from frames, for all frames to come",
+        description="Sample the posterior as `infer` does, and write what it knows as a scene "
+        "file, which every other command and every request takes. Frames without the object, and "
+        "of one over a wide stroke, are what it takes. The file is written as a whole or not at "
+        "all. A posterior that has not converged is written too, and the exit code is 3; it is "
+        "refused wherever a scene is used, and so is one whose model does not fit, until "
+        "`scene.calibration.accept` has the word that the refusal names.",
+        examples="""
+            hybridtof calibrate frames.csv --scene scene.json --output calibrated.json
+            hybridtof estimate more.csv --scene calibrated.json
+        """,
+    )
+    add_posterior_arguments(parser)
+    parser.add_argument(
+        "--output", type=Path, required=True, help="write the calibrated scene file here (.json)"
+    )
+
+
+def _run(args: argparse.Namespace) -> int:
+    from service.commands.files import check_folder
+    from service.commands.frames import checked_whole
+
+    check_folder("--output", args.output)
+    settings = settings_of(args)
+    date = datetime.now(UTC).isoformat(timespec="seconds")
+    record, document = posterior_of(
+        args, checked_whole(args), settings, lambda jobs, done: jobs.scene(done.id, date)
+    )
+    if document is not None:
+        _write(args.output, document + b"\n")
+    elif record.result is not None:
+        note(args, f"{args.output} is not written: nothing was drawn")
+    if record.result is not None and record.result["fit"]["misfit"]:
+        note(args, f"misfit: {'; '.join(record.result['fit']['reasons'])}")
+    return exit_code_of(args, record)
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Write a file as a whole or not at all."""
+    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(data)
+            os.fchmod(descriptor, 0o666 & ~_umask())
+        Path(name).replace(path)
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    """Return the permissions that new files do not get; there is no way but to set it and back."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,60 @@
+"""A posterior as a scene: the law of its draws, and what is said of them."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.posterior.calibrated import scene_of_draws
+from simulator.parameters import parameters_of
+from tests.service import drawn
+
+FINDINGS = {"converged": True, "misfit": False, "seed": 3, "date": None}
+
+
+def of_coordinates(z: NDArray[np.float64], mode: NDArray[np.intp]) -> dict[str, Any]:
+    """Members of the law of draws that are given in the priors' coordinates."""
+    job = drawn.job()
+    parameters = parameters_of(job.sensor, job.scene)
+    draws = dataclasses.replace(
+        drawn.draws(),
+        parameters=parameters.natural(z).reshape(1, 1, len(z), 2),
+        mode=mode.reshape(1, 1, len(z)),
+    )
+    scene = scene_of_draws(job.sensor, job.scene, job.frames, draws, FINDINGS)
+    assert scene.joint is not None
+    assert scene.calibration is not None
+    assert scene.calibration.frames.count == len(job.frames)
+    assert [row.unknown for row in scene.calibration.unknowns] == ["object.c0", "object.c2"]
+    return scene.joint.model_dump() | {"distance": scene.calibration.distance}
+
+
+def test_the_law_has_mean_and_covariance_of_the_draws() -> None:
+    """Of 4000 normal draws the greatest distance is above 2.2 / sqrt(n) once in 8,000 times."""
+    rng = np.random.default_rng(1)
+    z = rng.standard_normal((4000, 2)) @ np.array([[0.1, 0.05], [0.0, 0.01]]) + [0.4, -1.0]
+    law = of_coordinates(z, np.zeros(len(z), dtype=np.intp))
+    (mode,) = law["modes"]
+    assert np.allclose(mode["mean"], z.mean(axis=0), atol=1e-9)
+    assert np.allclose(mode["covariance"], np.cov(z.T, bias=True), rtol=1e-6)
+    assert 0.0 < law["distance"] < 2.2 / np.sqrt(len(z))
+
+
+def test_separate_modes_are_a_mixture_and_strays_are_none() -> None:
+    rng = np.random.default_rng(2)
+    z = 0.01 * rng.standard_normal((2000, 2))
+    mode = np.repeat([0, 1, 2], [1496, 500, 4])
+    z[mode == 1] += [3.0, 0.0]
+    law = of_coordinates(z, mode)
+    first, second = law["modes"]
+    assert np.isclose(first["weight"], 1496 / 1996)
+    assert np.isclose(first["weight"] + second["weight"], 1.0)
+    assert np.allclose(second["mean"], z[mode == 1].mean(axis=0), atol=1e-9)
+
+
+def test_draws_at_the_end_of_a_support_are_a_law() -> None:
+    """A parameter so near the end that it has no coordinate any more, and one that never moves."""
+    z = np.column_stack([np.full(500, 40.0), np.zeros(500)])
+    law = of_coordinates(z, np.zeros(500, dtype=np.intp))
+    assert np.isfinite(law["modes"][0]["covariance"]).all()
