@@ -16,7 +16,7 @@ import numpy as np
 
 from inference.estimate import estimate
 from inference.estimates import Status
-from service.answers.estimates import encode_estimates
+from service.answers.encoding import encode_estimates
 from service.checked_system import checked_frames
 from service.requests import EstimateRequest
 from service.strict_json import check_bulk, decode

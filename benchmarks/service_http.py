@@ -1,24 +1,66 @@
-"""A batch of estimates against a real server, and how long health checks wait meanwhile.
+"""The service under load, beside an empty FastAPI endpoint in the same run.
 
-    python -m benchmarks.service_http --frames 1000000
+    python -m benchmarks.service_http [--against CHECKOUT] [--frames 1000000]
 
-Baseline: the same health checks against the idle server, in the same run.
+First, estimates of one frame from 1, 8 and 64 clients that ask as fast as they are answered, and
+batches of 1,000 frames from 8; the servers take turns, round by round. Baselines: an endpoint that
+returns an empty object and reads nothing, on the same server, and another checkout of this
+repository. Then, with ``--frames``, one large batch, and how long health checks wait meanwhile;
+baseline: the same checks against the idle server.
 """
 
 import argparse
-import os
-import re
-import subprocess
-import sys
+import contextlib
+import json
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
 
 import httpx
 import numpy as np
 
+from benchmarks.http_load import asked, post, served
 from benchmarks.service_estimates import body
 
 JSON = {"Content-Type": "application/json"}
+ROUTE = "/v1/estimates"
+FRAMES = 1000
+
+
+def one_frame() -> bytes:
+    sensor = {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1e-6, 1e-6]}}
+    scene = {"object": {"c0": 0.0769, "c1": -0.123, "c2": 0.1}}
+    frames = {"w1": [0.01], "w2": [1.5]}
+    return json.dumps({"sensor": sensor, "scene": scene, "frames": frames}).encode()
+
+
+def p99_ms(times: list[float]) -> float:
+    return float(np.quantile(times, 0.99)) * 1e3
+
+
+def load(servers: dict[str, str], rounds: int, count: int) -> None:
+    """Print what requests of one frame take, and how many frames of batches are answered."""
+    for clients in (1, 8, 64):
+        times: dict[str, list[float]] = {name: [] for name in servers}
+        for _ in range(rounds):
+            for name, address in servers.items():
+                times[name] += asked(address, post(address, ROUTE, one_frame()), clients, count)[0]
+        base = p99_ms(times["empty"])
+        for name, found in times.items():
+            p50, p99 = np.median(found) * 1e3, p99_ms(found)
+            ratio = f"{p99 / base:.2f} times the empty endpoint"
+            print(f"{clients:3d} clients, {name:<17} p50 {p50:7.2f} ms, p99 {p99:7.2f} ms, {ratio}")
+    batches = {
+        "rows": (ROUTE, set(servers) - {"empty"}),
+        "columns": (ROUTE + "?shape=columns", {"service"}),
+    }
+    for shape, (path, names) in batches.items():
+        for name in sorted(names):
+            address = servers[name]
+            request = post(address, path, body(FRAMES))
+            taken = [asked(address, request, 8, count // 4)[1] for _ in range(rounds)]
+            rate = FRAMES * (count // 4) / min(taken)
+            print(f"batches of {FRAMES}, {name:<10} {shape:<8} {rate:9.0f} frames/s")
 
 
 def waits(address: str, until: "Future[httpx.Response] | None", count: int) -> list[float]:
@@ -38,44 +80,48 @@ def show(what: str, seconds: list[float]) -> None:
     print(f"health check, {what:<18} median {median:7.1f} ms, worst {most:7.1f} ms")
 
 
+def large(address: str, n: int, path: str) -> None:
+    content = body(n)
+    show("idle", waits(address, None, 100))
+    with ThreadPoolExecutor(1) as threads:
+        start = time.perf_counter()
+        batch = threads.submit(
+            httpx.post, address + path, content=content, headers=JSON, timeout=600
+        )
+        show("during the batch", waits(address, batch, 0))
+    response = batch.result()
+    seconds = time.perf_counter() - start
+    sizes = f"{len(content) / 2**20:.0f} MiB, answered {len(response.content) / 2**20:.0f} MiB"
+    print(f"{n} frames to {path}: {response.status_code}, {sizes} in {seconds:.2f} s")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--frames", type=int, default=1_000_000)
-    n = parser.parse_args().frames
-    start = time.perf_counter()
-    command = (sys.executable, "-m", "service.cli", "serve", "--port", "0")
+    parser.add_argument("--against", type=Path, help="another checkout of this repository")
+    parser.add_argument("--frames", type=int, default=0, help="of one large batch")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--requests", type=int, default=1000, help="a round")
+    args = parser.parse_args()
+    serve = ("service.cli", "serve", "--port", "0")
     limits = {"HYBRIDTOF_MAX_BODY_BYTES": str(2**28), "HYBRIDTOF_MAX_HELD_BYTES": str(2**30)}
-    limits |= {"HYBRIDTOF_REQUEST_S": "600"}
-    server = subprocess.Popen(  # noqa: S603
-        command, stderr=subprocess.PIPE, text=True, env=os.environ | limits
-    )
-    assert server.stderr is not None
-    try:
-        match = None
-        while match is None:
-            match = re.search(r"running on (http://\S+)", server.stderr.readline())
-        address = match[1]
-        httpx.get(address + "/health/live").raise_for_status()
-        print(f"first health answer after {time.perf_counter() - start:.1f} s")
-        first = httpx.post(address + "/v1/estimates", content=body(10), headers=JSON, timeout=600)
-        first.raise_for_status()
-        content = body(n)
-        show("idle", waits(address, None, 100))
-        with ThreadPoolExecutor(1) as threads:
-            start = time.perf_counter()
-            batch = threads.submit(
-                httpx.post, address + "/v1/estimates", content=content, headers=JSON, timeout=600
+    limits |= {"HYBRIDTOF_REQUEST_S": "600", "HYBRIDTOF_WARM": "off"}
+    with contextlib.ExitStack() as stack:
+        servers = {
+            "empty": stack.enter_context(served("benchmarks.empty_service")),
+            "service": stack.enter_context(served(*serve, **limits)),
+        }
+        if args.against is not None:
+            servers["other checkout"] = stack.enter_context(
+                served(*serve, tree=args.against, **limits)
             )
-            show("during the batch", waits(address, batch, 0))
-        response = batch.result()
-        seconds = time.perf_counter() - start
-        size = len(response.content) / 2**20
-        print(f"{n} frames: {response.status_code}, {size:.0f} MiB in {seconds:.2f} s")
-        start = time.perf_counter()
-    finally:
-        server.terminate()
-        server.wait()
-        print(f"ended {time.perf_counter() - start:.1f} s after SIGTERM")
+        for name, address in servers.items():
+            if name != "empty":  # machine code is loaded, or made
+                for content in (one_frame(), body(FRAMES)):
+                    asked(address, post(address, ROUTE, content), 8, 300)
+        load(servers, args.rounds, args.requests)
+        if args.frames:
+            for path in (ROUTE, ROUTE + "?shape=columns"):
+                large(servers["service"], args.frames, path)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from inference.assumptions import assumptions_of
 from inference.estimates import Estimates, LeftOut, TechniqueResult
 from inference.known import known_of
-from inference.plan import cheapest, obstacle, plan
+from inference.plan import Plan, cheapest, obstacle, plan
 from inference.realtime.registry import TECHNIQUES
 from inference.technique import Task
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
@@ -17,7 +17,7 @@ from simulator.scene import Scene
 from simulator.scene_checks import check_scene
 from simulator.sensor import Sensor
 
-__all__ = ["all_roots", "estimate"]
+__all__ = ["all_roots", "estimate", "estimate_planned"]
 
 
 def estimate(
@@ -52,7 +52,35 @@ def estimate(
         check_scene(sensor, scene)
     except InvalidInputError as error:
         raise error.below("/scene") from None
-    choice = plan(sensor, scene, frames)
+    return estimate_planned(sensor, scene, frames, plan(sensor, scene, frames), techniques)
+
+
+def estimate_planned(
+    sensor: Sensor,
+    scene: Scene,
+    frames: Frames,
+    choice: Plan,
+    techniques: Sequence[str] | None = None,
+) -> Estimates:
+    """Estimate as `estimate` does, of a checked scene, by a plan that was made.
+
+    Parameters
+    ----------
+    sensor, scene, frames, techniques
+        As for `estimate`.
+    choice : Plan
+        Of `inference.plan.plan`.
+
+    Returns
+    -------
+    Estimates
+        As of `estimate`.
+
+    Raises
+    ------
+    InvalidInputError
+        As of `estimate`.
+    """
     supposed = assumptions_of(scene)
     if techniques is None:
         if choice.chosen is None:

@@ -11,10 +11,13 @@ from service.lanes import Processes, Threads
 from service.service_settings import ServiceSettings
 from service.warm.warming import Warming
 
-__all__ = ["SMALL", "Shared", "client_of", "shared_of"]
+__all__ = ["SMALL", "TINY", "TINY_BYTES", "Shared", "client_of", "shared_of"]
 
 SMALL = 10_000
 """Frames of which an answer is made in milliseconds."""
+
+TINY, TINY_BYTES = 1000, 2**16
+"""Frames, and bytes of a body, whose work takes less time than handing it to a thread may."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)

@@ -7,18 +7,28 @@ loading that code would take: the first few frames need no compiler, and no kind
 more than twice of what it must. `KERNELS_COMPILE=always` compiles at the first call.
 """
 
+import contextlib
 import functools
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FunctionType
 from typing import Any, ParamSpec, TypeVar, cast
 
 from simulator.kernel_cache import CacheFolder, folder_of
 
-__all__ = ["Kernel", "compiled", "compiled_for_both", "given_up_s", "hot", "when_compiling"]
+__all__ = [
+    "Kernel",
+    "NotReadyError",
+    "compiled",
+    "compiled_for_both",
+    "given_up_s",
+    "hot",
+    "ready_only",
+    "when_compiling",
+]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -32,6 +42,34 @@ _lock = threading.RLock()
 _waiting: list[Callable[[], None]] = []
 _machine: list[Any] = []
 _given_up_s = [0.0]
+# what an answer of the interpreter may take where nobody can wait [s]
+_QUICK_S = 0.002
+_this_thread = threading.local()
+
+
+class NotReadyError(Exception):
+    """A kernel has no answer at once, and who asks cannot wait for one."""
+
+
+@contextlib.contextmanager
+def ready_only() -> Iterator[None]:
+    """Let kernels answer in this thread only by what is there, for who must be quick.
+
+    Raises
+    ------
+    NotReadyError
+        By a kernel whose machine code would have to be made or loaded, but where the interpreter
+        has answered such calls before, and does so in a moment.
+    """
+    _this_thread.ready_only = True
+    try:
+        yield
+    finally:
+        _this_thread.ready_only = False
+
+
+def _in_a_hurry() -> bool:
+    return getattr(_this_thread, "ready_only", False)
 
 
 def when_compiling(action: Callable[[], None]) -> Callable[[], None]:
@@ -81,6 +119,8 @@ class Kernel:
         self._dispatcher: Any = None
         self._below: Any = None
         self._spent_s: dict[Any, float] = {}
+        # kinds of calls that the interpreter does not answer in a moment
+        self._long: set[Any] = set()
         self._found = False
 
     def __reduce__(self) -> str:
@@ -104,10 +144,14 @@ class Kernel:
                     self._answer_calls(made)
                     self._below = made
                 compile_now, made.compile_now = made._compile_for_args, made._compile_for_args
+
                 # asked where there is no machine code for the types of a call
-                made._compile_for_args = lambda *args: (
-                    self._answer if self._may_try(args) else compile_now(*args)
-                )
+                def found(*args: Any) -> Any:
+                    if _in_a_hurry():
+                        return self._answer_at_once
+                    return self._answer if self._may_try(args) else compile_now(*args)
+
+                made._compile_for_args = found
                 self._dispatcher = made
         return self._dispatcher
 
@@ -185,6 +229,8 @@ class Kernel:
         """Answer a call for which there is no machine code, as far as is known."""
         from simulator import uncompiled
 
+        if _in_a_hurry():
+            return self._answer_at_once(*args, **kwargs)
         if kwargs or not self._may_try(args):
             return self.dispatcher(*args, **kwargs)
         kind = uncompiled.kind_of(args)
@@ -197,6 +243,22 @@ class Kernel:
             dispatcher = self.dispatcher
             return dispatcher(*args)
         self._spent_s[kind] = spent_s + took_s
+        return answer
+
+    def _answer_at_once(self, *args: Any, **kwargs: Any) -> Any:
+        """Answer as `_answer` where such calls were answered before, and nothing is in the way."""
+        from simulator import uncompiled
+
+        kind = uncompiled.kind_of(args)
+        known = kind in self._spent_s and kind not in self._long
+        if kwargs or not known or not uncompiled.free() or not self._may_try(args):
+            raise NotReadyError
+        try:
+            answer, took_s = uncompiled.run(self._function, args, _QUICK_S)
+        except uncompiled.NotSoError:
+            self._long.add(kind)
+            raise NotReadyError from None
+        self._spent_s[kind] += took_s
         return answer
 
 

@@ -154,8 +154,10 @@ def frames_from_columns(
             problems.append(Problem("/gain", "must be positive"))
     if problems:
         raise InvalidInputError(*problems)
+    readings = np.empty((n, 2))
+    readings[:, 0], readings[:, 1] = arrays[first], arrays[second]
     return Frames(
-        readings=np.column_stack([arrays[first], arrays[second]]),
+        readings=readings,
         time_s=arrays.get("time_s"),
         derivatives=(
             np.column_stack([arrays[name] for name in slopes]) if slopes[0] in arrays else None
@@ -220,6 +222,6 @@ def _as_column(name: str, values: ArrayLike) -> tuple[NDArray[Any], str | None]:
         return array, None
     if array.dtype.kind not in "fiu":
         return array, "must hold numbers"
-    array = array.astype(np.float64)
-    bad = np.flatnonzero(~np.isfinite(array))
-    return array, f"entry {bad[0]} is not finite" if bad.size else None
+    array = array.astype(np.float64, copy=False)
+    finite = np.isfinite(array)
+    return array, None if finite.all() else f"entry {finite.argmin()} is not finite"

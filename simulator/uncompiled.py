@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["NotSoError", "kind_of", "reach", "run", "size"]
+__all__ = ["NotSoError", "free", "kind_of", "reach", "run", "size"]
 
 _Float = np.float64
 # packages whose functions are run so wherever they are used
@@ -250,6 +250,11 @@ def _plain(value: Any) -> Any:
         kind, parts = type(value), map(_plain, value)
         return kind(parts) if kind is tuple else kind(*parts)
     return value
+
+
+def free() -> bool:
+    """Tell whether no other thread runs a kernel without a compiler."""
+    return not _turn.locked()
 
 
 def run(function: Any, arguments: tuple[Any, ...], most_s: float) -> tuple[Any, float]:

@@ -6,6 +6,7 @@ requests from an operator's browser. The first shows in ``Host``, the second in 
 """
 
 import dataclasses
+import functools
 import ipaddress
 import re
 from collections.abc import Iterable
@@ -22,6 +23,7 @@ _ORIGIN = re.compile(r"https?://(?P<authority>[^/?#@]+)")
 _ANY = "*"
 
 
+@functools.lru_cache(1000)
 def is_loopback(name: str) -> bool:
     """Tell whether a name or an address is this machine's own, without asking anybody.
 

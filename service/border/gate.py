@@ -4,7 +4,7 @@ import time
 from collections.abc import Sequence
 
 from fastapi import APIRouter, FastAPI
-from starlette.datastructures import Headers, MutableHeaders
+from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.border.authorities import Authorities
@@ -18,13 +18,13 @@ from simulator.errors import HybridTofError
 __all__ = ["WITHOUT_KEY", "Gate", "install"]
 
 # no answer is a page: nothing in it may run, be framed, be guessed at or be kept
-_HEADERS = {
-    "Cache-Control": "no-store",
-    "Content-Security-Policy": "default-src 'none'; frame-ancestors 'none'",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
-}
+_HEADERS = (
+    (b"cache-control", b"no-store"),
+    (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"x-content-type-options", b"nosniff"),
+)
 _BLOCK = 2**16
 
 WITHOUT_KEY = frozenset({"/health/live", "/health/ready"})
@@ -94,11 +94,11 @@ class Gate:
             nonlocal status, sent
             if message["type"] == "http.response.start":
                 status = message["status"]
-                headers = MutableHeaders(scope=message)
-                headers["X-Request-ID"] = name
-                for header, value in _HEADERS.items():
-                    headers.setdefault(header, value)
-                await send(message)
+                headers = list(message.get("headers", ()))
+                known = {header.lower() for header, _ in headers}
+                headers += [pair for pair in _HEADERS if pair[0] not in known]
+                headers.append((b"x-request-id", name.encode("ascii")))
+                await send(dict(message) | {"headers": headers})
                 return
             body = message.get("body", b"")
             held.answer(len(body))

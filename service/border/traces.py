@@ -6,8 +6,8 @@ Neither has what a request said: no query, no header, no body. A path is told by
 import contextvars
 import dataclasses
 import logging
+import random
 import re
-import uuid
 from collections.abc import Callable, Iterator, Mapping
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
@@ -30,7 +30,9 @@ _GONE = 499
 
 def request_id(given: str | None) -> str:
     """Return the id of a request: the client's own, where it is one, or a new one."""
-    return given if given is not None and _ID.fullmatch(given) else uuid.uuid4().hex
+    return (
+        given if given is not None and _ID.fullmatch(given) else f"{random.getrandbits(128):032x}"
+    )
 
 
 class _Jobs(Collector):
@@ -93,6 +95,7 @@ class Traces:
             buckets=_SECONDS,
             registry=self._registry,
         )
+        self._counted: dict[tuple[str, str, int], tuple[Counter, Histogram]] = {}
         self.open = Gauge(
             "hybridtof_requests_open", "Requests that wait for an answer", registry=self._registry
         )
@@ -102,8 +105,13 @@ class Traces:
         method = scope["method"] if scope["method"] in _METHODS else "other"
         route = scope.get("hybridtof.route", "none")
         status = _GONE if told.status is None else told.status
-        self._requests.labels(method, route, str(status)).inc()
-        self._seconds.labels(route).observe(told.seconds)
+        kind = (method, route, status)
+        if kind not in self._counted:  # to be looked up once, not at every request
+            counted = self._requests.labels(method, route, str(status))
+            self._counted[kind] = (counted, self._seconds.labels(route))
+        counts, seconds = self._counted[kind]
+        counts.inc()
+        seconds.observe(told.seconds)
         fields = {
             "method": method,
             "route": route,

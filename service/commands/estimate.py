@@ -45,7 +45,7 @@ def _run(args: argparse.Namespace) -> int:
     import json
 
     from inference.estimate import estimate
-    from service.answers.estimates import encode_estimates
+    from service.answers.encoding import encode_estimates
     from service.bad_rows import insert_answers
     from service.commands.files import check_folder, naming
     from service.commands.frames import checked

@@ -1,6 +1,7 @@
 """``hybridtof serve``: the service over HTTP."""
 
 import argparse
+import gc
 import os
 
 from service.commands.command import Subparsers, add_command
@@ -63,6 +64,10 @@ def _run(args: argparse.Namespace) -> int:
         port=args.port,
         log_config=log_config("warning" if args.quiet else "info"),
     )
+    # what is there stays: it is not to be searched for garbage while somebody waits, and a batch
+    # of frames makes more lists than Python takes for a sign of garbage
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 50)
     try:
         server.run()
     except SystemExit:

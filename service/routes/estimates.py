@@ -2,13 +2,14 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Request
+from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import Response
 
-from inference.estimate import estimate
+from inference.estimate import estimate, estimate_planned
 from inference.fits.techniques.registry import FITS
 from inference.plan import plan
-from service.answers.estimates import EstimatesResponse, encode_estimates
+from service.answers.encoding import encode_estimates
+from service.answers.estimates import ColumnarEstimatesResponse, EstimatesResponse, Shape
 from service.bodies import BodyOf
 from service.checked_system import aliases_of, checked_frames
 from service.errors import OverdueError
@@ -18,23 +19,27 @@ from service.messages.answering import message_answer
 from service.problems import problem_responses
 from service.requests import EstimateRequest
 from service.service_settings import ServiceSettings
-from service.shared import SMALL, shared_of
+from service.shared import SMALL, TINY, TINY_BYTES, shared_of
+from simulator.compiled import NotReadyError, ready_only
 from simulator.errors import InvalidInputError
 
 __all__ = ["answer", "quick_answer", "router"]
 
 router = APIRouter(prefix="/v1/estimates", tags=["estimates"])
 _FORMS = ("application/json", *(message.media_type for message in MESSAGES))
+_ANY = frozenset({"", "*/*", _FORMS[0]})
 Body = Annotated[tuple[EstimateRequest, bytes], Depends(BodyOf(EstimateRequest))]
 
 
-def answer(request: EstimateRequest) -> bytes:
+def answer(request: EstimateRequest, shape: Shape = "rows") -> bytes:
     """Estimate and encode.
 
     Parameters
     ----------
     request : EstimateRequest
         Sensor, scene, frames and techniques.
+    shape : str
+        Of `service.answers.encoding.encode_estimates`.
 
     Returns
     -------
@@ -47,10 +52,12 @@ def answer(request: EstimateRequest) -> bytes:
         With pointers into the request.
     """
     sensor, scene, frames = checked_frames(request.sensor, request.scene, request.frames)
-    return encode_estimates(estimate(sensor, scene, frames, request.techniques))
+    return encode_estimates(estimate(sensor, scene, frames, request.techniques), shape)
 
 
-def quick_answer(request: EstimateRequest, settings: ServiceSettings) -> bytes | None:
+def quick_answer(
+    request: EstimateRequest, settings: ServiceSettings, shape: Shape = "rows", most: int = SMALL
+) -> bytes | None:
     """Estimate and encode where that is a matter of milliseconds.
 
     Parameters
@@ -59,11 +66,15 @@ def quick_answer(request: EstimateRequest, settings: ServiceSettings) -> bytes |
         As of `answer`.
     settings : ServiceSettings
         How many frames a fit may have.
+    shape : str
+        As of `answer`.
+    most : int
+        Estimates of frames that may be asked for, by all techniques together.
 
     Returns
     -------
     bytes or None
-        As of `answer`; None where a fit over many frames is asked for, or many frames are sent.
+        As of `answer`; None where a fit over many frames is asked for, or more than ``most``.
 
     Raises
     ------
@@ -71,18 +82,27 @@ def quick_answer(request: EstimateRequest, settings: ServiceSettings) -> bytes |
         As of `answer`, and for a fit of too many frames.
     """
     sensor, scene, frames = checked_frames(request.sensor, request.scene, request.frames)
-    names = request.techniques
-    if names is None:
-        names = [name for name in (plan(sensor, scene, frames).chosen,) if name is not None]
-    most = settings.max_fit_frames
-    if FITS.keys() & set(names):
-        if len(frames) > most:
-            message = f"a fit over frames takes at most {most} of them here: ask for a posterior"
+    choice = plan(sensor, scene, frames)
+    names = {choice.chosen} if request.techniques is None else set(request.techniques)
+    limit = settings.max_fit_frames
+    if FITS.keys() & names:
+        if len(frames) > limit:
+            message = f"a fit over frames takes at most {limit} of them here: ask for a posterior"
             raise InvalidInputError.at("/frames", message)
         return None
-    if len(frames) * aliases_of(sensor, scene) > SMALL:
+    if len(frames) * aliases_of(sensor, scene) * len(names) > most:
         return None
-    return encode_estimates(estimate(sensor, scene, frames, request.techniques))
+    found = estimate_planned(sensor, scene, frames, choice, request.techniques)
+    return encode_estimates(found, shape)
+
+
+def tiny_answer(request: EstimateRequest, settings: ServiceSettings, shape: Shape) -> bytes | None:
+    """Answer as `quick_answer`; None where that takes longer than handing it to a thread may."""
+    try:
+        with ready_only():
+            return quick_answer(request, settings, shape, TINY)
+    except NotReadyError:
+        return None
 
 
 @router.post(
@@ -90,23 +110,33 @@ def quick_answer(request: EstimateRequest, settings: ServiceSettings) -> bytes |
     response_model=None,
     responses={
         200: {
-            "model": EstimatesResponse,
+            "model": EstimatesResponse | ColumnarEstimatesResponse,
             "content": {message.media_type: {} for message in MESSAGES},
         },
         **problem_responses(400, 413, 415, 422, 503),
     },
 )
-async def create(request: Request, body: Body) -> Response:
-    """Return all physical roots of every frame, or one message a frame by ``Accept``."""
-    shared = shared_of(request)
-    form = accepted_type(",".join(request.headers.getlist("accept")), _FORMS) or _FORMS[0]
-    if form != _FORMS[0]:
-        messages = await shared.processes.run(request, message_answer, body[0], form)
+async def create(
+    request: Request,
+    body: Body,
+    shape: Annotated[Shape, Query(description="of `frames` in JSON")] = "rows",
+) -> Response:
+    """Return all physical roots of every frame, or one message a frame by ``Accept``.
+
+    ``frames`` are a list of objects, or with ``shape=columns`` an object of lists.
+    """
+    shared, asked = shared_of(request), body[0]
+    accept = ",".join(request.headers.getlist("accept"))
+    if accept not in _ANY and (form := accepted_type(accept, _FORMS) or _FORMS[0]) != _FORMS[0]:
+        messages = await shared.processes.run(request, message_answer, asked, form)
         return Response(messages, headers={"Vary": "Accept"}, media_type=form)
-    content = await shared.threads.run(request, quick_answer, body[0], shared.settings)
+    tiny = len(body[1]) <= TINY_BYTES
+    content = tiny_answer(asked, shared.settings, shape) if tiny else None
+    if content is None:
+        content = await shared.threads.run(request, quick_answer, asked, shared.settings, shape)
     if content is None:
         try:
-            content = await shared.processes.run(request, answer, body[0])
+            content = await shared.processes.run(request, answer, asked, shape)
         except OverdueError as error:
             raise OverdueError(f"{error}: ask for a posterior, or send fewer frames") from None
     return Response(content, media_type="application/json")

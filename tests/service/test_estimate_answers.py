@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from inference.estimates import Estimates, LeftOut, SdParts, Status, TechniqueResult
-from service.answers.estimates import encode_estimates
+from service.answers.encoding import encode_estimates
 
 REASONS = ("", 'a "quoted" {brace} reason', "beyond the background: é")
 
