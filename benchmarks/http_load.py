@@ -7,7 +7,7 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -16,9 +16,11 @@ _LENGTH = re.compile(rb"content-length: ([0-9]+)", re.IGNORECASE)
 
 
 @contextlib.contextmanager
-def served(*module: str, tree: Path | None = None, **more: str) -> Iterator[str]:
+def served(
+    *module: str, tree: Path | None = None, settings: Mapping[str, str] | None = None
+) -> Iterator[str]:
     """Run a module that serves, of another checkout perhaps; its address."""
-    environment = os.environ | more
+    environment = os.environ | (settings or {})
     if tree is not None:
         environment["PYTHONPATH"] = str(tree)
     server = subprocess.Popen(  # noqa: S603
@@ -115,7 +117,7 @@ def asked(address: str, request: bytes, clients: int, count: int) -> tuple[list[
         begun = time.perf_counter()
         connections = [
             await loop.create_connection(
-                lambda: _Client(request, times, left), url.hostname, url.port
+                lambda: _Client(request, times, left), url.hostname or "", url.port or 0
             )
             for _ in range(clients)
         ]

@@ -108,11 +108,11 @@ def main() -> None:
     with contextlib.ExitStack() as stack:
         servers = {
             "empty": stack.enter_context(served("benchmarks.empty_service")),
-            "service": stack.enter_context(served(*serve, **limits)),
+            "service": stack.enter_context(served(*serve, settings=limits)),
         }
         if args.against is not None:
             servers["other checkout"] = stack.enter_context(
-                served(*serve, tree=args.against, **limits)
+                served(*serve, tree=args.against, settings=limits)
             )
         for name, address in servers.items():
             if name != "empty":  # machine code is loaded, or made

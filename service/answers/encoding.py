@@ -5,6 +5,7 @@ but for their numbers: of each kind the texts of columns are laid between texts 
 """
 
 import dataclasses
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,7 +14,7 @@ import orjson
 from numpy.typing import NDArray
 
 from inference.estimates import Estimates, SdParts, Status, TechniqueResult
-from service.answers.estimates import Shape
+from service.answers.estimates import AnswerShape
 from service.json_text import encode
 
 __all__ = ["encode_estimates"]
@@ -30,7 +31,7 @@ _STATUS = tuple(status.name.lower() for status in Status)
 _ALL = slice(None)
 
 
-def encode_estimates(estimates: Estimates, shape: Shape = "rows") -> bytes:
+def encode_estimates(estimates: Estimates, shape: AnswerShape = "rows") -> bytes:
     """Return the body of ``POST /v1/estimates``.
 
     Parameters
@@ -55,7 +56,7 @@ def encode_estimates(estimates: Estimates, shape: Shape = "rows") -> bytes:
     return b"".join(parts)
 
 
-def _technique(result: TechniqueResult, shape: Shape) -> Iterator[bytes]:
+def _technique(result: TechniqueResult, shape: AnswerShape) -> Iterator[bytes]:
     """Yield JSON text of one technique's results, block by block."""
     yield b'{"technique":' + encode(result.technique) + b',"frames":'
     if shape == "columns":
@@ -96,9 +97,9 @@ def _columns(result: TechniqueResult) -> Iterator[bytes]:
         named = zip(SdParts._fields, parts, strict=True)
         columns["sd_parts_m"] = {name: np.where(known, x[:, 0], np.nan) for name, x in named}
     if bounds is not None:
-        fine = np.isfinite(bounds).all(axis=1).tolist()
-        pairs = zip(bounds.tolist(), fine, strict=True)
-        columns["range_bounds_m"] = [pair if good else None for pair, good in pairs]
+        columns["range_bounds_m"] = [
+            pair if math.isfinite(sum(pair)) else None for pair in bounds.tolist()
+        ]
     columns |= {name: x for name in _OF_MOTION if (x := getattr(result, name)) is not None}
     for number, (name, column) in enumerate(columns.items()):
         yield (f',"{name}":' if number else f'{{"{name}":').encode() + _dumps(column)

@@ -5,17 +5,17 @@ from typing import Literal
 import pydantic
 
 __all__ = [
+    "AnswerShape",
     "ColumnarEstimatesResponse",
     "EstimateColumns",
     "EstimatesResponse",
     "FrameEstimate",
     "LeftOutTechnique",
-    "Shape",
     "TechniqueColumns",
     "TechniqueEstimates",
 ]
 
-Shape = Literal["rows", "columns"]
+AnswerShape = Literal["rows", "columns"]
 StatusName = Literal["unique", "ambiguous", "none", "saturated"]
 
 

@@ -1,6 +1,5 @@
 """Draws as NDJSON: one object a draw."""
 
-import json
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from service.exports.described import DescribedDraws
 from service.exports.export import Export
+from service.json_text import encode
 
 __all__ = ["EXPORT", "to_ndjson"]
 
@@ -18,7 +18,7 @@ def _plain(values: NDArray[Any]) -> list[float | None]:
     return [value if math.isfinite(value) else None for value in values.tolist()]
 
 
-def _lines(described: DescribedDraws) -> Iterator[str]:
+def _lines(described: DescribedDraws) -> Iterator[bytes]:
     draws = described.draws
     where = {int(step): k for k, step in enumerate(draws.thinned)}
     for ensemble, walker, step in np.ndindex(draws.log_density.shape):
@@ -40,7 +40,7 @@ def _lines(described: DescribedDraws) -> Iterator[str]:
                 column: _plain(draws.readings[at][:, k])
                 for k, column in enumerate(described.columns)
             }
-        yield json.dumps(line, allow_nan=False, separators=(",", ":"))
+        yield encode(line)
 
 
 def to_ndjson(described: DescribedDraws) -> bytes:
@@ -58,7 +58,7 @@ def to_ndjson(described: DescribedDraws) -> bytes:
         have ``range_m``, ``log_likelihood`` and replicated ``readings`` of all frames, null where
         a frame was saturated or holds no object; the others lack these members.
     """
-    return b"".join(line.encode() + b"\n" for line in _lines(described))
+    return b"".join(line + b"\n" for line in _lines(described))
 
 
 EXPORT = Export("application/x-ndjson", ".ndjson", to_ndjson)

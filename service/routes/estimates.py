@@ -9,7 +9,7 @@ from inference.estimate import estimate, estimate_planned
 from inference.fits.techniques.registry import FITS
 from inference.plan import plan
 from service.answers.encoding import encode_estimates
-from service.answers.estimates import ColumnarEstimatesResponse, EstimatesResponse, Shape
+from service.answers.estimates import AnswerShape, ColumnarEstimatesResponse, EstimatesResponse
 from service.bodies import BodyOf
 from service.checked_system import aliases_of, checked_frames
 from service.errors import OverdueError
@@ -31,7 +31,7 @@ _ANY = frozenset({"", "*/*", _FORMS[0]})
 Body = Annotated[tuple[EstimateRequest, bytes], Depends(BodyOf(EstimateRequest))]
 
 
-def answer(request: EstimateRequest, shape: Shape = "rows") -> bytes:
+def answer(request: EstimateRequest, shape: AnswerShape = "rows") -> bytes:
     """Estimate and encode.
 
     Parameters
@@ -56,7 +56,10 @@ def answer(request: EstimateRequest, shape: Shape = "rows") -> bytes:
 
 
 def quick_answer(
-    request: EstimateRequest, settings: ServiceSettings, shape: Shape = "rows", most: int = SMALL
+    request: EstimateRequest,
+    settings: ServiceSettings,
+    shape: AnswerShape = "rows",
+    most: int = SMALL,
 ) -> bytes | None:
     """Estimate and encode where that is a matter of milliseconds.
 
@@ -96,7 +99,9 @@ def quick_answer(
     return encode_estimates(found, shape)
 
 
-def tiny_answer(request: EstimateRequest, settings: ServiceSettings, shape: Shape) -> bytes | None:
+def tiny_answer(
+    request: EstimateRequest, settings: ServiceSettings, shape: AnswerShape
+) -> bytes | None:
     """Answer as `quick_answer`; None where that takes longer than handing it to a thread may."""
     try:
         with ready_only():
@@ -119,7 +124,7 @@ def tiny_answer(request: EstimateRequest, settings: ServiceSettings, shape: Shap
 async def create(
     request: Request,
     body: Body,
-    shape: Annotated[Shape, Query(description="of `frames` in JSON")] = "rows",
+    shape: Annotated[AnswerShape, Query(description="of `frames` in JSON")] = "rows",
 ) -> Response:
     """Return all physical roots of every frame, or one message a frame by ``Accept``.
 

@@ -1,14 +1,13 @@
 """What frames would tell of a scene, before they are taken."""
 
-import dataclasses
 from typing import Annotated
 
-import pydantic_core
 from fastapi import APIRouter, Depends, Request
 from fastapi.responses import Response
 
 from service.answers.identifiability import IdentifiabilityResponse, identifiability_of
 from service.bodies import BodyOf
+from service.json_text import encode
 from service.problems import problem_responses
 from service.requests import IdentifiabilityRequest
 from service.shared import shared_of
@@ -25,7 +24,7 @@ _COST = 10
 
 def answer(request: IdentifiabilityRequest) -> bytes:
     """Foresee and encode; see `service.answers.identifiability.identifiability_of`."""
-    return pydantic_core.to_json(dataclasses.asdict(identifiability_of(request)))
+    return encode(identifiability_of(request))
 
 
 @router.post(

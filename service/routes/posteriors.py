@@ -4,10 +4,10 @@ import hashlib
 import re
 from collections.abc import AsyncIterable, AsyncIterator
 from datetime import UTC, datetime
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Query, Request
-from fastapi.responses import JSONResponse, Response
+from fastapi.responses import Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.exceptions import HTTPException
 
@@ -18,6 +18,7 @@ from service.checked_system import checked_frames
 from service.errors import MalformedError, NotAcceptableError
 from service.exports import EXPORTS
 from service.exports.negotiation import accepted_export
+from service.json_text import encode
 from service.lanes import while_wanted
 from service.problems import problem_responses
 from service.requests import PosteriorRequest, SystemDescription
@@ -36,6 +37,10 @@ def _key(header: str | None) -> str | None:
     if header is not None and not _KEY.fullmatch(header):
         raise MalformedError("Idempotency-Key must be 1 to 255 visible ASCII characters")
     return header
+
+
+def _answer(body: Any, status: int = 200, headers: dict[str, str] | None = None) -> Response:
+    return Response(encode(body), status, headers, "application/json")
 
 
 @router.post(
@@ -61,7 +66,7 @@ async def create(
     record = await shared.jobs.submit(
         *checked, sampler, key=key, digest=digest, client=client_of(request)
     )
-    return JSONResponse(full(record), 202, {"Location": f"/v1/posteriors/{record.id}"})
+    return _answer(full(record), 202, {"Location": f"/v1/posteriors/{record.id}"})
 
 
 @router.get(
@@ -80,7 +85,7 @@ async def page(
     after = None if cursor is None else int(cursor)
     records = await shared_of(request).jobs.page(after, limit + 1, client_of(request))
     more = str(records[limit - 1].sequence) if len(records) > limit else None
-    return JSONResponse({"items": [brief(r) for r in records[:limit]], "next_cursor": more})
+    return _answer({"items": [brief(r) for r in records[:limit]], "next_cursor": more})
 
 
 @router.get(
@@ -90,7 +95,7 @@ async def page(
 )
 async def get(request: Request, job_id: str) -> Response:
     """Return a posterior as it stands."""
-    return JSONResponse(full(await shared_of(request).jobs.get(job_id, client_of(request))))
+    return _answer(full(await shared_of(request).jobs.get(job_id, client_of(request))))
 
 
 async def _followed(
@@ -169,7 +174,7 @@ async def scene(request: Request, job_id: str) -> Response:
 )
 async def cancel(request: Request, job_id: str) -> Response:
     """End a posterior after the chunk that runs; it keeps what it has. One that ended stays."""
-    return JSONResponse(full(await shared_of(request).jobs.cancel(job_id, client_of(request))), 202)
+    return _answer(full(await shared_of(request).jobs.cancel(job_id, client_of(request))), 202)
 
 
 @router.delete("/{job_id}", status_code=204, response_model=None, responses=problem_responses(404))

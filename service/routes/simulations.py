@@ -2,13 +2,13 @@
 
 from typing import Annotated
 
-import pydantic_core
 from fastapi import APIRouter, Depends, Request
 from fastapi.responses import Response
 
 from service.answers.simulations import SimulationResponse, simulation_of
 from service.bodies import BodyOf
 from service.caps import frames_within
+from service.json_text import encode
 from service.problems import problem_responses
 from service.requests import SimulationRequest
 from service.shared import shared_of
@@ -21,7 +21,7 @@ Body = Annotated[tuple[SimulationRequest, bytes], Depends(BodyOf(SimulationReque
 
 def answer(request: SimulationRequest) -> bytes:
     """Simulate and encode; see `service.answers.simulations.simulation_of`."""
-    return pydantic_core.to_json(simulation_of(request))
+    return encode(simulation_of(request))
 
 
 @router.post(

@@ -2,17 +2,18 @@
 
 import contextlib
 import dataclasses
-import json
 import threading
 import time
 from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
+import orjson
 import sqlalchemy as sa
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.errors import IdempotencyError, StoreError
+from service.json_text import encode
 from service.store.database import brief, engine_of, is_sqlite, ready
 from service.store.holder import has_ended
 from service.store.record import QUEUED, Claimed, JobRecord, NewJob, Status
@@ -31,14 +32,14 @@ _ALL = (*_BRIEF, JOB.c.result, JOB.c.problem)
 
 
 def _text(value: dict[str, Any] | None) -> str | None:
-    return None if value is None else json.dumps(value, allow_nan=False)
+    return None if value is None else encode(value).decode()
 
 
 def _record(row: sa.Row[Any]) -> JobRecord:
     fields = dict(row._mapping)
     for name in ("progress", "result", "problem"):
         if fields.get(name) is not None:
-            fields[name] = json.loads(fields[name])
+            fields[name] = orjson.loads(fields[name])
     return JobRecord(**fields)
 
 

@@ -46,6 +46,16 @@ def slow(result: TechniqueResult) -> list[dict[str, Any]]:
     return frames
 
 
+def assert_same_as_rows(columns: dict[str, Any], rows: list[dict[str, Any]]) -> None:
+    """What a row lacks is null in its column; no row has a member without a column."""
+    parts = columns.pop("sd_parts_m", None)
+    assert all(row.keys() <= columns.keys() | {"sd_parts_m"} for row in rows)
+    for name, column in columns.items():
+        assert column == [row.get(name) for row in rows]
+    for name in SdParts._fields if parts else ():
+        assert parts[name] == [(row.get("sd_parts_m") or {}).get(name) for row in rows]
+
+
 @st.composite
 def results(draw: st.DrawFn) -> TechniqueResult:
     n = draw(st.integers(0, 30))
@@ -87,6 +97,10 @@ def test_same_as_one_dictionary_a_frame(result: TechniqueResult) -> None:
     assert body["chosen"] is None
     assert body["left_out"] == [{"technique": "intensity", "reason": 'needs "c0"'}]
     assert len(body["results"]) == 2
+    columns = json.loads(encode_estimates(estimates, "columns"))
+    assert columns | {"results": None} == body | {"results": None}
+    for item in columns["results"]:
+        assert_same_as_rows(item["frames"], slow(result))
     for item in body["results"]:
         assert item.keys() == {"technique", "frames", "parameters", "runtime_s"}
         assert item["frames"] == slow(result)

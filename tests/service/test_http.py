@@ -57,6 +57,20 @@ async def test_estimates(client: httpx.AsyncClient, request_body: dict[str, Any]
     EstimatesResponse.model_validate(body)
 
 
+async def test_estimates_as_columns(
+    client: httpx.AsyncClient, request_body: dict[str, Any]
+) -> None:
+    rows = (await client.post("/v1/estimates", json=request_body)).json()
+    answer = await client.post("/v1/estimates?shape=columns", json=request_body)
+    columns = answer.json()["results"][0]["frames"]
+    for name, column in columns.items():
+        if name != "sd_parts_m":
+            assert column == [frame.get(name) for frame in rows["results"][0]["frames"]]
+    refused = await client.post("/v1/estimates?shape=heap", json=request_body)
+    assert refused.status_code == 422
+    assert [error["pointer"] for error in refused.json()["errors"]] == ["/query/shape"]
+
+
 async def test_estimates_as_messages(
     client: httpx.AsyncClient, request_body: dict[str, Any]
 ) -> None:

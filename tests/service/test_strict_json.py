@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from service.errors import MalformedError
-from service.strict_json import MAX_DEPTH, SHORT, check_bulk, decode
+from service.strict_json import MAX_DEPTH, SHORT, _decode_slowly, check_bulk, decode
 from simulator.errors import InvalidInputError
 from simulator.frames import FrameColumns
 from simulator.validated import parse
@@ -28,6 +28,31 @@ json_values = st.recursive(
 def test_reads_what_the_standard_library_reads(value: Any) -> None:
     assert decode(json.dumps(value).encode()) == value
     assert decode(json.dumps(value, ensure_ascii=False).encode()) == value
+
+
+def outcome(read: Any, raw: bytes) -> Any:
+    try:
+        return read(raw)
+    except (InvalidInputError, MalformedError) as error:
+        return type(error), str(error)
+
+
+PIECES = r"""{"a": {"b": ,"a": ,"b": [ ] } , 1 -0 1.5e3 1e999 ":" null true NaN
+18446744073709551615 36893488147419103232 "\ud800" "é" """
+pieces = st.sampled_from(PIECES.split())
+
+
+@given(st.lists(pieces, max_size=12).map("".join))
+def test_fast_and_slow_reading_are_the_same(text: str) -> None:
+    """Values, refusals and their words: orjson alone would take a member that comes twice."""
+    fast, slow = outcome(decode, text.encode()), outcome(_decode_slowly, text.encode())
+    assert repr(fast) == repr(slow)  # so that nan is nan, and 1 is not 1.0
+
+
+def test_a_member_that_is_repeated_inside_a_column_is_seen() -> None:
+    column = [{"a": 1}] * (SHORT + 1)
+    with pytest.raises(InvalidInputError, match="number"):
+        check_bulk(decode(json.dumps({"w1": column}).encode()))
 
 
 @pytest.mark.parametrize(

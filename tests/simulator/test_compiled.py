@@ -262,3 +262,23 @@ def test_kernels_use_nothing_that_the_digest_does_not_see(path: Path) -> None:
                 if not there.exists():  # a module of a package, imported by its name
                     there = ROOT / origin[name].replace(".", "/") / f"{name}.py"
                 assert MARK in there.read_text(), f"{function.name} uses {name} of {there}"
+
+
+def test_who_is_in_a_hurry_gets_what_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The interpreter answers at once what it has answered before; nothing is compiled."""
+
+    def half(x: float) -> float:
+        return x / 2
+
+    monkeypatch.delenv("KERNELS_COMPILE", raising=False)
+    kernel: Any = simulator.compiled.compiled(half)
+    with simulator.compiled.ready_only(), pytest.raises(simulator.compiled.NotReadyError):
+        kernel(3.0)
+    assert kernel(3.0) == 1.5
+    with simulator.compiled.ready_only():
+        assert kernel(3.0) == 1.5
+        with pytest.raises(simulator.compiled.NotReadyError):
+            kernel(3)  # another kind of call, which wants machine code of its own
+    monkeypatch.setenv("KERNELS_COMPILE", "always")
+    with simulator.compiled.ready_only(), pytest.raises(simulator.compiled.NotReadyError):
+        kernel(3.0)
