@@ -53,7 +53,7 @@ ALLOWED: dict[str, str] = {
     "service/border": "service",
     "service/commands": "service inference",
     "service/demo": "service inference",
-    "service/exports": "service.fold inference",
+    "service/exports": "service.fold service.json_text inference",
     "service/messages": "service inference",
     "service/report": "service inference",
     "service/routes": "service inference",
