@@ -9,10 +9,12 @@ from inference.estimates import Estimates, LeftOut, TechniqueResult
 from inference.known import known_of
 from inference.plan import Plan, cheapest, obstacle, plan
 from inference.realtime.registry import TECHNIQUES
+from inference.shared_error import with_shared_error
 from inference.technique import Task
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.errors import InvalidInputError, Problem, RefusedError
 from simulator.frames import Frames
+from simulator.joint_scene import around, centre
 from simulator.scene import Scene
 from simulator.scene_checks import check_scene
 from simulator.sensor import Sensor
@@ -31,7 +33,8 @@ def estimate(
         The sensor.
     scene : Scene
         What is known of the scene. Of priors only the supports are used, and as where a fit over
-        many frames begins to look.
+        many frames begins to look. Of a joint law techniques of single frames take the numbers at
+        its centre, and its spread is the part ``scene`` of every standard deviation.
     frames : Frames
         The readings.
     techniques : sequence of str, optional
@@ -96,7 +99,6 @@ def estimate_planned(
     ]
     if problems:
         raise InvalidInputError(*problems)
-    known = known_of(scene)
     served: list[TechniqueResult] = []
     left_out = {item.name: item for item in choice.left_out if item.name not in techniques}
     if choice.chosen is not None and choice.chosen not in techniques:
@@ -104,7 +106,9 @@ def estimate_planned(
     for name in dict.fromkeys(techniques):
         reason = ELSEWHERE.get(name)
         if reason is None:
-            reason = obstacle(ALL_TECHNIQUES[name], sensor, scene, known, frames)
+            # a fit over many frames asks the frames alone
+            stated = centre(sensor, scene) if name in TECHNIQUES else scene
+            reason = obstacle(ALL_TECHNIQUES[name], sensor, stated, known_of(stated), frames)
         found = LeftOut(name, reason) if reason else _run(sensor, scene, frames, name)
         if isinstance(found, LeftOut):
             left_out[name] = found
@@ -117,10 +121,24 @@ def estimate_planned(
 def _run(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> TechniqueResult | LeftOut:
     start = time.perf_counter()
     try:
-        result = ALL_TECHNIQUES[name].solve(Task(sensor, scene, frames, known_of(scene)))
+        result = _solved(sensor, scene, frames, name)
     except RefusedError as error:
         return LeftOut(name, str(error))
     return dataclasses.replace(result, runtime_s=time.perf_counter() - start)
+
+
+def _solved(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> TechniqueResult:
+    solve = ALL_TECHNIQUES[name].solve
+    if scene.joint is None or name not in TECHNIQUES:
+        return solve(Task(sensor, scene, frames, known_of(scene)))
+
+    def at(stated: Scene) -> TechniqueResult:
+        return solve(Task(sensor, stated, frames, known_of(stated), physical=False))
+
+    middle = centre(sensor, scene)
+    result = solve(Task(sensor, middle, frames, known_of(middle)))
+    pairs = ((at(plus), at(minus)) for plus, minus in around(sensor, scene))
+    return with_shared_error(result, pairs)
 
 
 def all_roots(
@@ -149,6 +167,7 @@ def all_roots(
     """
     if technique not in TECHNIQUES:
         raise InvalidInputError.at("/technique", f"{technique!r} is not a real-time technique")
+    scene = centre(sensor, scene)
     known = known_of(scene)
     reason = obstacle(TECHNIQUES[technique], sensor, scene, known, frames)
     if reason is not None:

@@ -10,6 +10,7 @@ from inference.technique import Technique
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.errors import listed
 from simulator.frames import Frames
+from simulator.joint_scene import centre
 from simulator.scene import Scene
 from simulator.sensor import Sensor, SineWaveSensor
 
@@ -116,6 +117,7 @@ def plan(sensor: Sensor, scene: Scene, frames: Frames | None = None) -> Plan:
     Plan
         The choice, and the reason against each other technique.
     """
+    scene = centre(sensor, scene)
     known = known_of(scene)
     obstacles = {
         name: obstacle(technique, sensor, scene, known, frames)

@@ -4,7 +4,6 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 import pydantic
-from scipy import linalg
 
 from simulator.sensor import PulsedSensor, SineWaveSensor
 from simulator.validated import NonNegative, Number, Positive, Validated
@@ -59,8 +58,8 @@ class NormalMode(Validated):
         if not np.allclose(correlation, correlation.T, rtol=0.0, atol=_SYMMETRIC):
             raise ValueError("covariance must be symmetric")
         try:
-            linalg.cholesky(correlation)
-        except linalg.LinAlgError:
+            np.linalg.cholesky(correlation)
+        except np.linalg.LinAlgError:
             raise ValueError("covariance must be positive definite") from None
         return self
 

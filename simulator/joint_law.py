@@ -3,8 +3,8 @@
 import dataclasses
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg, special
 
 from simulator.joint import Joint
 from simulator.unknowns import Unknown, Values
@@ -22,6 +22,8 @@ class JointLaw:
 
     Attributes
     ----------
+    names : tuple of str
+        The unknowns that it names.
     mean, sd : ndarray, shape (d,)
         Of the unknowns in the coordinates of their independent priors; 0 and 1 of those that the
         law does not name.
@@ -33,6 +35,7 @@ class JointLaw:
         Mean of each mode in z, and the Cholesky factor of its covariance.
     """
 
+    names: tuple[str, ...]
     mean: Array
     sd: Array
     mixing: Array
@@ -46,7 +49,7 @@ class JointLaw:
 
     def joint(self, t: Array) -> Array:
         """Inverse of `marginal`."""
-        return np.asarray(linalg.solve_triangular(self.mixing, t.T, lower=True).T)
+        return np.asarray(scipy.linalg.solve_triangular(self.mixing, t.T, lower=True).T)
 
     def unknown(self, j: int, of: Unknown) -> Unknown:
         """Return unknown number j as a function of its t: the law is inside its support anyway."""
@@ -66,10 +69,12 @@ class JointLaw:
             return np.asarray(-0.5 * np.einsum("ij,ij->i", z, z))
         terms = []
         for weight, centre, factor in zip(self.weights, self.centres, self.factors, strict=True):
-            off = linalg.solve_triangular(factor, (z - centre).T, lower=True, check_finite=False)
+            off = scipy.linalg.solve_triangular(
+                factor, (z - centre).T, lower=True, check_finite=False
+            )
             size = np.log(weight) - np.log(np.diagonal(factor)).sum()
             terms.append(size - 0.5 * np.einsum("ji,ji->i", off, off))
-        return np.asarray(special.logsumexp(terms, axis=0))
+        return np.asarray(scipy.special.logsumexp(terms, axis=0))
 
     def sample(self, rng: np.random.Generator, n: int) -> Array:
         """Draw n vectors z."""
@@ -108,18 +113,22 @@ def joint_law(joint: Joint, names: tuple[str, ...]) -> JointLaw:
     off = means - mean
     whole = np.einsum("k,kij->ij", weights, covariances + off[:, :, None] * off[:, None, :])
     sd = np.sqrt(np.diagonal(whole))
-    mixing = linalg.cholesky(whole / sd[:, None] / sd, lower=True)
+    mixing = scipy.linalg.cholesky(whole / sd[:, None] / sd, lower=True)
     mixing /= np.linalg.norm(mixing, axis=1)[:, None]
     if len(weights) == 1:
-        return JointLaw(mean, sd, mixing, np.empty(0), np.empty((0, d)), np.empty((0, d, d)))
-    centres = linalg.solve_triangular(mixing, (off / sd).T, lower=True).T
+        return JointLaw(
+            joint.unknowns, mean, sd, mixing, np.empty(0), np.empty((0, d)), np.empty((0, d, d))
+        )
+    centres = scipy.linalg.solve_triangular(mixing, (off / sd).T, lower=True).T
     factors = [
-        linalg.solve_triangular(
+        scipy.linalg.solve_triangular(
             mixing,
-            sd_k[:, None] * linalg.cholesky(c / sd_k[:, None] / sd_k, lower=True) / sd[:, None],
+            sd_k[:, None]
+            * scipy.linalg.cholesky(c / sd_k[:, None] / sd_k, lower=True)
+            / sd[:, None],
             lower=True,
         )
         for c in covariances
         for sd_k in [np.sqrt(np.diagonal(c))]
     ]
-    return JointLaw(mean, sd, mixing, weights, centres, np.array(factors))
+    return JointLaw(joint.unknowns, mean, sd, mixing, weights, centres, np.array(factors))

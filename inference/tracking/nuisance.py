@@ -39,7 +39,8 @@ def nuisance_of(
     parameters : Parameters
         The scene's unknowns.
     posterior : Posterior or ndarray, shape (draws, d), optional
-        Draws in SI units in the order of ``parameters.names``, or a posterior of this scene.
+        Draws in SI units in the order of ``parameters.names``, or a posterior of this scene. Left
+        out, the scene's joint law is what is known.
     learnt : tuple of str
         Unknowns that need no posterior.
 
@@ -55,15 +56,17 @@ def nuisance_of(
         Where something is unknown and there is no posterior.
     """
     names = parameters.names
-    free = [name for name in names if name not in learnt and not name.startswith("range_m.")]
+    told = () if parameters.law is None else parameters.law.names
+    free = [name for name in names if name not in (*learnt, *told) and "range_m." not in name]
     origin = np.zeros(len(names))
     if posterior is None:
         if free:
             raise RefusedError(
                 f"{', '.join(free)} unknown: a tracker needs numbers or a posterior; infer one "
-                "from frames of this scene first, and pass it"
+                "from frames of this scene first, and pass it, or calibrate the scene"
             )
-        return Nuisance(parameters.terms(origin[None]), (), ())
+        steps = np.eye(len(names))[[names.index(name) for name in told]]
+        return _around(parameters, origin, steps)
     draws = _draws(parameters, posterior)
     with np.errstate(all="ignore"):
         z = parameters.standard(draws)
@@ -73,6 +76,10 @@ def nuisance_of(
     _, sizes, directions = np.linalg.svd(z - centre, full_matrices=False)
     roots = directions * (sizes / np.sqrt(len(z) - 1.0))[:, None]
     roots = roots[sizes > 1e-12 * sizes.max(initial=0.0)]
+    return _around(parameters, centre, roots)
+
+
+def _around(parameters: Parameters, centre: Array, roots: Array) -> Nuisance:
     return Nuisance(
         parameters.terms(centre[None]),
         tuple(parameters.terms((centre + root)[None]) for root in roots),

@@ -102,7 +102,8 @@ def tracker(
     posterior : Posterior or ndarray, shape (draws, d), optional
         What is known of the scene's unknowns: draws in SI units in the order of
         ``parameters_of(sensor, scene).names``. Their uncertainty is common to all frames: it is in
-        every standard deviation and does not average down.
+        every standard deviation and does not average down. Left out, it is the scene's joint law,
+        where it has one.
 
     Returns
     -------
@@ -125,8 +126,10 @@ def tracker(
     _check(sensor, scene, settings)
     observed = observed_of(sensor, settings)
     unknown_crosstalk = tuple(n for n in parameters.crosstalk or () if n in parameters.names)
+    told = () if parameters.law is None else parameters.law.names
+    untold = [name for name in unknown_crosstalk if name not in told]
     learns = not observed.by_rate and (
-        settings.crosstalk_drift is not None or (posterior is None and bool(unknown_crosstalk))
+        settings.crosstalk_drift is not None or (posterior is None and bool(untold))
     )
     # derivatives do not see crosstalk at all
     spared = unknown_crosstalk if learns or observed.by_rate else ()
@@ -142,7 +145,8 @@ def tracker(
     erring = scene.model_error
     carried = ModelError(0.0, 0.0, integrated=False)
     if not observed.by_rate:
-        fixed = not any(name.startswith("object.") for name in parameters.names)
+        # numbers, or a joint law, come from a fit
+        fixed = not any(n.startswith("object.") and n not in told for n in parameters.names)
         carried = erring.beside_numbers() if fixed else erring
     jacobian = nuisance_jacobian(sensor, carried, known, knots, observed.scale, not learns)
     crosstalk = np.zeros(2)

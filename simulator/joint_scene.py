@@ -1,0 +1,92 @@
+"""A scene with a joint law as scenes of known numbers: at its centre, and around it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulator.parameters import parameters_of
+from simulator.scene import Scene, Shadow
+from simulator.sensor import Sensor
+
+__all__ = ["around", "centre"]
+
+Array = NDArray[np.float64]
+
+
+def centre(sensor: Sensor, scene: Scene) -> Scene:
+    """Return the scene with the numbers at the centre of its joint law.
+
+    Parameters
+    ----------
+    sensor, scene : Sensor, Scene
+        The scene, checked.
+
+    Returns
+    -------
+    Scene
+        Without a joint law; the scene itself where it has none.
+    """
+    if scene.joint is None:
+        return scene
+    parameters = parameters_of(sensor, scene)
+    return _at(
+        sensor, scene, parameters.names, parameters.natural(np.zeros((1, len(parameters))))[0]
+    )
+
+
+def around(sensor: Sensor, scene: Scene) -> tuple[tuple[Scene, Scene], ...]:
+    """Return scenes a standard deviation off the centre on either side, a pair a direction.
+
+    The directions are independent of one another under the joint law.
+
+    Parameters
+    ----------
+    sensor, scene : Sensor, Scene
+        The scene, checked, with a joint law.
+
+    Returns
+    -------
+    tuple of (Scene, Scene)
+        Without joint laws.
+    """
+    assert scene.joint is not None  # noqa: S101  # see above
+    parameters = parameters_of(sensor, scene)
+    names = parameters.names
+    steps = np.eye(len(names))[[names.index(name) for name in scene.joint.unknowns]]
+    plus, minus = parameters.natural(steps), parameters.natural(-steps)
+    return tuple(
+        (_at(sensor, scene, names, up), _at(sensor, scene, names, down))
+        for up, down in zip(plus, minus, strict=True)
+    )
+
+
+def _at(sensor: Sensor, scene: Scene, names: tuple[str, ...], values: Array) -> Scene:
+    """Put numbers in place of what the joint law names."""
+    assert scene.joint is not None  # noqa: S101  # its callers have seen to it
+    numbers = {
+        name: value
+        for name, value in zip(names, values.tolist(), strict=True)
+        if name in scene.joint.unknowns
+    }
+
+    def of(path: str) -> dict[str, float]:
+        return {
+            name.removeprefix(path): value
+            for name, value in numbers.items()
+            if name.startswith(path) and "." not in name.removeprefix(path)
+        }
+
+    changes: dict[str, object] = {"joint": None, "calibration": None}
+    changes["object"] = scene.object.model_copy(update=of("object."))
+    if scene.crosstalk_values is not None:
+        given = of("crosstalk.")
+        changes["crosstalk"] = tuple(
+            given.get(column, value)
+            for column, value in zip(sensor.columns, scene.crosstalk_values, strict=True)
+        )
+    if scene.background is not None:
+        update: dict[str, object] = dict(of("background."))
+        shadow = of("background.shadow.")
+        if shadow and isinstance(scene.background.shadow, Shadow):
+            update["shadow"] = scene.background.shadow.model_copy(update=shadow)
+        changes["background"] = scene.background.model_copy(update=update)
+    return scene.model_copy(update=changes)

@@ -1,0 +1,62 @@
+"""A tracker of a calibrated scene: it knows what one with the posterior's draws knows."""
+
+import numpy as np
+import pytest
+
+from inference.tracking.settings import TrackingSettings
+from inference.tracking.track import track
+from simulator.errors import RefusedError
+from simulator.parameters import parameters_of
+from simulator.scene import parse_scene
+from simulator.sensor import parse_sensor
+from simulator.simulate import simulate
+from simulator.trajectories import RadialTrajectory
+
+SENSOR = parse_sensor({"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1e-4, 1e-4]}})
+STATED = {"crosstalk": [{"prior": "normal", "mean": 0.003, "sd": 0.05}] * 2}
+NAMES = parameters_of(SENSOR, parse_scene(STATED)).names
+
+
+@pytest.mark.parametrize("drift", [None, (1e-5, 1e-5)])
+@pytest.mark.parametrize("discrepancy", [0, 0.05])
+def test_a_law_and_draws_of_it_are_the_same(
+    drift: tuple[float, float] | None, discrepancy: float
+) -> None:
+    rng = np.random.default_rng(1)
+    d = len(NAMES)
+    root = 0.01 * np.tril(rng.normal(size=(d, d)))
+    normal = rng.standard_normal((400, d))
+    normal -= normal.mean(axis=0)
+    normal = normal @ np.linalg.inv(np.linalg.cholesky(normal.T @ normal / 399)).T
+    prior = parse_scene(STATED | {"discrepancy": discrepancy})
+    draws = parameters_of(SENSOR, prior).natural(normal @ root.T)
+    mode = {"mean": [0.0] * d, "covariance": (root @ root.T).tolist()}
+    law = parse_scene(
+        STATED | {"discrepancy": discrepancy, "joint": {"unknowns": list(NAMES), "modes": [mode]}}
+    )
+    settings = TrackingSettings(crosstalk_drift=drift)
+    path = RadialTrajectory(from_m=0.5, to_m=1.2, frames=8, duration_s=4.0)
+    truth = parameters_of(SENSOR, prior).natural(np.zeros((1, d)))[0].tolist()
+    known = {
+        "object": dict(zip(("c0", "c1", "c2"), truth[:3], strict=True)),
+        "crosstalk": truth[3:],
+    }
+    frames = simulate(SENSOR, parse_scene(known), path, 3).frames
+    here = track(SENSOR, law, frames, settings)
+    there = track(SENSOR, prior, frames, settings, draws)
+    assert np.isfinite(here.range_m[2:]).all()
+    # second differences of directions that are turned: a hundredth of one that is a hundredth wide
+    assert np.allclose(here.range_m, there.range_m, rtol=1e-3, equal_nan=True)
+    assert np.allclose(here.sd_m, there.sd_m, rtol=2e-2, equal_nan=True)
+
+
+def test_what_the_law_does_not_name_is_refused() -> None:
+    joint = {"unknowns": ["object.c0"], "modes": [{"mean": [0.0], "covariance": [[1e-6]]}]}
+    frames = simulate(
+        SENSOR,
+        parse_scene({"object": {"c0": 0.08, "c1": 0.0, "c2": 0.1}}),
+        RadialTrajectory(from_m=0.5, to_m=1.2, frames=2),
+        3,
+    ).frames
+    with pytest.raises(RefusedError, match=r"object\.c1, object\.c2 unknown"):
+        track(SENSOR, parse_scene({"joint": joint}), frames)
