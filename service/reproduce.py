@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service.commands.command import Subparsers, add_command, note
-from simulator.optics.appendix_b import Row, rows_as_csv, simulate
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from simulator.optics.appendix_b import Row
 
 __all__ = ["add_parser", "reproduce_appendix_b", "reproduce_figures"]
 
@@ -32,6 +33,8 @@ def _as_table(rows: "Iterable[Row]") -> str:
 
 def reproduce_appendix_b(args: argparse.Namespace) -> int:
     """Write Appendix B's table of one system to standard output and return the exit code."""
+    from simulator.optics.appendix_b import rows_as_csv, simulate
+
     rows = list(simulate(args.system, converged=args.converged))
     if args.format == "csv":
         sys.stdout.write(rows_as_csv(rows))

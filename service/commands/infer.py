@@ -1,7 +1,6 @@
 """``hybridtof infer``: the posterior of the frames in a file."""
 
 import argparse
-import asyncio
 import json
 import os
 import sys
@@ -146,6 +145,8 @@ def posterior_of(
     (JobRecord, bytes or None)
         None where there are no draws, or nothing is to be made of them.
     """
+    import asyncio
+
     from service.commands.files import naming, source
 
     with naming({"/frames": source(args.frames), "": str(args.scene)}):

@@ -9,7 +9,7 @@ import pytest
 from inference.estimate import estimate
 from inference.estimates import Status
 from inference.fits.answer.counts import frames_needed
-from inference.fits.likelihood.problem import unknowns_of
+from inference.fits.likelihood.unknowns import unknowns_of
 from inference.identifiability.experiment import Experiment, information
 from inference.plan import plan
 from simulator.frames import Frames

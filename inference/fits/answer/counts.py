@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from inference.fits.likelihood.problem import unknowns_of
+from inference.fits.likelihood.unknowns import unknowns_of
 from inference.known import Known
 from inference.realtime.net import SATURATED, rule_out
 from simulator.errors import listed

@@ -16,6 +16,7 @@ from inference.fits.likelihood.coordinates import (
     physical,
 )
 from inference.fits.likelihood.supports import supports_of
+from inference.fits.likelihood.unknowns import paths_of
 from inference.frame.arguments import Instrument, Rows
 from inference.frame.blocks import own_blocks
 from inference.frame.sensitivity import Value
@@ -26,7 +27,7 @@ from simulator.parameters import Parameters, parameters_of
 from simulator.scene import Scene
 from simulator.sensor import Sensor, instrument
 
-__all__ = ["FitProblem", "fit_problem", "unknowns_of"]
+__all__ = ["FitProblem", "fit_problem"]
 
 Array = NDArray[np.float64]
 
@@ -176,56 +177,12 @@ class FitProblem:
         )
 
 
-def _paths(sensor: Sensor) -> tuple[str, ...]:
-    """Scene paths in the order of `Value`."""
-    first, second = sensor.columns
-    return (
-        "object.c0",
-        "object.c1",
-        "object.c2",
-        f"crosstalk.{first}",
-        f"crosstalk.{second}",
-        "background.strength",
-        "background.distance_m",
-        "background.shadow.c0",
-        "background.shadow.c1",
-    )
-
-
-# a plan asks several times in a row about one scene
-_asked: list[tuple[Sensor, Scene, tuple[str, ...]]] = []
-
-
-def unknowns_of(sensor: Sensor, scene: Scene) -> tuple[str, ...]:
-    """Return the scene paths of everything unknown but the ranges.
-
-    Parameters
-    ----------
-    sensor : Sensor
-        Names the two crosstalks.
-    scene : Scene
-        The scene, checked.
-
-    Returns
-    -------
-    tuple of str
-        In the order object, crosstalk, background, shadow.
-    """
-    for before, what, found in _asked[:1]:
-        if before is sensor and what is scene:
-            return found
-    names = set(parameters_of(sensor, scene).names)
-    unknowns = tuple(path for path in _paths(sensor) if path in names)
-    _asked[:] = [(sensor, scene, unknowns)]
-    return unknowns
-
-
 def _known_and_unknown(
     sensor: Sensor, parameters: Parameters, unit: float
 ) -> tuple[tuple[str, ...], NDArray[np.int64], Array]:
     """Return names of the coordinates, the coordinate of each value, and the known values."""
     index, known = np.full(SLOTS, KNOWN, dtype=np.int64), np.zeros(SLOTS)
-    paths = _paths(sensor)
+    paths = paths_of(sensor)
     names = tuple(path for path in paths if path in parameters.names)
     for k, path in enumerate(paths):
         if path in names:

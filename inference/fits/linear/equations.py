@@ -6,6 +6,7 @@ changes with both readings, the range along with them, and the weights from a fi
 """
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable
 
@@ -20,7 +21,7 @@ from inference.technique import Task, Technique
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 
-__all__ = ["Equations", "Observed", "fit_equations"]
+__all__ = ["Equations", "Observed", "fit_equations", "without_warnings"]
 
 Array = NDArray[np.float64]
 
@@ -208,3 +209,22 @@ def _best_roots(equations: Equations, roots: Array, x: Array) -> Array:
         misses.append(np.where(np.isnan(miss), np.inf, miss))
     index = np.argmin(np.stack(misses, axis=1), axis=1)
     return np.asarray(roots[np.arange(roots.shape[0]), index])
+
+
+def without_warnings(
+    solve: Callable[[Task], TechniqueResult],
+) -> Callable[[Task], TechniqueResult]:
+    """Wrap a solver so that overflow shows in its numbers, which `linear_answer` judges.
+
+    Parameters
+    ----------
+    solve : callable
+        Task -> TechniqueResult.
+    """
+
+    @functools.wraps(solve)
+    def quiet(task: Task) -> TechniqueResult:
+        with np.errstate(all="ignore"):
+            return solve(task)
+
+    return quiet

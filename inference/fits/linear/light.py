@@ -1,12 +1,16 @@
 """Readings that numbers of a scene make at given ranges, over frames."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.frame.sensitivity import Sensitivity, sensitivity
 from simulator.frames import Frames
 from simulator.parameters import Terms
 from simulator.sensor import PulsedSensor, Sensor
+
+if TYPE_CHECKING:
+    from inference.frame.sensitivity import Sensitivity
 
 __all__ = ["background_light", "carrier", "component", "gains", "object_light"]
 
@@ -37,7 +41,9 @@ def component(sensor: Sensor, readings: Array, r: Array) -> Array:
 
 def _light(
     sensor: Sensor, shape: Triple, background: Quad | None, r: Array, gain: Array
-) -> Sensitivity:
+) -> "Sensitivity":
+    from inference.frame.sensitivity import sensitivity
+
     rows = None if background is None else np.array([background])
     terms = Terms(np.array([shape]), None, rows, np.empty((1, 8)))
     return sensitivity(sensor, terms, np.log(r), gain)

@@ -1,8 +1,6 @@
 """From a linear fit to a result: parameters, fit report, ranges that all frames agree upon."""
 
 import dataclasses
-import functools
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -21,7 +19,7 @@ from inference.technique import Task
 from simulator.errors import RefusedError
 from simulator.parameters import parameters_of
 
-__all__ = ["linear_answer", "not_identified", "without_warnings"]
+__all__ = ["linear_answer", "not_identified"]
 
 Array = NDArray[np.float64]
 
@@ -29,25 +27,6 @@ Array = NDArray[np.float64]
 def not_identified(reason: str) -> dict[str, Any]:
     """Return the entry of a parameter of which the frames say nothing."""
     return {"value": None, "sd": None, "status": "not_identified", "reason": reason}
-
-
-def without_warnings(
-    solve: Callable[[Task], TechniqueResult],
-) -> Callable[[Task], TechniqueResult]:
-    """Wrap a solver so that overflow shows in its numbers, which `linear_answer` judges.
-
-    Parameters
-    ----------
-    solve : callable
-        Task -> TechniqueResult.
-    """
-
-    @functools.wraps(solve)
-    def quiet(task: Task) -> TechniqueResult:
-        with np.errstate(all="ignore"):
-            return solve(task)
-
-    return quiet
 
 
 def linear_answer(

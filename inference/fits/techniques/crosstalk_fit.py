@@ -14,12 +14,10 @@ from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
 from inference.fits.answer.counts import too_few
-from inference.fits.answer.likelihood_answer import likelihood_answer_from
-from inference.fits.likelihood.problem import unknowns_of
-from inference.fits.linear.follow import Follow
+from inference.fits.likelihood.unknowns import unknowns_of
+from inference.fits.linear.equations import without_warnings
 from inference.fits.linear.least_squares import LinearFit, solve_weighted
 from inference.fits.linear.light import object_light
-from inference.fits.linear.linear_answer import linear_answer, without_warnings
 from inference.frame.arguments import instrument_of
 from inference.frame.noise import whiteners
 from inference.known import Known
@@ -178,6 +176,11 @@ def _fitted(task: Task, unknown: tuple[str, ...]) -> tuple[LinearFit, TechniqueR
 
 
 def _solve(task: Task) -> TechniqueResult:
+    # imported where a fit is asked for: plans of single frames go without
+    from inference.fits.answer.likelihood_answer import likelihood_answer_from
+    from inference.fits.linear.follow import Follow
+    from inference.fits.linear.linear_answer import linear_answer
+
     unknown = unknowns_of(task.sensor, task.scene)
     fit, single = _fitted(task, unknown)
     order = [path for path in _paths(task) if path in unknown]

@@ -15,14 +15,11 @@ from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
 from inference.fits.answer.counts import linear_obstacle, too_few
-from inference.fits.answer.likelihood_answer import likelihood_answer_from
-from inference.fits.likelihood.problem import unknowns_of
+from inference.fits.likelihood.unknowns import unknowns_of
 from inference.fits.linear.at_rest import refuse_at_rest
-from inference.fits.linear.equations import Equations, Observed, fit_equations
-from inference.fits.linear.follow import Follow
+from inference.fits.linear.equations import Equations, Observed, fit_equations, without_warnings
 from inference.fits.linear.least_squares import LinearFit
 from inference.fits.linear.light import background_light, carrier, component, gains
-from inference.fits.linear.linear_answer import linear_answer, without_warnings
 from inference.known import Known
 from inference.realtime.techniques.background_intensity import BACKGROUND_INTENSITY
 from inference.realtime.techniques.conventional import CONVENTIONAL
@@ -133,6 +130,11 @@ def _natural(x: Array, factor: Array) -> dict[str, tuple[float, Array]]:
 
 def _solve(task: Task) -> TechniqueResult:
     technique = CONVENTIONAL if task.scene.background is None else BACKGROUND_INTENSITY
+    # imported where a fit is asked for: plans of single frames go without
+    from inference.fits.answer.likelihood_answer import likelihood_answer_from
+    from inference.fits.linear.follow import Follow
+    from inference.fits.linear.linear_answer import linear_answer
+
     unknown = unknowns_of(task.sensor, task.scene)
     to_x, fixed = _map(unknown, task.known)
 

@@ -13,12 +13,10 @@ from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
 from inference.fits.answer.counts import linear_obstacle, too_few
-from inference.fits.answer.likelihood_answer import likelihood_answer_from
-from inference.fits.likelihood.problem import unknowns_of
+from inference.fits.likelihood.unknowns import unknowns_of
 from inference.fits.linear.at_rest import refuse_at_rest
-from inference.fits.linear.equations import Equations, Observed, fit_equations
+from inference.fits.linear.equations import Equations, Observed, fit_equations, without_warnings
 from inference.fits.linear.light import background_light, component, gains, object_light
-from inference.fits.linear.linear_answer import without_warnings
 from inference.known import Known
 from inference.realtime.net import SATURATED, rule_out
 from inference.realtime.techniques.background_cancelling import BACKGROUND_CANCELLING
@@ -91,7 +89,14 @@ def _solve(task: Task) -> TechniqueResult:
         )
     # the ranges that were regressed on are no truth: the likelihood knows their noise
     values = {_C0: 1.0 / y[0], _C1: y[1] / y[0]}
-    return likelihood_answer_from("shadow_fit", task, {path: values[path] for path in unknown})
+    return _by_likelihood(task, {path: values[path] for path in unknown})
+
+
+def _by_likelihood(task: Task, values: dict[str, float]) -> TechniqueResult:
+    # imported where a fit is asked for: plans of single frames go without
+    from inference.fits.answer.likelihood_answer import likelihood_answer_from
+
+    return likelihood_answer_from("shadow_fit", task, values)
 
 
 def _solve_strength(task: Task) -> TechniqueResult:
@@ -118,7 +123,7 @@ def _solve_strength(task: Task) -> TechniqueResult:
             f"the best fit has a background of strength {value:.3g}; leave the background out of "
             "the scene, or use a posterior with priors"
         )
-    return likelihood_answer_from("shadow_fit", task, {_STRENGTH: value})
+    return _by_likelihood(task, {_STRENGTH: value})
 
 
 def _obstacle(sensor: Sensor, scene: Scene, known: Known, frames: Frames | None) -> str | None:
