@@ -88,6 +88,7 @@ def create_app(
         description="Distance from hybrid intensity/time-of-flight sensors. SI units throughout.",
         lifespan=lifespan,
         redirect_slashes=False,
+        generate_unique_id_function=openapi.name_of,
         # pages that fetch their scripts from elsewhere; /openapi.json says what they would show
         docs_url=None,
         redoc_url=None,

@@ -1,4 +1,9 @@
-"""The OpenAPI document, with the bodies that the service reads by itself."""
+"""The OpenAPI document: what FastAPI says of the routes, and what it cannot know.
+
+Bodies that the service reads by itself, with examples; what the border answers; where a posterior
+that was asked for is found; and tags of unions, which have to be sent although Python may leave
+them out.
+"""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -11,9 +16,17 @@ from pydantic.json_schema import models_json_schema
 
 from service.bodies import BodyOf
 from service.border.gate import WITHOUT_KEY
+from service.examples import EXAMPLES
 from service.problems import ProblemDetails, problem_responses
 
-__all__ = ["install"]
+__all__ = ["install", "name_of"]
+
+_POSTERIORS = "/v1/posteriors"
+
+
+def name_of(route: APIRoute) -> str:
+    """Name an operation: its resource and what is done, for methods of generated clients."""
+    return f"{route.tags[0]}_{route.name}"
 
 
 def _bodies(routers: Sequence[APIRouter]) -> Iterator[tuple[str, str, type[BaseModel]]]:
@@ -53,14 +66,54 @@ def install(app: FastAPI, routers: Sequence[APIRouter]) -> None:
             for path, method, model in bodies:
                 document["paths"][path][method]["requestBody"] = {
                     "required": True,
-                    "content": {"application/json": {"schema": references[model, "validation"]}},
+                    "content": {
+                        "application/json": {
+                            "schema": references[model, "validation"],
+                            "examples": EXAMPLES.get(model, {}),
+                        }
+                    },
                 }
+            for schema in document["components"]["schemas"].values():
+                _tell_what_is_sent(schema)
+            _add_links(document)
             _drop_supposed_refusals(document)
             _add_border(document)
             app.openapi_schema = document
         return app.openapi_schema
 
     app.openapi = openapi  # type: ignore[method-assign]  # FastAPI's own way to extend it
+
+
+def _tell_what_is_sent(schema: dict[str, Any]) -> None:
+    """Require what a union is told by, and leave out defaults that are whole objects.
+
+    Who generates a client cannot write such a default down; the field's text says what it is.
+    """
+    for name, member in schema.get("properties", {}).items():
+        if "const" in member and "default" in member:
+            del member["default"]
+            schema["required"] = sorted({*schema.get("required", ()), name})
+        elif isinstance(member.get("default"), dict | list):
+            del member["default"]
+
+
+def _add_links(document: dict[str, Any]) -> None:
+    """Say where a posterior is found that was asked for, and what can be done with it."""
+    paths = document["paths"]
+    links = {
+        operation["operationId"]: {
+            "operationId": operation["operationId"],
+            "parameters": {"job_id": "$response.body#/id"},
+        }
+        for path, operations in paths.items()
+        for operation in operations.values()
+        if path.startswith(_POSTERIORS + "/{job_id}")
+    }
+    made = paths[_POSTERIORS]["post"]["responses"]["202"]
+    made["links"] = links
+    made["headers"] = {
+        "Location": {"required": True, "schema": {"type": "string", "format": "uri-reference"}}
+    }
 
 
 def _add_border(document: dict[str, Any]) -> None:

@@ -25,9 +25,15 @@ def _of_size(value: float) -> float:
 
 
 _SIZE = pydantic.AfterValidator(_of_size)
-Number = Annotated[float, _SIZE]
-Positive = Annotated[float, pydantic.Field(gt=0), _SIZE]
-NonNegative = Annotated[float, pydantic.Field(ge=0), _SIZE]
+
+
+def _between(low: float) -> pydantic.WithJsonSchema:
+    return pydantic.WithJsonSchema({"type": "number", "minimum": low, "maximum": _LARGEST})
+
+
+Number = Annotated[float, _SIZE, _between(-_LARGEST)]
+Positive = Annotated[float, pydantic.Field(gt=0), _SIZE, _between(1 / _LARGEST)]
+NonNegative = Annotated[float, pydantic.Field(ge=0), _SIZE, _between(0.0)]
 
 
 class Validated(pydantic.BaseModel):

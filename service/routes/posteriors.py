@@ -31,6 +31,8 @@ router = APIRouter(prefix="/v1/posteriors", tags=["posteriors"])
 Body = Annotated[tuple[PosteriorRequest, bytes], Depends(BodyOf(PosteriorRequest))]
 
 _KEY = re.compile(r"[\x21-\x7e]{1,255}")
+# by which OpenAPI says what is refused here, with words of its own
+_KEY_PATTERN, _CURSOR_PATTERN = "^[!-~]{1,255}$", "^[0-9]{1,18}$"
 
 
 def _key(header: str | None) -> str | None:
@@ -52,7 +54,9 @@ def _answer(body: Any, status: int = 200, headers: dict[str, str] | None = None)
 async def create(
     request: Request,
     body: Body,
-    idempotency_key: Annotated[str | None, Header()] = None,
+    idempotency_key: Annotated[
+        str | None, Header(json_schema_extra={"pattern": _KEY_PATTERN})
+    ] = None,
 ) -> Response:
     """Start a posterior; the same Idempotency-Key with the same body gives the same one."""
     key = _key(idempotency_key)
@@ -76,11 +80,11 @@ async def create(
 )
 async def page(
     request: Request,
-    cursor: str | None = None,
+    cursor: Annotated[str | None, Query(json_schema_extra={"pattern": _CURSOR_PATTERN})] = None,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
 ) -> Response:
     """List posteriors, the newest first; ``next_cursor`` is null on the last page."""
-    if cursor is not None and not re.fullmatch(r"[0-9]{1,18}", cursor):
+    if cursor is not None and not re.fullmatch(_CURSOR_PATTERN, cursor):
         raise MalformedError("the cursor is not one that this service gave")
     after = None if cursor is None else int(cursor)
     records = await shared_of(request).jobs.page(after, limit + 1, client_of(request))

@@ -24,8 +24,9 @@ FREE = ("/truth", "/problem")
 
 
 @pytest.fixture(scope="module")
-def document() -> dict[str, Any]:
-    return create_app(ServiceSettings(workers=1)).openapi()
+def document(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    database = f"sqlite:///{tmp_path_factory.mktemp('jobs')}/jobs.sqlite"
+    return create_app(ServiceSettings(workers=1, database=database)).openapi()
 
 
 def validator(document: dict[str, Any], operation: str) -> jsonschema.Draft202012Validator:
