@@ -51,6 +51,7 @@ ALLOWED: dict[str, str] = {
     "service/adapters": "service.errors",
     "service/answers": "service inference",
     "service/border": "service",
+    "service/c_export": "service.messages inference",
     "service/commands": "service inference",
     "service/demo": "service inference",
     "service/exports": "service.fold service.json_text inference",

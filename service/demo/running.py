@@ -49,6 +49,7 @@ def running_service() -> Iterator[str]:
     )
     assert process.stderr is not None  # noqa: S101  # asked for above
     said: list[str] = []
+    drain = threading.Thread(target=process.stderr.read, daemon=True)
     try:
         for line in process.stderr:
             said.append(line)
@@ -57,7 +58,6 @@ def running_service() -> Iterator[str]:
         else:
             raise DemoError("the service does not start:\n" + "".join(said))
         # a full pipe would halt the service
-        drain = threading.Thread(target=process.stderr.read, daemon=True)
         drain.start()
         yield found[1]
     finally:
@@ -67,6 +67,9 @@ def running_service() -> Iterator[str]:
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
+        if drain.is_alive():
+            drain.join()
+        process.stderr.close()
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,0 +1,105 @@
+"""The conventional range in C: one division, or one arctangent."""
+
+import math
+
+from service.c_export.source import Asked, Bound, Exported, noise_lines
+from simulator.sensor import PulsedSensor
+
+__all__ = ["conventional"]
+
+# 8 roundings beyond its ends, as everywhere (inference.realtime.assemble)
+_PULSE = """
+static int answer(real first, real second, @_answer *out)
+{
+    const real late = first - CROSSTALK1, whole = second - CROSSTALK2;
+    real share, range, variance, noise;
+    if (!(whole > 0) || !(late > 0) || !(late <= whole))
+        return @_NONE;
+    share = late / whole;
+    range = R0 * share;
+    if (!(range >= LOW * (1 - 8 * EPSILON)) || !(range <= HIGH * (1 + 8 * EPSILON)))
+        return @_NONE;
+    {
+@NOISE        variance = own1 + share * share * own2 + (1 - share) * (1 - share) * shared;
+    }
+    noise = R0 / whole * SQRT(variance);
+    if (noise < EPSILON * range)
+        noise = EPSILON * range;
+    out->range_m = range;
+    out->sd_m = SQRT(noise * noise + MODEL * MODEL);
+    return @_UNIQUE;
+}
+"""
+_WAVE = """
+static int answer(real first, real second, @_answer *out)
+{
+    const real x = first - CROSSTALK1, y = second - CROSSTALK2;
+    const real size = LARGER(x, y), a = x / size, b = y / size;
+    real phase, range, sd, band;
+    if (!(size > 0))
+        return @_NONE;
+    phase = ATAN2(y, x) - OFFSET;
+    if (phase < 0)
+        phase += TURN;
+    if (phase >= TURN)
+        phase -= TURN;
+    {
+@NOISE        sd = SQRT(b * b * (own1 + shared) + a * a * (own2 + shared)) / (a * a + b * b) / size;
+    }
+    band = 3 * sd < TURN / 4 ? 3 * sd : TURN / 4;
+    if (!(phase > 0) || phase > TURN - band)
+        return @_NONE;
+    range = phase / WAVE_NUMBER;
+    if (!(range >= LOW * (1 - 8 * EPSILON)) || !(range <= HIGH * (1 + 8 * EPSILON)))
+        return @_NONE;
+    sd = sd / WAVE_NUMBER;
+    if (sd < EPSILON * range)
+        sd = EPSILON * range;
+    out->range_m = range;
+    out->sd_m = SQRT(sd * sd + MODEL * MODEL);
+    return @_UNIQUE;
+}
+"""
+
+
+def conventional(asked: Asked) -> Exported:
+    """Write the conventional range; see `service.c_export.export`."""
+    sensor, (low, high) = asked.sensor, asked.known.support
+    assert asked.known.crosstalk is not None  # noqa: S101  # what the plan leaves out
+    first, second = asked.known.crosstalk
+    read = sensor.noise.read
+    limits = (low, min(high, sensor.max_range_m))
+    constants = {
+        "CROSSTALK1": first,
+        "CROSSTALK2": second,
+        "LOW": limits[0],
+        "HIGH": limits[1],
+        "READ1": read[0],
+        "READ2": read[1],
+        "SHOT": sensor.noise.shot,
+        "MODEL": asked.error.range_m,
+    }
+    crosstalk = abs(first) / read[0] + abs(second) / read[1]
+    # the noise is scoped, since C99 declares where it likes but not twice
+    noise = noise_lines(sensor).replace("    const", "        const")
+    if isinstance(sensor, PulsedSensor):
+        return Exported(
+            constants | {"R0": sensor.r0},
+            {},
+            _PULSE.replace("@NOISE", noise),
+            Bound(0.0, 6.0, 0.0, crosstalk, (0.0, 0.0), read),
+            "r0 (w1 - x1) / (w2 - x2): five roundings of the range, and those of the crosstalk x, "
+            "which are small beside the noise of the same reading",
+            limits,
+        )
+    k, offset = sensor.wave_number, math.remainder(sensor.phase_offset_rad, 2 * math.pi)
+    return Exported(
+        constants | {"OFFSET": offset, "WAVE_NUMBER": k, "TURN": 2 * math.pi},
+        {},
+        _WAVE.replace("@NOISE", noise),
+        # arctangent 4 pi, offset and its difference 4 pi, turn and its sum 4 pi, readings 1
+        Bound(0.0, 3.0, (1 + 12 * math.pi) / k, crosstalk, (0.0, 0.0), read),
+        "the phase over k, given an atan2 within 2 units in the last place; whatever range of the "
+        "phase is used, its roundings are those of a whole turn",
+        limits,
+    )

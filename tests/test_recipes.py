@@ -1,0 +1,162 @@
+"""Every recipe as it stands on its page, run against a running service."""
+
+import contextlib
+import json
+import os
+import queue
+import re
+import shlex
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from paho.mqtt import client as mqtt
+from paho.mqtt.enums import CallbackAPIVersion
+
+from service.cli import main
+from service.demo.running import running_service
+
+PAGE = (Path(__file__).parents[1] / "docs" / "recipes.md").read_text(encoding="utf-8")
+MARK = "executed by tests/test_recipes.py"
+SYSTEM = {
+    "sensor": {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [2e-5, 1e-3]}},
+    "scene": {"crosstalk": [0.004, 0.02]},
+}
+FRAMES = [{"w1": 0.0242, "w2": 0.4230}, {"w1": 0.0162, "w2": 0.1711}, {"w1": 0.0, "w2": 0.0}]
+RANGES = [0.7513, 1.2103, None]
+WAIT_S = 60.0  # for what comes in milliseconds on an idle machine
+
+
+def block(mark: str) -> str:
+    found = re.search(rf"<!-- {mark} -->\n```\w*\n(.*?)\n```", PAGE, re.DOTALL)
+    assert found is not None, mark
+    return found[1] + "\n"
+
+
+@pytest.fixture
+def system(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(SYSTEM))
+    return path
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A service whose store is nobody else's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        with running_service() as address:
+            yield address
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler: install cc")
+@pytest.mark.parametrize("flags", [[], ["-DHYBRIDTOF_FLOAT"]], ids=["double", "float"])
+def test_c(flags: list[str], tmp_path: Path, system: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(system.parent)
+    program, *words = shlex.split(block(f"command: {MARK}"))
+    assert program == "hybridtof"
+    assert main(words) == 0
+    (tmp_path / "main.c").write_text(block("c: compiled and run by tests/test_recipes.py"))
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
+    subprocess.run(["cc", *strict, *flags, "main.c", "-o", "main", "-lm"], check=True)
+    said = subprocess.run(["./main"], check=True, capture_output=True, text=True).stdout
+    assert f"`{said.strip()}`" in PAGE
+
+
+def test_ndjson(address: str, system: Path, tmp_path: Path) -> None:
+    program = tmp_path / "lines.py"
+    program.write_text(block(f"ndjson: {MARK}"))
+    command = [sys.executable, str(program), str(system), address]
+    lines = "".join(json.dumps(frame) + "\n" for frame in FRAMES)
+    run = subprocess.run(command, input=lines, capture_output=True, text=True, check=True)
+    answers = [json.loads(line) for line in run.stdout.splitlines()]
+    found = [answer["range_m"] for answer in answers]
+    assert found[:2] == pytest.approx(RANGES[:2], abs=1e-4)
+    assert found[2] is None
+    bad = subprocess.run(command, input='{"w1": 1, "w2": "x"}\n', capture_output=True, text=True)
+    assert bad.returncode == 1
+    assert "/frames/w2/0" in bad.stderr
+
+
+@contextlib.contextmanager
+def broker(folder: Path) -> Iterator[int]:
+    """The broker of Debian on a port that nobody has."""
+    command = shutil.which("mosquitto", path=f"{os.environ['PATH']}:/usr/sbin")
+    if command is None:
+        pytest.skip("no MQTT broker: apt-get install mosquitto")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    settings = folder / "mosquitto.conf"
+    settings.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\n")
+    process = subprocess.Popen([command, "-c", str(settings)], stderr=subprocess.DEVNULL)
+    try:
+        end = time.monotonic() + WAIT_S
+        while True:
+            try:
+                socket.create_connection(("127.0.0.1", port), timeout=1).close()
+                break
+            except OSError:
+                assert process.poll() is None
+                assert time.monotonic() < end
+                time.sleep(0.02)
+        yield port
+    finally:
+        process.terminate()
+        process.wait(timeout=WAIT_S)
+
+
+def test_mqtt(address: str, system: Path, tmp_path: Path) -> None:
+    code = block(f"mqtt: {MARK}")
+    assert len([line for line in code.splitlines() if line.strip()]) <= 36
+    program = tmp_path / "bridge.py"
+    program.write_text(code)
+    heard: queue.Queue[tuple[str, Any]] = queue.Queue()
+
+    def until(topic: str) -> Any:
+        while True:
+            where, payload = heard.get(timeout=WAIT_S)
+            if where == topic:
+                return payload
+
+    with broker(tmp_path) as port:
+        listener = mqtt.Client(CallbackAPIVersion.VERSION2)
+        listener.on_message = lambda _client, _data, message: heard.put(
+            (message.topic, message.payload.decode())
+        )
+        listener.on_connect = lambda client, *_: client.subscribe("#")
+        listener.connect("127.0.0.1", port)
+        listener.loop_start()
+        environment = os.environ | {"MQTT_PORT": str(port), "SERVICE": address}
+        bridge = subprocess.Popen([sys.executable, str(program), str(system)], env=environment)
+        try:
+            sensor = json.loads(until("homeassistant/sensor/hybridtof_shelf/config"))
+            # https://www.home-assistant.io/integrations/sensor.mqtt/
+            assert sensor["device_class"] == "distance"
+            assert sensor["unit_of_measurement"] == "m"
+            assert sensor["device"]["identifiers"]
+            assert until(sensor["availability_topic"]) == "online"
+            for frame, range_m in zip(FRAMES, RANGES, strict=True):
+                listener.publish("shelf/frame", json.dumps(frame))
+                state = json.loads(until(sensor["state_topic"]))
+                if range_m is None:
+                    assert state["range_m"] is None
+                    assert state["reason"]
+                else:
+                    assert state["range_m"] == pytest.approx(range_m, abs=1e-4)
+            for junk in ("{", "[1]", '{"w1": 1}', '{"w1": "x", "w2": 1}'):
+                listener.publish("shelf/frame", junk)
+                assert json.loads(until(sensor["state_topic"]))["range_m"] is None
+            bridge.kill()
+            assert until(sensor["availability_topic"]) == "offline"
+        finally:
+            bridge.kill()
+            bridge.wait(timeout=WAIT_S)
+            listener.loop_stop()
+            listener.disconnect()
