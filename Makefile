@@ -22,7 +22,7 @@ setup: $(READY) ## Create .venv with the locked dependencies
 demo: $(READY) ## Readings to distances through the running service: a table, out/demo.png
 	$(BIN)/hybridtof demo --out out
 
-report: $(READY) ## Error against run time of every technique: a table, out/report.json, out/report.png
+report: $(READY) ## Error against run time of every method: a table, out/report.html, .md, .json, .png
 	$(BIN)/hybridtof report --quick --out out
 
 readme: $(READY) ## Write the table of techniques in docs/techniques.md anew
@@ -31,8 +31,9 @@ readme: $(READY) ## Write the table of techniques in docs/techniques.md anew
 api: $(READY) ## Write docs/api.md from the docstrings anew
 	$(BIN)/python docs/make_api.py > docs/api.md
 
-picture: $(READY) ## Make the README's picture anew
+picture: $(READY) report ## Make the README's pictures anew
 	$(BIN)/hybridtof demo --out docs
+	cp out/report.png docs/report.png
 
 notebook: $(READY) ## Run the notebook and store its outputs
 	$(BIN)/jupyter-execute --inplace notebooks/posterior_diagnostics.ipynb

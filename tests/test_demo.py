@@ -1,6 +1,5 @@
-"""The demo and the report as their users run them."""
+"""The demo as its users run it."""
 
-import json
 import math
 import subprocess
 import sys
@@ -11,9 +10,6 @@ import pytest
 
 from service.demo.answers import Answer, Episode, Point, of_estimates, of_posterior
 from service.demo.table import table
-from service.report.measure import Effort, measure
-from service.report.scenes import SCENES
-from service.report.table import table as report_table
 
 ROOT = Path(__file__).parents[1]
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -91,21 +87,3 @@ def test_table() -> None:
     assert rows[2][-4:] == ["1.4000", "(25%),", "2.0000", "(75%)"]
     assert rows[3] == ["2.5000", "-", "-", "none"]
     assert "a remark" in text
-
-
-@pytest.mark.slow
-def test_report_of_a_scene() -> None:
-    (scene,) = (scene for scene in SCENES if scene.name == "crosstalk")
-    rows = list(measure(scene, Effort(batch=200, frames=12, target_ess=(50,))))
-    names = {row.technique for row in rows}
-    assert {"conventional", "differential", "posterior (emcee)"} <= names
-    for row in rows:
-        assert row.run_s > 0
-        assert 0 <= row.answered <= 1
-        assert 0 <= row.holds_truth <= 1
-    blind = next(row for row in rows if row.technique == "conventional")
-    assert blind.remark == "as if there were none"
-    # crosstalk larger than the signal beyond a metre: no interval of the noise has room for it
-    assert blind.holds_truth < 0.1
-    assert json.dumps([row.median_error for row in rows], allow_nan=False)
-    assert "scene: crosstalk" in report_table(rows)

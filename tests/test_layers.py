@@ -56,7 +56,7 @@ ALLOWED: dict[str, str] = {
     "service/demo": "service inference",
     "service/exports": "service.fold service.json_text inference",
     "service/messages": "service inference",
-    "service/report": "service inference",
+    "service/report": "service inference simulator.optics",
     "service/routes": "service inference",
     "service/store": "service",
     "service/store/migrations": "service.store",

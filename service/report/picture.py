@@ -1,67 +1,230 @@
-"""Work against precision, one panel a scene."""
+"""Pictures of the report: work against precision, and what each term costs."""
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
-from matplotlib import colormaps
-from matplotlib.artist import Artist
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
-from service.report.measure import Row
+from service.report.row import Row
+from service.report.run import Report
+from service.report.terms import TermCost
 
-__all__ = ["draw"]
+__all__ = ["draw_scene", "draw_snr", "draw_summary", "draw_terms", "svg"]
+
+# colour-blind safe (Okabe and Ito), one a family of methods
+_COLOURS = {
+    "single frames": "#0072b2",
+    "many frames": "#009e73",
+    "tracker": "#cc79a7",
+    "posterior": "#d55e00",
+}
+_GREY = "#777777"
+_SIZE = 8.0  # of labels, in points
+# where a label may stand about its point, in points: tried one after the other
+_PLACES = [
+    (x, y)
+    for y in (0, 9, -9, 18, -18, 27, -27, 36, -36, 48, -48)
+    for x in ((7, "left"), (-7, "right"))
+]
+_SUMMARY = ("Bare object", "Unknown crosstalk", "Known wall behind", "Through the fold")
 
 
-def draw(rows: Sequence[Row], path: Path) -> None:
-    """Draw median relative error against run time a frame.
+def _curves(rows: Sequence[Row]) -> dict[tuple[str, str, str], list[Row]]:
+    """Return the curves of a scene: rows of one method by its knob."""
+    curves: dict[tuple[str, str, str], list[Row]] = {}
+    for row in rows:
+        if row.scores is not None and row.scores.median_error and row.costs.frame_s:
+            curves.setdefault((row.family, row.method, row.told), []).append(row)
+    return {key: sorted(curve, key=lambda row: row.order) for key, curve in curves.items()}
 
-    Parameters
-    ----------
-    rows : sequence of Row
-        The report.
-    path : Path
-        The image; its suffix says which format.
-    """
-    scenes = list(dict.fromkeys(row.scene for row in rows))
-    names = list(dict.fromkeys(row.technique for row in rows))
-    colours = dict(zip(names, colormaps["tab10"](range(10)), strict=False))
-    figure = Figure(figsize=(12, 8), layout="constrained")
-    panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
-    for axes, scene in zip(panels, scenes, strict=True):
-        for name in names:
-            chosen = [r for r in rows if (r.scene, r.technique) == (scene, name)]
-            chosen = [r for r in chosen if r.median_error is not None]
-            if not chosen:
-                continue
-            # hollow: told that what disturbs it is not there
-            hollow = "as if" in chosen[0].remark
-            axes.loglog(
-                [r.frame_s for r in chosen],
-                [r.median_error or 0.0 for r in chosen],
-                "-o" if len(chosen) > 1 else "o",
-                ms=8,
-                color=colours[name],
-                mfc="none" if hollow else colours[name],
-                label=name,
+
+def _panel(axes: Axes, rows: Sequence[Row], least: float | None, division: float) -> None:
+    labels: list[tuple[float, float, str, str]] = []
+    points: list[tuple[float, float]] = []
+    for (family, method, told), curve in _curves(rows).items():
+        colour = _COLOURS[family]
+        x = [row.costs.frame_s or 0.0 for row in curve]
+        y = [row.scores.median_error or 0.0 for row in curve if row.scores]
+        axes.loglog(
+            x, y, "-o", color=colour, ms=5, lw=1.2, mfc="white" if told else colour, clip_on=False
+        )
+        points += list(zip(x, y, strict=True))
+        name = f"{method} (misinformed)" if told else method
+        at = int(np.argmin(y))
+        labels.append((x[at], y[at], name, colour))
+    low = min([least or np.inf, *(y for _, y in points)], default=1e-6)
+    high = max((y for _, y in points), default=1.0)
+    axes.set_ylim(low / 6, high * 6)
+    axes.set_xlim(division / 2, 30.0)
+    if least:
+        axes.axhline(least, color=_GREY, lw=1, ls="--")
+        axes.annotate(
+            "least error: all known but the range",
+            (division, least),
+            (4, -10),
+            textcoords="offset points",
+            color=_GREY,
+            fontsize=_SIZE,
+        )
+    axes.axvline(division, color=_GREY, lw=1, ls="--")
+    axes.annotate(
+        "one division",
+        (division, high * 6),
+        (4, -4),
+        textcoords="offset points",
+        va="top",
+        rotation=90,
+        color=_GREY,
+        fontsize=_SIZE,
+    )
+    axes.grid(alpha=0.25)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    _place(axes, labels, points, least)
+
+
+def _place(
+    axes: Axes,
+    labels: list[tuple[float, float, str, str]],
+    points: list[tuple[float, float]],
+    line: float | None = None,
+) -> None:
+    """Put every label beside its point where it covers neither a point, label nor the line."""
+    figure = axes.get_figure()
+    if figure is None:
+        return
+    figure.draw_without_rendering()  # type: ignore[union-attr]
+    per_point = figure.dpi / 72.0
+    transform = axes.transData.transform
+    taken = [(x - 4, y - 4, x + 4, y + 4) for x, y in map(transform, points)]
+    frame = axes.get_window_extent()
+    if line:
+        height = transform((1.0, line))[1]
+        taken.append((frame.x0, height - 1, frame.x1, height + 1))
+    for x, y, text, colour in sorted(labels, key=lambda label: label[1]):
+        px, py = transform((x, y))
+        width, height = 0.56 * _SIZE * len(text) * per_point, 1.15 * _SIZE * per_point
+        best = None
+        for (dx, side), dy in ((place[0], place[1]) for place in _PLACES):
+            left = px + dx * per_point - (width if side == "right" else 0)
+            box = (left, py + dy * per_point - height / 2, left + width, 0.0)
+            box = (box[0], box[1], box[2], box[1] + height)
+            inside = box[0] > frame.x0 + 14 and box[2] < frame.x1 + 30 * per_point
+            hit = sum(
+                box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in taken
             )
-        axes.set_title(scene, fontsize=10)
-        axes.grid(alpha=0.3)
-    for axes in panels[2:]:
-        axes.set_xlabel("run time a frame [s]")
-    for axes in panels[::2]:
-        axes.set_ylabel("median relative error of single ranges")
-    found: dict[str, Artist] = {}
-    for axes in panels:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    figure.legend(
-        handles=list(found.values()),
-        labels=list(found),
-        loc="outside lower center",
-        ncols=4,
-        fontsize=9,
+            cost = (0 if inside else 5) + hit
+            if best is None or cost < best[0]:
+                best = (cost, dx, dy, side, box)
+            if cost == 0:
+                break
+        if best is None:
+            continue
+        _, dx, dy, side, box = best
+        taken.append(box)
+        axes.annotate(
+            text,
+            (x, y),
+            (dx, dy),
+            textcoords="offset points",
+            ha=side,
+            va="center",
+            color=colour,
+            fontsize=_SIZE,
+            arrowprops={"arrowstyle": "-", "color": colour, "lw": 0.5} if abs(dy) > 10 else None,
+        )
+
+
+def draw_scene(report: Report, scene: str) -> Figure:
+    """Draw error against time a frame of one scene, each method a curve over its own knob."""
+    figure = Figure(figsize=(8.6, 4.6), layout="constrained")
+    axes = figure.subplots()
+    axes.set(
+        xlabel="processor time a frame [s]",
+        ylabel="median error of the range, relative",
     )
-    figure.suptitle(
-        "Error against run time. Hollow: crosstalk or background present and not told.", fontsize=11
+    _panel(axes, report.of(scene), report.least_errors.get(scene), report.division_s)
+    return figure
+
+
+def draw_summary(report: Report, path: Path) -> None:
+    """Draw four scenes into one picture."""
+    names = [name for name in _SUMMARY if name in report.scenes] or list(report.scenes)[:4]
+    figure = Figure(figsize=(13, 9), layout="constrained", dpi=100)
+    panels = figure.subplots(2, 2).ravel()
+    for axes in panels[len(names) :]:
+        axes.set_visible(False)
+    for axes, name in zip(panels, names, strict=False):
+        axes.set_title(name, fontsize=11, loc="left")
+        axes.set(xlabel="processor time a frame [s]", ylabel="median relative error")
+    for axes, name in zip(panels, names, strict=False):
+        _panel(axes, report.of(name), report.least_errors.get(name), report.division_s)
+    figure.savefig(path, pil_kwargs={"optimize": True})
+
+
+def draw_snr(report: Report, ratios: dict[str, float]) -> Figure | None:
+    """Draw error against the signal-to-noise ratio; None where fewer than two were measured."""
+    names = sorted((n for n in report.scenes if n in ratios), key=lambda n: ratios[n])
+    if len(names) < 2:
+        return None
+    figure = Figure(figsize=(8.6, 4.6), layout="constrained")
+    axes = figure.subplots()
+    found: dict[tuple[str, str], dict[float, float]] = {}
+    for name in names:
+        for (family, method, _), curve in _curves(report.of(name)).items():
+            best = min(r.scores.median_error or np.inf for r in curve if r.scores)
+            found.setdefault((family, method), {})[ratios[name]] = best
+    labels, points = [], []
+    for (family, method), values in found.items():
+        x, y = list(values), list(values.values())
+        axes.loglog(x, y, "-o", color=_COLOURS[family], ms=4, lw=1.2)
+        labels.append((x[-1], y[-1], method, _COLOURS[family]))
+        points += list(zip(x, y, strict=True))
+    least = [report.least_errors.get(name) or np.nan for name in names]
+    axes.loglog([ratios[n] for n in names], least, "--", color=_GREY, lw=1)
+    axes.set(
+        xlabel="signal-to-noise ratio at 1 m",
+        ylabel="median relative error",
+        xlim=(None, max(ratios[n] for n in names) * 300),
     )
-    figure.savefig(path, dpi=110)
+    axes.grid(alpha=0.25)
+    _place(axes, labels, points)
+    return figure
+
+
+def draw_terms(terms: Sequence[TermCost]) -> Figure:
+    """Draw what each term costs, beside the object alone."""
+    figure = Figure(figsize=(10, 3.6), layout="constrained")
+    panels = figure.subplots(1, 3, sharey=True)
+    names = [term.term for term in terms]
+    columns = (
+        ("unknowns", [float(term.unknowns) for term in terms], "{:.0f}"),
+        ("arithmetic a frame", [term.operations for term in terms], "{:,.0f}"),
+        ("microseconds a frame", [1e6 * term.frame_s for term in terms], "{:.1f}"),
+    )
+    for axes, (title, values, form) in zip(panels, columns, strict=True):
+        bars = axes.barh(names, values, color="#0072b2", alpha=0.8)
+        axes.bar_label(bars, [form.format(v) for v in values], padding=3, fontsize=_SIZE)
+        axes.axvline(values[0], color=_GREY, lw=1, ls="--")
+        axes.set_xlim(0, 1.25 * max(values))
+        axes.xaxis.set_major_locator(MaxNLocator(3))
+        axes.set_title(title, fontsize=10, loc="left")
+        axes.tick_params(labelsize=_SIZE)
+        axes.invert_yaxis() if axes is panels[0] else None
+        for side in ("top", "right"):
+            axes.spines[side].set_visible(False)
+    return figure
+
+
+def svg(figure: Figure) -> str:
+    """Return a figure as SVG whose text is text, without what stands before the element."""
+    buffer = io.StringIO()
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "hybridtof"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    text = buffer.getvalue()
+    return text[text.index("<svg") :]

@@ -1,0 +1,125 @@
+"""Readings of a scene of the report with the truth behind them."""
+
+import dataclasses
+import functools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.report.scenes import ReportScene
+from simulator.catalogue import plate_scene
+from simulator.frames import Frames
+from simulator.optics.assembly import OpticalScene, read
+from simulator.optics.electronics import Electronics
+from simulator.optics.motion import series
+from simulator.optics.parametrisation import fit_object
+from simulator.scene import Scene, parse_scene
+from simulator.sensor import Sensor
+from simulator.simulate import simulate
+from simulator.trajectories import SampledTrajectory
+
+__all__ = ["Readings", "readings_of", "told_of_object"]
+
+Array = NDArray[np.float64]
+
+_FRAME_S = 0.01
+_LIGHT = 1e-8  # relative error of the light that the optical simulator adds up
+_CALIBRATED_M = (0.1, 2.4)
+_OPTICAL = 2000  # frames, beyond which nothing is learnt that is worth the time
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Readings:
+    """Frames and their truth.
+
+    Attributes
+    ----------
+    frames : Frames
+        The frames, those without an object first.
+    range_m : ndarray, shape (n,)
+        True ranges [m]; nan of a frame without object.
+    """
+
+    frames: Frames
+    range_m: Array
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Where an object is, shape (n,)."""
+        return np.isfinite(self.range_m)
+
+
+def readings_of(scene: ReportScene, frames: int, seed: int, empty: int = 0) -> Readings:
+    """Make readings of an object on its way, evenly in log range.
+
+    Parameters
+    ----------
+    scene : ReportScene
+        The scene.
+    frames, empty : int
+        Number of frames with and without the object.
+    seed : int
+        Of the noise.
+
+    Returns
+    -------
+    Readings
+    """
+    if scene.plate:
+        return _optical(scene, min(frames, _OPTICAL), seed, empty)
+    ranges = np.r_[np.ones(empty), np.geomspace(scene.from_m, scene.to_m, frames)]
+    way = SampledTrajectory(
+        range_m=ranges.tolist(),
+        time_s=(_FRAME_S * np.arange(ranges.size)).tolist(),
+        object_present=[False] * empty + [True] * frames if empty else None,
+    )
+    made = simulate(scene.sensor, scene.truth, way, seed)
+    return Readings(made.frames, made.range_m)
+
+
+def _optical(scene: ReportScene, frames: int, seed: int, empty: int) -> Readings:
+    rng = np.random.default_rng(seed)
+    plate = plate_scene(scene.plate)
+    values = scene.truth.crosstalk_values
+    crosstalk = (0.0, 0.0) if values is None else tuple(map(float, values))  # type: ignore[arg-type]
+    electronics = Electronics(crosstalk=(crosstalk[0], crosstalk[1]))
+    bare = OpticalScene(electronics=electronics)
+    ranges = np.geomspace(scene.from_m, scene.to_m, frames)
+    seen = series(
+        bare.model_copy(update={"surfaces": (plate.plate(1.0),)}),
+        lambda distance: plate.plate(distance).pose,
+        ranges,
+        scene.sensor,
+        rng,
+    )
+    without = [read(bare, scene.sensor, rng).values for _ in range(empty)]
+    both = np.array([*without, *seen.frames.readings.tolist()])
+    present = np.arange(len(both)) >= empty
+    found = Frames(
+        both,
+        time_s=_FRAME_S * np.arange(len(both), dtype=np.float64),
+        object_present=present if empty else None,
+    )
+    return Readings(found, np.r_[np.full(empty, np.nan), seen.range_m])
+
+
+@functools.cache
+def _calibrated(plate: str, sensor: Sensor) -> tuple[float, float, float]:
+    """Return c0, c1, c2 as a calibration at 40 distances without noise finds them."""
+    made, light, ranges = plate_scene(plate), [], []
+    for distance in np.geomspace(*_CALIBRATED_M, 40).tolist():
+        body = OpticalScene(surfaces=(made.plate(distance),))
+        found = read(body, sensor, tolerance=_LIGHT).light.objects
+        light.append(found.flux)
+        ranges.append(found.distance_m)
+    fit = fit_object(np.array(ranges), np.array(light))
+    return fit.c0, fit.c1, fit.c2
+
+
+def told_of_object(scene: ReportScene) -> Scene:
+    """Return what is told where the object is known: of a real plate what a calibration finds."""
+    if not scene.plate:
+        return scene.known
+    c0, c1, c2 = _calibrated(scene.plate, scene.sensor)
+    told = scene.known.model_dump(mode="json", exclude_unset=True)
+    return parse_scene(told | {"object": {"c0": c0, "c1": c1, "c2": c2}})

@@ -1,0 +1,100 @@
+"""Techniques of single frames."""
+
+import dataclasses
+import functools
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.estimate import estimate
+from inference.estimates import Status, TechniqueResult
+from inference.realtime.registry import TECHNIQUES
+from service.report.cells import Cell
+from service.report.clock import alone, best, peak_bytes
+from service.report.readings import Readings, readings_of, told_of_object
+from service.report.row import Costs, Row
+from service.report.said import said
+from service.report.scores import Scores, scores_of_roots
+from simulator.scene import Scene
+
+__all__ = ["measure_single"]
+
+Array = NDArray[np.float64]
+
+# frames of a call that stands for one frame: a derivative has neighbours
+_NEIGHBOURS = 3
+
+
+def _scores_of_result(truth: Array, result: TechniqueResult) -> Scores:
+    return scores_of_roots(
+        truth,
+        result.range_m,
+        result.status == Status.AMBIGUOUS,
+        result.roots_m,
+        result.roots_sd_m,
+        np.where(np.isfinite(result.roots_m), 1.0, np.nan),
+    )
+
+
+def _blind(scene: Scene) -> Scene:
+    return scene.model_copy(update={"crosstalk": None, "background": None})
+
+
+def _obstacle(reasons: dict[str, str], name: str) -> str:
+    return reasons.get(name, "could not serve this scene")
+
+
+def measure_single(cell: Cell, seed: int) -> Row:
+    """Measure a technique; one that cannot serve the scene is told that nothing disturbs it."""
+    scene, name = cell.scene, cell.name
+    made = readings_of(scene, cell.frames, seed)
+    row = Row(scene.name, said(name), "single frames", frames=len(made.frames))
+    known = told_of_object(scene)
+    reason = ""
+    for told, scene_told in (("", known), ("that there is neither", _blind(known))):
+        if told and scene_told == known:
+            continue
+        run = functools.partial(estimate, scene.sensor, scene_told, made.frames, [name])
+        found = run()
+        reasons = {item.name: item.reason for item in found.left_out}
+        reason = reason or _obstacle(reasons, name)
+        if not found.results:
+            continue
+        found, seconds = best(run)
+        (result,) = found.results
+        middle, tail = alone(_one_by_one(cell, scene_told, made))
+        knob = f"{len(made.frames)} frames a sweep" if len(made.frames) != 1 else ""
+        return dataclasses.replace(
+            row,
+            told=told,
+            knob=knob,
+            order=float(cell.frames),
+            scores=_scores_of_result(made.range_m, result),
+            costs=Costs(
+                frame_s=seconds / len(made.frames),
+                p50_s=middle,
+                p99_s=tail,
+                run_s=seconds,
+                peak_bytes=peak_bytes(run),
+            ),
+            remark=reason if told else "",
+        )
+    return dataclasses.replace(row, remark=reason)
+
+
+def _one_by_one(cell: Cell, told: Scene, made: Readings) -> list[Callable[[], object]]:
+    """Return calls for single frames, which derivatives give two neighbours, spread over all."""
+    total = len(made.frames)
+    width = _NEIGHBOURS if TECHNIQUES[cell.name].differential else 1
+    starts = np.linspace(0, total - width, cell.value).astype(int).tolist()
+    return [
+        functools.partial(
+            estimate,
+            cell.scene.sensor,
+            told,
+            made.frames.select(slice(start, start + width)),
+            [cell.name],
+        )
+        for start in starts
+    ]

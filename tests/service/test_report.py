@@ -1,0 +1,258 @@
+"""The report: its figures, what it keeps, and its page."""
+
+import dataclasses
+import functools
+import itertools
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from scipy import integrate, stats
+
+import service.report.run as run_module
+from inference.density.collapsed import collapsed_density
+from inference.techniques import ALL_TECHNIQUES
+from service.cli import main
+from service.report.cells import Cell, Effort, cells_of
+from service.report.floors import least_error
+from service.report.measure import measure
+from service.report.page import markdown_page, page
+from service.report.picture import draw_scene, draw_summary, draw_terms, svg
+from service.report.readings import readings_of
+from service.report.row import Row, row_from
+from service.report.run import Report, errors_of, machine, rows_of
+from service.report.scenes import SCENES
+from service.report.scores import crps_of_draws, crps_of_normals, scores_of_roots
+from service.report.terms import TermCost, operations_of
+from simulator.readings import object_readings
+
+BY_NAME = {scene.name: scene for scene in SCENES}
+TINY = Effort(200, 4, 1, (40,), (10,), (), (), (2,))
+
+
+def test_score_of_a_mixture_is_the_integral_that_defines_it() -> None:
+    mean, sd, weight = np.array([[1.0, 3.0]]), np.array([[0.2, 0.5]]), np.array([[0.3, 0.7]])
+
+    def missed(x: float) -> float:
+        below = float((weight * stats.norm.cdf(x, mean, sd)).sum())
+        return (below - (x >= 2.2)) ** 2
+
+    exact = sum(integrate.quad(missed, *ends)[0] for ends in ((-5.0, 2.2), (2.2, 12.0)))
+    found = crps_of_normals(np.array([2.2]), mean, sd, weight)
+    np.testing.assert_allclose(found, exact, rtol=1e-6)
+    # a part that is not there counts for nothing, and weights need not add up to one
+    padded = [np.hstack([part, [[np.nan]]]) for part in (mean, sd, 2 * weight)]
+    np.testing.assert_allclose(crps_of_normals(np.array([2.2]), *padded), exact, rtol=1e-6)
+    assert np.isnan(crps_of_normals(np.ones(1), *[np.full((1, 2), np.nan)] * 3)).all()
+
+
+def test_score_of_draws_is_that_of_their_law() -> None:
+    draws = stats.norm.ppf((np.arange(4000) + 0.5) / 4000)[:, None] * [0.5, 2.0] + [1.0, -1.0]
+    truth = np.array([1.3, 2.0])
+    normal = crps_of_normals(
+        truth, np.array([[1.0], [-1.0]]), np.array([[0.5], [2.0]]), np.ones((2, 1))
+    )
+    np.testing.assert_allclose(crps_of_draws(truth, draws), normal, rtol=1e-3)
+
+
+def test_shares() -> None:
+    nan = np.nan
+    truth, single = np.array([1.0, 1.0, 1.0, 2.0]), np.array([1.1, nan, nan, 2.0])
+    roots = np.array([[1.1, nan], [1.0, 2.0], [nan, nan], [2.0, nan]])
+    sd = np.array([[0.05, nan], [0.1, 0.1], [nan, nan], [nan, nan]])
+    several = np.array([False, True, False, False])
+    found = scores_of_roots(truth, single, several, roots, sd, np.ones_like(roots))
+    assert (found.single, found.ambiguous, found.refused) == (0.5, 0.25, 0.25)
+    assert found.median_error == pytest.approx(0.05)
+    # the last has no interval; the first is two standard deviations off
+    assert found.coverage == 0.5
+
+
+def test_least_error_is_the_noise_over_the_slope() -> None:
+    """Of one pulse with all but the range known, by differences, at each range."""
+    scene = BY_NAME["Bare object"]
+    ranges, noise = np.geomspace(scene.from_m, scene.to_m, 40), np.array(scene.sensor.noise.read)
+    sizes = stats.norm.ppf(0.5 + 0.5 * (np.arange(200) + 0.5) / 200)
+
+    def readings(r: float) -> np.ndarray:
+        return np.array(object_readings(r, 14.9896229, None, 0.0769 * 0.0957, 0.0769, -0.123))
+
+    slopes = [
+        np.linalg.norm(
+            (readings(r * 1.0001) - readings(r / 1.0001)) / (2 * math.log(1.0001)) / noise
+        )
+        for r in ranges
+    ]
+    expected = np.median(np.outer(1 / np.array(slopes), sizes))
+    assert least_error(scene) == pytest.approx(expected, rel=1e-5)
+
+
+def test_every_method_is_in_the_report() -> None:
+    for scene in SCENES:
+        cells = list(cells_of(scene, dataclasses.replace(TINY, posterior_frames=(8,))))
+        assert {cell.name for cell in cells} - {""} == set(ALL_TECHNIQUES)
+        assert {"tracker", "emcee", "importance"} <= {cell.family for cell in cells}
+        assert len({cell.key for cell in cells}) == len(cells)
+
+
+def test_readings_have_what_the_scene_says() -> None:
+    for name in (
+        "Unknown crosstalk, 5 empty frames",
+        "Real plate, unknown crosstalk, 5 empty frames",
+    ):
+        made = readings_of(BY_NAME[name], 7, 1, 5)
+        assert made.frames.object_present is not None
+        assert made.frames.object_present.tolist() == [False] * 5 + [True] * 7
+        assert np.isnan(made.range_m[:5]).all()
+        # the crosstalk alone, to within five standard deviations of the mean of five
+        noise = np.array(BY_NAME[name].sensor.noise.read)
+        off = made.frames.readings[:5].mean(axis=0) - [2e-4, 4e-3]
+        assert np.all(np.abs(off) < 5 * noise / math.sqrt(5))
+        # the mean way to a plate is longer than that to its middle, and most so near by
+        longer = made.range_m[5:] / np.geomspace(0.2, 2.0, 7)
+        assert np.all(np.diff(longer) < 1e-12)
+        assert longer[0] == (1.0 if not BY_NAME[name].plate else pytest.approx(1.19, abs=0.01))
+
+
+def measured(tmp_path: Path, names: tuple[str, ...]) -> list[Row]:
+    scenes = [BY_NAME[name] for name in names]
+    return list(rows_of(scenes, TINY, 1, tmp_path / "part"))
+
+
+def test_same_seed_same_errors_and_a_killed_run_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "other").mkdir()
+    names = ("Unknown crosstalk", "Through the fold")
+    whole = measured(tmp_path / "other", names)
+    scenes = [BY_NAME[name] for name in names]
+    first = list(itertools.islice(rows_of(scenes, TINY, 1, tmp_path / "part"), 9))
+    with (tmp_path / "part").open("a") as file:
+        file.write('{"key": "cut sh')
+    counted: list[Cell] = []
+
+    def counting(cell: Cell, seed: int) -> Row:
+        counted.append(cell)
+        return measure(cell, seed)
+
+    monkeypatch.setattr(run_module, "measure", counting)
+    said: list[str] = []
+    again = list(rows_of(scenes, TINY, 1, tmp_path / "part", said.append))
+    assert len(counted) == len(whole) - len(first)
+    assert errors_of(again) == errors_of(whole)
+    assert again[: len(first)] == first
+    assert "goes on after 9 of" in said[0]
+    # another seed is another report
+    counted.clear()
+    next(rows_of(scenes, TINY, 2, tmp_path / "part"))
+    assert len(counted) == 1
+    for row in whole:
+        assert row_from(json.loads(json.dumps(row.to_json(), allow_nan=False))) == row
+
+
+def test_what_is_not_told_misleads(tmp_path: Path) -> None:
+    rows = measured(tmp_path, ("Unknown crosstalk",))
+    by = {(row.method, row.told != ""): row for row in rows if row.scores is not None}
+    blind = by["time of flight alone", True].scores
+    # crosstalk of half the signal: no interval of the noise has room for it
+    assert blind is not None
+    assert blind.coverage is not None
+    assert blind.coverage < 0.1
+    for name in ("rates of change", "fit of everything", "tracker"):
+        found = by[name, False].scores
+        assert found is not None
+        assert blind.median_error is not None
+        assert found.median_error is not None
+        assert found.median_error < 0.2 * blind.median_error
+        assert found.coverage is not None
+        assert blind.coverage is not None
+        assert found.coverage > 0.5 > blind.coverage
+    out = [row for row in rows if row.scores is None]
+    assert out
+    assert all(row.remark for row in out)
+
+
+@pytest.mark.slow
+def test_a_posterior_is_scored_and_counted() -> None:
+    effort = dataclasses.replace(TINY, draws=(10,))
+    (cell,) = (c for c in cells_of(BY_NAME["Bare object"], effort) if c.family == "emcee")
+    row = measure(cell, 3)
+    assert row.remark == "verdict passed"
+    assert row.likelihood_calls is not None
+    assert row.likelihood_calls > 1000
+    assert row.scores is not None
+    # 40 frames whose errors go together: fewer than half happens once in a thousand sets
+    assert row.scores.coverage is not None
+    assert row.scores.coverage > 0.5
+    assert row.costs.draws_per_s is not None
+    assert row.costs.draws_per_s > 0
+
+
+def test_page(tmp_path: Path) -> None:
+    rows = measured(tmp_path, ("Unknown crosstalk", "Through the fold"))
+    scenes = [BY_NAME[name] for name in dict.fromkeys(row.scene for row in rows)]
+    least = {scene.name: least_error(scene) for scene in scenes}
+    terms = (TermCost("object alone", 3, 9000.0, 5e-6), TermCost("+ wall", 4, 9500.0, 6e-6))
+    report = Report(machine(), 1, tuple(rows), least, 3e-10, terms)
+    pictures = {name: svg(draw_scene(report, name)) for name in report.scenes}
+    made = page(report, pictures, svg(draw_terms(terms)), None)
+    # one file, and nothing from elsewhere
+    assert "<script" not in made
+    assert 'src="http' not in made
+    assert "href" not in made
+    assert made.count("data:image/svg+xml;base64,") == 3
+    assert len(made) < 500_000
+    for text in (made, markdown_page(report), *pictures.values()):
+        for name in ALL_TECHNIQUES:
+            assert "_" not in name or f">{name}<" not in text
+    for scene in report.scenes:
+        assert f"<h2>{scene}</h2>" in made
+        assert f"## {scene}" in markdown_page(report)
+    for name in ("fit of everything", "tracker", "time of flight alone (misinformed)"):
+        assert name in pictures["Unknown crosstalk"]
+    assert "time of flight alone, which takes no notice, errs by" in made
+    draw_summary(report, tmp_path / "report.png")
+    assert (tmp_path / "report.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_a_scene_lacks_costs_nothing() -> None:
+    """Counted work of the density: known crosstalk is subtracted, unknown terms are looked at."""
+    counts = {}
+    for name in ("Bare object", "Known crosstalk", "Unknown crosstalk"):
+        scene = BY_NAME[name]
+        made = readings_of(scene, 3, 1)
+        density = collapsed_density(scene.sensor, scene.free, made.frames)
+        z = np.zeros((1, len(density.parameters)))
+        evaluate = functools.partial(density.frame_log_likelihoods, z)
+        counts[name] = [operations_of(evaluate) for _ in range(2)]
+    for first, second in counts.values():
+        assert first == second > 1000
+    assert counts["Known crosstalk"][0] < 1.1 * counts["Bare object"][0]
+    assert counts["Unknown crosstalk"][0] > 1.1 * counts["Bare object"][0]
+    # 11,695 a frame: a quarter more would be a slower algorithm
+    assert counts["Bare object"][0] < 1.25 * 3 * 11_695
+
+
+@pytest.mark.slow
+def test_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As its users run it, on one scene and few frames."""
+    monkeypatch.setattr("service.report.cells.QUICK", TINY)
+    monkeypatch.setattr("service.report.scenes.SCENES", (BY_NAME["Bare object"],))
+    monkeypatch.setattr("service.report.run.term_costs", list)
+    monkeypatch.setattr("service.report.picture.draw_terms", lambda _: Figure())
+    monkeypatch.setenv("KERNELS_COMPILE", "never")
+    assert main(["report", "--quick", "--out", str(tmp_path)]) == 0
+    said = capsys.readouterr()
+    assert "scene: Bare object" in said.out
+    assert "tracker" in said.out
+    assert "Bare object: measurement 1 of" in said.err
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"report.html", "report.md", "report.json", "report.png"}
+    found = json.loads((tmp_path / "report.json").read_text())
+    assert found["machine"]["numpy"] == np.__version__
+    assert [row for row in found["rows"] if row["scores"] is None and not row["remark"]] == []
