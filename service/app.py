@@ -26,6 +26,9 @@ from service.shared import Shared
 from service.store.database import default_url
 from service.store.retention import Retention
 from service.store.sql_store import SqlJobStore
+from service.store.stream_store import StreamStore
+from service.streams.streams import Streams
+from service.streams.taking import WINDOW
 from service.warm.warming import Warming
 
 __all__ = ["create_app"]
@@ -66,7 +69,10 @@ def create_app(
     traces = Traces(store.counts)
     parsing, threads = (Threads(settings.threads, settings.queue) for _ in range(2))
     processes = Processes(settings.threads, settings.queue, settings.request_s)
-    shared = Shared(settings, jobs, parsing, threads, processes, traces, warming)
+    kept_s = settings.keep_days * 86_400
+    kept = StreamStore(store.database, settings.max_streams, settings.stream_idle_s, kept_s, WINDOW)
+    streams = Streams(kept, traces, settings.threads)
+    shared = Shared(settings, jobs, parsing, threads, processes, traces, streams, warming)
     keys = None if settings.api_keys is None else KeyRing(settings.api_keys)
 
     @asynccontextmanager

@@ -120,7 +120,9 @@ async def read_limited(
     return bytes(body)
 
 
-def check_media_type(headers: Headers) -> None:
+def check_media_type(
+    headers: Headers, kinds: re.Pattern[str] = _JSON, name: str = "application/json"
+) -> None:
     """Accept JSON in UTF-8 by any of its names, and nothing that does not say that it is.
 
     A page of somebody else can send forms and plain text without asking, but not this.
@@ -129,6 +131,10 @@ def check_media_type(headers: Headers) -> None:
     ----------
     headers : Headers
         Of the request.
+    kinds : Pattern
+        Other media types than those of JSON.
+    name : str
+        The one that is told to the client.
 
     Raises
     ------
@@ -142,14 +148,15 @@ def check_media_type(headers: Headers) -> None:
     message = Message()
     message["Content-Type"] = given[0] if given else "none"
     kind = message.get_content_type()
-    if len(given) != 1 or not _JSON.fullmatch(kind):
-        raise UnsupportedMediaTypeError("Content-Type must be application/json")
+    if len(given) != 1 or not kinds.fullmatch(kind):
+        raise UnsupportedMediaTypeError(f"Content-Type must be {name}", name)
     charset = message.get_content_charset("utf-8")
     if charset not in _CHARSETS:
-        raise UnsupportedMediaTypeError("the charset must be utf-8")
+        raise UnsupportedMediaTypeError("the charset must be utf-8", name)
     codings = ",".join(headers.getlist("content-encoding")).lower().split(",")
     if {coding.strip() for coding in codings} - {"", "identity"}:
-        raise UnsupportedMediaTypeError("the body must not be compressed: no Content-Encoding")
+        message_of = "the body must not be compressed: no Content-Encoding"
+        raise UnsupportedMediaTypeError(message_of, name)
 
 
 class BodyOf(Generic[T]):

@@ -68,7 +68,17 @@ class SlowClientError(ServiceError):
 
 
 class UnsupportedMediaTypeError(ServiceError):
-    """The body does not say that it is JSON in UTF-8, or says that it is something else."""
+    """The body does not say that it is JSON in UTF-8, or says that it is something else.
+
+    Attributes
+    ----------
+    accept : str
+        The media type that is accepted.
+    """
+
+    def __init__(self, message: str, accept: str = "application/json") -> None:
+        super().__init__(message)
+        self.accept = accept
 
 
 class MethodError(ServiceError):

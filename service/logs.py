@@ -96,6 +96,19 @@ class Lines(logging.Handler):
                 self._lines.task_done()
 
 
+class NoSockets(logging.Filter):
+    """Drops uvicorn's lines of WebSockets, which have one of their own like every request."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """See `logging.Filter`."""
+        said = str(record.msg)
+        return not (
+            '"WebSocket' in said
+            or said.startswith("connection ")
+            or "completing handshake" in said  # of a refusal
+        )
+
+
 def log_config(level: str) -> dict[str, Any]:
     """Return a configuration for `logging.config.dictConfig`.
 
@@ -109,7 +122,8 @@ def log_config(level: str) -> dict[str, Any]:
         "version": 1,
         "disable_existing_loggers": False,
         "formatters": {"lines": {"()": form}},
-        "handlers": {"stderr": {"()": Lines, "formatter": "lines"}},
+        "filters": {"sockets": {"()": NoSockets}},
+        "handlers": {"stderr": {"()": Lines, "formatter": "lines", "filters": ["sockets"]}},
         "loggers": {
             name: {"handlers": ["stderr"], "level": level.upper(), "propagate": False}
             for name in ("hybridtof", "uvicorn")

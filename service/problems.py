@@ -186,7 +186,7 @@ def _headers(error: HybridTofError) -> Mapping[str, str]:
     if isinstance(error, MethodError):
         return {"Allow": error.allow}
     if isinstance(error, UnsupportedMediaTypeError):
-        return {"Accept": "application/json", "Accept-Encoding": "identity"}
+        return {"Accept": error.accept, "Accept-Encoding": "identity"}
     return {}
 
 

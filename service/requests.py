@@ -1,6 +1,6 @@
 """What clients send, and what files hold: the types by which both are validated."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import pydantic
 
@@ -18,6 +18,7 @@ __all__ = [
     "IdentifiabilityRequest",
     "PosteriorRequest",
     "SimulationRequest",
+    "StreamRequest",
     "SystemDescription",
     "TrackedSystem",
 ]
@@ -41,6 +42,19 @@ class TrackedSystem(SystemDescription):
     """A sensor, the scene before it, and how its objects move."""
 
     tracking: TrackingSettings = TrackingSettings()
+
+
+class StreamRequest(TrackedSystem):
+    """Body of ``POST /v1/streams``.
+
+    Attributes
+    ----------
+    policy : str
+        "all": no line is dropped, a client that sends faster than it is answered has to wait.
+        "latest": a line that has waited too long for its turn is dropped for a newer one.
+    """
+
+    policy: Literal["all", "latest"] = "all"
 
 
 class EstimateRequest(SystemDescription):

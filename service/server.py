@@ -20,6 +20,8 @@ from service.service_settings import ServiceSettings
 
 __all__ = ["server_of"]
 
+_MESSAGE = 2**17
+
 _log = logging.getLogger("hybridtof")
 
 
@@ -124,6 +126,9 @@ def server_of(app: FastAPI, settings: ServiceSettings, **more: Any) -> uvicorn.S
         http=type("Bounded", (_Bounded,), limits),
         # requests have a line of their own
         access_log=False,
+        # a message is a line, or a few
+        ws_max_size=_MESSAGE,
+        ws_per_message_deflate=False,
         # an open connection must not hold up the end
         timeout_graceful_shutdown=round(settings.shutdown_s),
         **more,

@@ -72,6 +72,10 @@ class ServiceSettings(pydantic.BaseModel):
         Bytes for the draws of finished posteriors; the oldest make room.
     keep_days : float
         How long finished posteriors are kept [days].
+    max_streams : int
+        Streams that are kept; expired ones make room, and one key has half of them at most.
+    stream_idle_s : float
+        Time without a line after which a stream has expired [s].
     warm : bool
         Whether `serve` makes all machine code from its start on.
     shutdown_s : float
@@ -100,6 +104,8 @@ class ServiceSettings(pydantic.BaseModel):
     max_jobs: Count = 1000
     max_draws_bytes: Count = 2**30
     keep_days: Annotated[float, pydantic.Field(gt=0)] = 30.0
+    max_streams: Count = 1000
+    stream_idle_s: Annotated[float, pydantic.Field(gt=0)] = 3600.0
     warm: bool = True
     shutdown_s: Annotated[float, pydantic.Field(ge=0, le=10)] = 5.0
 

@@ -3,12 +3,13 @@
 import dataclasses
 from typing import Any, cast
 
-from fastapi import Request
+from starlette.requests import HTTPConnection
 
 from service.border.traces import Traces
 from service.jobs import Jobs
 from service.lanes import Processes, Threads
 from service.service_settings import ServiceSettings
+from service.streams.streams import Streams
 from service.warm.warming import Warming
 
 __all__ = ["SMALL", "TINY", "TINY_BYTES", "Shared", "client_of", "shared_of"]
@@ -36,6 +37,8 @@ class Shared:
         For answers that may take long.
     traces : Traces
         Counts of requests.
+    streams : Streams
+        Those of clients.
     warming : Warming or None
         Makes machine code ahead of the first question.
     """
@@ -46,6 +49,7 @@ class Shared:
     threads: Threads
     processes: Processes
     traces: Traces
+    streams: Streams
     warming: Warming | None = None
 
     def lane(self, frames: int) -> Threads | Processes:
@@ -53,11 +57,11 @@ class Shared:
         return self.threads if frames <= SMALL else self.processes
 
 
-def shared_of(request: Request) -> Shared:
+def shared_of(request: HTTPConnection) -> Shared:
     """Return what the routes share in the application that got a request."""
     return cast("Shared", request.app.state.shared)
 
 
-def client_of(request: Request) -> str:
+def client_of(request: HTTPConnection) -> str:
     """Return to whom what a request makes belongs: the id of its key, empty without keys."""
     return str(request.scope.get("hybridtof.client", ""))

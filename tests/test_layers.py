@@ -61,6 +61,7 @@ ALLOWED: dict[str, str] = {
     "service/store": "service",
     "service/store/migrations": "service.store",
     "service/store/migrations/versions": "",
+    "service/streams": "service inference",
     "service/warm": "service inference",
     "hybridtof": "inference service.frame_files",
 }

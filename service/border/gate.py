@@ -67,14 +67,37 @@ class Gate:
         if scope["type"] == "http":
             await self._request(scope, receive, send)
         elif scope["type"] == "websocket":
-            try:
-                self._let_in(scope)
-            except HybridTofError:
-                await send({"type": "websocket.close", "code": 1008})
-            else:
-                await self._app(scope, receive, send)
+            await self._socket(scope, receive, send)
         else:
             await self._app(scope, receive, send)
+
+    async def _socket(self, scope: Scope, receive: Receive, send: Send) -> None:
+        name = request_id(Headers(scope=scope).get("x-request-id"))
+        before = REQUEST_ID.set(name)
+        began, status, sent = time.perf_counter(), None, 0
+
+        async def send_counted(message: Message) -> None:
+            nonlocal status, sent
+            if message["type"] == "websocket.http.response.start":
+                status = message["status"]
+            elif status is None:
+                status = 101 if message["type"] == "websocket.accept" else 403
+            sent += len(message.get("text") or message.get("body") or b"")
+            await send(message)
+
+        self._traces.open.inc()
+        try:
+            self._let_in(scope)
+            await self._app(scope, receive, send_counted)
+        except HybridTofError as error:
+            if "websocket.http.response" in scope.get("extensions", {}):
+                await response_of(error)(scope, receive, send_counted)
+            else:
+                await send_counted({"type": "websocket.close", "code": 1008})
+        finally:
+            self._traces.open.dec()
+            self._traces.tell(scope, Told(status, sent, time.perf_counter() - began))
+            REQUEST_ID.reset(before)
 
     def _let_in(self, scope: Scope) -> None:
         """Refuse a request, or note whose it is."""
@@ -109,6 +132,8 @@ class Gate:
                 await send({"type": "http.response.body", "body": block, "more_body": True})
             rest = (len(body) - 1) // _BLOCK * _BLOCK if body else 0
             await send(dict(message) | {"body": body[rest:]})
+            if message.get("more_body", False):
+                held.sent(len(body))
 
         self._traces.open.inc()
         try:

@@ -49,6 +49,11 @@ class Held:
         self._bytes += count
         self._room.used += count
 
+    def sent(self, count: int) -> None:
+        """Hold some bytes of an answer no more: the client takes them, and more are to come."""
+        self._bytes -= count
+        self._room.used -= count
+
     def release(self) -> None:
         """Hold nothing any more."""
         self._room.used -= self._bytes

@@ -100,6 +100,16 @@ class Traces:
             "hybridtof_requests_open", "Requests that wait for an answer", registry=self._registry
         )
 
+        self.lines = Counter(
+            "hybridtof_stream_lines",
+            "Lines of streams, by what became of them",
+            ["outcome"],
+            registry=self._registry,
+        )
+        self.producers = Gauge(
+            "hybridtof_stream_producers", "Clients that send to a stream", registry=self._registry
+        )
+
     def tell(self, scope: Scope, told: Told) -> None:
         """Count a request, and write its line."""
         method = scope["method"] if scope["method"] in _METHODS else "other"

@@ -31,13 +31,17 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
 
 
 def _run(args: argparse.Namespace) -> int:
+    import time
+
     from inference.tracking.tracker import tracker
     from service.checked_system import checked_system
     from service.commands.files import naming, open_lines, read_document, reading
     from service.commands.output import write_result
     from service.plausibility import doubts
     from service.requests import TrackedSystem
-    from service.tracked_lines import TrackedLines, lines_like
+    from service.streams.forms import Form, form_like
+    from service.streams.kept import Kept
+    from service.streams.taking import Line, Place, take
 
     stated = read_document(TrackedSystem, args.scene)
     with naming({"/settings": f"{args.scene}#/tracking", "": str(args.scene)}):
@@ -45,16 +49,19 @@ def _run(args: argparse.Namespace) -> int:
         model = tracker(sensor, scene, stated.tracking)
     for doubt in doubts(sensor):
         note(args, f"note: {doubt}")
+    place, kept = Place(model.first), Kept()
     with reading(args.frames), open_lines(args.frames) as lines:
-        tracked: TrackedLines | None = None
+        form: Form | None = None
         for line in lines:
             if not line.strip():
                 continue
-            if tracked is None:
-                form, is_frame = lines_like(line)
-                tracked = TrackedLines(model, form)
+            if form is None:
+                form, is_frame = form_like(line)
                 if not is_frame:
                     continue
-            write_result(tracked.answer(line).encode("ascii"))
+            taken = take(model, place, [Line(line, time.perf_counter())], form, kept)
+            kept.add(taken)
+            place = taken.place
+            write_result(taken.answers[0])
     # of a stream in which no line is a frame nothing was answered
-    return 0 if tracked is not None and tracked.answered else 2
+    return 0 if place.answered else 2

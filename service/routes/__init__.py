@@ -9,6 +9,7 @@ from service.routes import (
     metrics,
     posteriors,
     simulations,
+    streams,
     techniques,
 )
 
@@ -18,6 +19,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     estimates.router,
     identifiability.router,
     posteriors.router,
+    streams.router,
     simulations.router,
     techniques.router,
     health.router,

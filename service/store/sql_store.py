@@ -1,24 +1,20 @@
 """Jobs in a database: an SQLite file, or PostgreSQL."""
 
-import contextlib
 import dataclasses
-import threading
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection
 from typing import Any
 
 import orjson
 import sqlalchemy as sa
-from sqlalchemy.dialects import postgresql, sqlite
-from sqlalchemy.exc import SQLAlchemyError
 
-from service.errors import IdempotencyError, StoreError
+from service.errors import IdempotencyError
 from service.json_text import encode
-from service.store.database import brief, engine_of, is_sqlite, ready
 from service.store.holder import has_ended
 from service.store.record import QUEUED, Claimed, JobRecord, NewJob, Status
 from service.store.retention import Retention, drop_draws, forget, make_room
 from service.store.tables import CHECKPOINT, JOB, SERVED
+from service.store.transactions import Transactions
 
 __all__ = ["SqlJobStore"]
 
@@ -71,32 +67,12 @@ class SqlJobStore:
         busy_s: float = 5.0,
         clock: Callable[[], float] = time.time,
     ) -> None:
-        self.engine = engine_of(url, busy_s)
-        ready(self.engine)
-        self._writing = self.engine.execution_options(writes=True)
-        # writers of one process queue here: SQLite would let them poll
-        self._lock = threading.Lock() if is_sqlite(self.engine) else contextlib.nullcontext()
-        self._insert = sqlite.insert if is_sqlite(self.engine) else postgresql.insert
+        self.database = Transactions(url, busy_s)
+        self.engine = self.database.engine
+        self._read, self._write = self.database.read, self.database.write
+        self._insert = self.database.insert
         self._retention = retention
         self._clock = clock
-
-    @contextlib.contextmanager
-    def _read(self) -> Iterator[sa.Connection]:
-        with self._saying("read"), self.engine.begin() as connection:
-            yield connection
-
-    @contextlib.contextmanager
-    def _write(self) -> Iterator[sa.Connection]:
-        with self._saying("written"), self._lock, self._writing.begin() as connection:
-            yield connection
-
-    @contextlib.contextmanager
-    def _saying(self, deed: str) -> Iterator[None]:
-        try:
-            yield
-        except SQLAlchemyError as error:
-            message = f"the store of jobs cannot be {deed} now: {brief(error)}"
-            raise StoreError(message) from error
 
     def add(self, job: NewJob) -> JobRecord:
         """See `JobStore.add`."""
@@ -354,4 +330,4 @@ class SqlJobStore:
 
     def close(self) -> None:
         """See `JobStore.close`."""
-        self.engine.dispose()
+        self.database.close()

@@ -2,7 +2,7 @@
 
 import sqlalchemy as sa
 
-__all__ = ["CHECKPOINT", "JOB", "METADATA", "SERVED"]
+__all__ = ["CHECKPOINT", "JOB", "METADATA", "SERVED", "STREAM", "STREAM_ANSWER"]
 
 METADATA = sa.MetaData()
 
@@ -52,5 +52,37 @@ CHECKPOINT = sa.Table(
         "job_id", sa.String(32), sa.ForeignKey("job.id", ondelete="CASCADE"), primary_key=True
     ),
     sa.Column("number", sa.Integer, primary_key=True),
+    sa.Column("bytes", sa.LargeBinary, nullable=False),
+)
+
+STREAM = sa.Table(
+    "stream",
+    METADATA,
+    sa.Column("arrival", sa.BigInteger().with_variant(sa.Integer(), "sqlite"), primary_key=True),
+    sa.Column("id", sa.String(32), nullable=False, unique=True),
+    sa.Column("client", sa.String(64), nullable=False),
+    sa.Column("request", sa.LargeBinary, nullable=False),
+    sa.Column("number", sa.Integer, nullable=False),
+    sa.Column("state", sa.LargeBinary, nullable=False),
+    sa.Column("sequence", sa.BigInteger, nullable=False),
+    sa.Column("counts", sa.Text, nullable=False),
+    sa.Column("last", sa.LargeBinary, nullable=False),
+    sa.Column("kept_bytes", sa.BigInteger, nullable=False),
+    sa.Column("touched", sa.Double, nullable=False),
+    sa.Column("holder", sa.String(128)),
+    sa.Column("held_until", sa.Double, nullable=False),
+    sa.Index("stream_client", "client"),
+    sqlite_autoincrement=True,
+)
+
+STREAM_ANSWER = sa.Table(
+    "stream_answer",
+    METADATA,
+    sa.Column(
+        "stream_id", sa.String(32), sa.ForeignKey("stream.id", ondelete="CASCADE"), primary_key=True
+    ),
+    # of the last of its lines
+    sa.Column("sequence", sa.BigInteger, primary_key=True),
+    sa.Column("size", sa.BigInteger, nullable=False),
     sa.Column("bytes", sa.LargeBinary, nullable=False),
 )

@@ -1,0 +1,26 @@
+"""The last answers of a stream, kept in memory."""
+
+import orjson
+
+from service.streams.taking import WINDOW, Taken
+
+__all__ = ["Kept"]
+
+
+class Kept:
+    """Answers by their numbers; see `service.streams.taking.Earlier`."""
+
+    def __init__(self) -> None:
+        self._answers: dict[int, bytes] = {}
+
+    def add(self, taken: Taken) -> None:
+        """Keep new answers, and forget what has become too old."""
+        for answer in taken.new:
+            self._answers[orjson.loads(answer)["sequence"]] = answer
+        oldest = taken.place.sequence - WINDOW
+        while self._answers and (first := next(iter(self._answers))) <= oldest:
+            del self._answers[first]
+
+    def answer(self, sequence: int) -> bytes | None:
+        """See `Earlier.answer`."""
+        return self._answers.get(sequence)

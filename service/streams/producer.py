@@ -1,0 +1,206 @@
+"""One client that sends lines to a stream, and is answered line by line, in order."""
+
+import asyncio
+import dataclasses
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from typing import Any
+
+import anyio
+import anyio.to_thread
+import orjson
+from starlette.requests import ClientDisconnect
+
+from inference.tracking.state import state_from_bytes, state_to_bytes
+from inference.tracking.tracker import Tracker
+from service.border.traces import Traces
+from service.errors import ConflictError, GoneError, NotFoundError, SlowClientError
+from service.store.stream_record import StreamChange, StreamRecord
+from service.store.stream_store import StreamStore
+from service.streams.cutting import Cutter
+from service.streams.forms import JsonLines
+from service.streams.model import model_of
+from service.streams.room import Room
+from service.streams.taking import Place, Taken, take
+from service.streams.writer import Writer
+
+__all__ = ["Producer", "lines_of", "place_of"]
+
+_COUNTS = ("answered", "errors", "dropped", "gaps", "surprise", "misfit")
+_BLOCK = 2**16
+_TRIES = 3
+
+Send = Callable[[list[bytes]], Awaitable[None]]
+
+
+def place_of(record: StreamRecord, model: Tracker) -> Place:
+    """Return where a stream stands, from its row.
+
+    Raises
+    ------
+    GoneError
+        Where the state is of another version of the tracker.
+    """
+    state = state_from_bytes(record.state)
+    if state.signature != model.first.signature:
+        raise GoneError("the stream's state is of another version of hybridtof: make a new one")
+    return Place(state, record.sequence, last=record.last, **record.counts)
+
+
+async def lines_of(chunks: AsyncIterator[bytes]) -> AsyncIterator[list[bytes | None]]:
+    """Yield the lines of a body as they come; one that breaks off has no last line."""
+    cutter = Cutter()
+    async for chunk in chunks:
+        for start in range(0, len(chunk), _BLOCK):
+            yield cutter.feed(chunk[start : start + _BLOCK])
+    yield cutter.end()
+
+
+class _Stored:
+    """Answers in the store, read when one of them is asked for."""
+
+    def __init__(self, store: StreamStore, stream_id: str) -> None:
+        self._store, self._id = store, stream_id
+        self._answers: Mapping[int, bytes] | None = None
+
+    def answer(self, sequence: int) -> bytes | None:
+        """See `Earlier.answer`."""
+        if self._answers is None:
+            lines = self._store.answers(self._id).splitlines()
+            self._answers = {orjson.loads(line)["sequence"]: line for line in lines}
+        return self._answers.get(sequence)
+
+
+@dataclasses.dataclass
+class Producer:
+    """One client that sends to one stream.
+
+    Attributes
+    ----------
+    store, writer : StreamStore, Writer
+        Where the stream is kept.
+    limiter : anyio.CapacityLimiter
+        For threads that track.
+    traces : Traces
+        Counts lines.
+    record : StreamRecord
+        As the stream stood when it was opened.
+    model, place : Tracker, Place
+        Its tracker, and where it stands.
+    latest : bool
+        Whether stale lines are dropped.
+    holder : str or None
+        This process, where the client goes on sending.
+    changed : callable
+        Is called after every change.
+    quiet_s : float or None
+        How long a client may send nothing [s].
+    """
+
+    store: StreamStore
+    writer: Writer
+    limiter: anyio.CapacityLimiter
+    traces: Traces
+    record: StreamRecord
+    model: Tracker
+    place: Place
+    latest: bool
+    holder: str | None
+    changed: Callable[[], None]
+    quiet_s: float | None = None
+
+    async def run(self, source: AsyncIterator[list[bytes | None]], send: Send) -> None:
+        """Answer all lines.
+
+        Parameters
+        ----------
+        source : async iterator of lists of lines
+            As `lines_of` yields them.
+        send : callable
+            Takes the answers of a turn, each without a line end; what came in the meantime waits.
+
+        Raises
+        ------
+        NotFoundError, ConflictError
+            Where the stream was deleted, or taken over by another client: what was not answered
+            was not applied.
+        SlowClientError
+            Where the client sent nothing for too long.
+        StoreError
+            Where the store does not take an answer.
+        """
+        room = Room(self.latest)
+        reading = asyncio.create_task(self._read(source, room))
+        try:
+            while lines := await room.take():
+                taken = await self._turn(lines)
+                await send(taken.answers)
+            await reading
+        finally:
+            reading.cancel()
+            await asyncio.gather(reading, return_exceptions=True)
+
+    async def _read(self, source: AsyncIterator[list[bytes | None]], room: Room) -> None:
+        try:
+            while True:
+                try:
+                    async with asyncio.timeout(self.quiet_s):
+                        lines = await anext(source)
+                except TimeoutError:
+                    message = f"nothing came for {self.quiet_s:g} s"
+                    raise SlowClientError(message) from None
+                await room.put(lines)
+        except (StopAsyncIteration, ClientDisconnect):
+            pass  # what came before the client hung up has its turn still
+        finally:
+            room.end()
+
+    async def _turn(self, lines: list[Any]) -> Taken:
+        """Answer some lines, once what they change is kept."""
+        for _ in range(_TRIES):
+            taken, change = await anyio.to_thread.run_sync(self._taken, lines, limiter=self.limiter)
+            if not taken.new or await self.writer.write(change):
+                self._count(taken)
+                return taken
+            await asyncio.to_thread(self._reload)
+        raise ConflictError("another client sends to this stream")
+
+    def _taken(self, lines: list[Any]) -> tuple[Taken, StreamChange]:
+        earlier = _Stored(self.store, self.record.id)
+        taken = take(self.model, self.place, lines, JsonLines(), earlier)
+        place = taken.place
+        change = StreamChange(
+            self.record.id,
+            self.record.number,
+            state_to_bytes(place.state) if taken.new else b"",
+            place.sequence,
+            {name: getattr(place, name) for name in _COUNTS},
+            place.last,
+            b"".join(line + b"\n" for line in taken.new),
+            self.holder,
+        )
+        return taken, change
+
+    def _reload(self) -> None:
+        """See where the stream stands by now, if it does.
+
+        A change of this client's may have been kept after its connection broke, or the stream
+        belongs to somebody else's client by now.
+        """
+        record = self.store.get(self.record.id)
+        if record is None:
+            raise NotFoundError("the stream was deleted")
+        if record.holder not in (None, self.holder) and self.store.held(record):
+            raise ConflictError("another client sends to this stream")
+        self.record = record
+        self.model = model_of(record.request)
+        self.place = place_of(record, self.model)
+
+    def _count(self, taken: Taken) -> None:
+        before, self.place = self.place, taken.place
+        if taken.new:
+            self.record = dataclasses.replace(self.record, number=self.record.number + 1)
+            self.changed()
+        lines = self.traces.lines
+        for name in ("answered", "errors", "dropped"):
+            lines.labels(name).inc(getattr(taken.place, name) - getattr(before, name))
+        lines.labels("repeated").inc(taken.repeated)

@@ -1,0 +1,194 @@
+"""Streams of one process: made, watched, sent to, forgotten."""
+
+import asyncio
+import contextlib
+import uuid
+from collections.abc import AsyncIterator
+
+import anyio
+
+from inference.tracking.state import state_to_bytes
+from service.border.traces import Traces
+from service.errors import ConflictError, GoneError, NotFoundError
+from service.store.holder import has_ended, holder_name
+from service.store.stream_record import StreamRecord
+from service.store.stream_store import StreamStore
+from service.streams.model import model_of, request_of
+from service.streams.producer import Producer, place_of
+from service.streams.writer import Writer
+
+__all__ = ["Streams"]
+
+_LOOK_S = 1.0
+_TOGETHER_S = 0.1
+
+
+class Streams:
+    """Opens streams of a store for one client each.
+
+    Parameters
+    ----------
+    store : StreamStore
+        Where they are kept.
+    traces : Traces
+        Counts lines.
+    threads : int
+        How many track at a time.
+    """
+
+    def __init__(self, store: StreamStore, traces: Traces, threads: int) -> None:
+        self._store = store
+        self._traces = traces
+        self._threads = threads
+        self._writer = Writer(store)
+        self._holder = holder_name()
+        self._producing: set[str] = set()
+        self._watched: dict[str, asyncio.Event] = {}
+        self._limiter: anyio.CapacityLimiter | None = None
+
+    async def create(self, raw: bytes, client: str) -> StreamRecord:
+        """Make a stream.
+
+        Parameters
+        ----------
+        raw : bytes
+            The request, which was validated.
+        client : str
+            To whom it belongs.
+
+        Raises
+        ------
+        InvalidInputError, RefusedError
+            Where there is no tracker for it.
+        BusyError
+            Where there is no room.
+        """
+        model = await asyncio.to_thread(model_of, raw)
+        state = state_to_bytes(model.first)
+        return await asyncio.to_thread(self._store.add, uuid.uuid4().hex, client, raw, state)
+
+    async def get(self, stream_id: str, client: str) -> StreamRecord:
+        """Return a stream as it stands.
+
+        Raises
+        ------
+        NotFoundError
+            Where the client has none of that name.
+        """
+        record = await asyncio.to_thread(self._store.get, stream_id)
+        if record is None or record.client != client:
+            raise NotFoundError("there is no stream of this id")
+        return record
+
+    def status(self, record: StreamRecord) -> str:
+        """Return what a stream is doing."""
+        return "expired" if self._store.expired(record) else "tracking"
+
+    async def page(self, after: int | None, limit: int, client: str) -> list[StreamRecord]:
+        """Return streams, newest first; see `StreamStore.page`."""
+        return await asyncio.to_thread(self._store.page, client, after, limit)
+
+    async def delete(self, stream_id: str, client: str) -> None:
+        """Forget a stream.
+
+        Raises
+        ------
+        NotFoundError
+            Where there is none of that name.
+        """
+        await self.get(stream_id, client)
+        if not await asyncio.to_thread(self._store.delete, stream_id):
+            raise NotFoundError("there is no stream of this id")
+        self._announce(stream_id)
+
+    async def follow(self, stream_id: str, after: int, client: str) -> AsyncIterator[StreamRecord]:
+        """Yield a stream as it stands after changes, those in quick succession as one.
+
+        Parameters
+        ----------
+        stream_id : str
+            Which stream.
+        after : int
+            Number of the last change that is known already.
+        client : str
+            To whom it belongs.
+        """
+        while True:
+            news = self._watched.setdefault(stream_id, asyncio.Event())
+            try:
+                record = await self.get(stream_id, client)
+            except NotFoundError:
+                return
+            if record.number > after:
+                after = record.number
+                yield record
+            if self.status(record) == "expired":
+                return
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(_LOOK_S):
+                    await news.wait()
+            await asyncio.sleep(_TOGETHER_S)
+
+    def _announce(self, stream_id: str) -> None:
+        if (news := self._watched.pop(stream_id, None)) is not None:
+            news.set()
+
+    @contextlib.asynccontextmanager
+    async def producing(
+        self, stream_id: str, client: str, quiet_s: float | None = None, lasting: bool = True
+    ) -> AsyncIterator[Producer]:
+        """Open a stream for a client that sends to it; no other may meanwhile.
+
+        Parameters
+        ----------
+        stream_id, client : str
+            Which stream, and whose.
+        quiet_s : float or None
+            How long the client may send nothing [s].
+        lasting : bool
+            Whether it goes on sending: other processes then keep away from the stream.
+
+        Raises
+        ------
+        NotFoundError
+            Where the client has none of that name.
+        ConflictError
+            Where another client sends to it.
+        GoneError
+            Where it has expired, or its state is of another version.
+        """
+        record = await self.get(stream_id, client)
+        if self._store.expired(record):
+            raise GoneError("the stream has expired: make a new one")
+        if stream_id in self._producing or self._held_elsewhere(record):
+            raise ConflictError("another client sends to this stream")
+        self._producing.add(stream_id)
+        self._traces.producers.inc()
+        if self._limiter is None:
+            self._limiter = anyio.CapacityLimiter(self._threads)
+        try:
+            model = await asyncio.to_thread(model_of, record.request)
+            producer = Producer(
+                store=self._store,
+                writer=self._writer,
+                limiter=self._limiter,
+                traces=self._traces,
+                record=record,
+                model=model,
+                place=place_of(record, model),
+                latest=request_of(record.request).policy == "latest",
+                holder=self._holder if lasting else None,
+                changed=lambda: self._announce(stream_id),
+                quiet_s=quiet_s,
+            )
+            yield producer
+            if lasting:
+                await asyncio.to_thread(self._store.release, stream_id, self._holder)
+        finally:
+            self._producing.discard(stream_id)
+            self._traces.producers.dec()
+
+    def _held_elsewhere(self, record: StreamRecord) -> bool:
+        if record.holder in (None, self._holder) or not self._store.held(record):
+            return False
+        return not has_ended(record.holder)

@@ -1,0 +1,312 @@
+"""Lines of a stream in, answers out: the one function behind HTTP, WebSocket and command line.
+
+However the lines are cut into batches, the answers are the same to the last bit, but for
+``latency_s``.
+"""
+
+import dataclasses
+import time
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from inference.tracking.hypotheses import TIME
+from inference.tracking.state import TrackState
+from inference.tracking.track import step
+from inference.tracking.tracker import Tracker
+from service.errors import BodyTooLargeError, ConflictError, GoneError
+from service.streams.answered import answers_of, encoded, error_of
+from service.streams.cutting import LONGEST
+from service.streams.forms import Form
+from service.streams.shapes import (
+    Shape,
+    frames_of,
+    of_one_frame,
+    one_frame,
+    passes,
+    shape_of,
+)
+from simulator.errors import HybridTofError, InvalidInputError
+from simulator.frames import Frames
+
+__all__ = ["WINDOW", "Earlier", "Line", "Place", "Taken", "take"]
+
+WINDOW = 4096
+"""Numbers behind the last one whose answers are kept."""
+
+_LARGEST = 2**53 - 1
+
+
+class Line(NamedTuple):
+    """A line as it arrived.
+
+    Attributes
+    ----------
+    raw : bytes or None
+        None: it was too long.
+    arrived : float
+        When, by `time.perf_counter`.
+    dropped : int
+        How many lines before it were dropped unread.
+    """
+
+    raw: bytes | None
+    arrived: float
+    dropped: int = 0
+
+
+@dataclasses.dataclass(frozen=True)
+class Place:
+    """Where a stream stands.
+
+    Attributes
+    ----------
+    state : TrackState
+        The tracker's.
+    sequence : int
+        Number of the last line that was answered; -1 before the first.
+    answered, errors, dropped, gaps : int
+        Frames that were tracked, lines that were answered by an error, lines that were dropped
+        unread, numbers that never came.
+    surprise : float or None
+        The tracker's, after the last frame.
+    misfit : bool
+        Whether that is more than chance allows.
+    last : bytes
+        The last answer; empty before the first.
+    """
+
+    state: TrackState
+    sequence: int = -1
+    answered: int = 0
+    errors: int = 0
+    dropped: int = 0
+    gaps: int = 0
+    surprise: float | None = None
+    misfit: bool = False
+    last: bytes = b""
+
+
+class Earlier(Protocol):
+    """Answers that were given before, to the last `WINDOW` numbers at least."""
+
+    def answer(self, sequence: int) -> bytes | None:
+        """Return the answer to a number; None where it has none."""
+        ...
+
+
+class Taken(NamedTuple):
+    """What has become of some lines.
+
+    Attributes
+    ----------
+    place : Place
+        Where the stream stands after them.
+    answers : list of bytes
+        One a line.
+    new : list of bytes
+        Those that were not given before, which are to be kept.
+    repeated : int
+        How many lines had come before.
+    """
+
+    place: Place
+    answers: list[bytes]
+    new: list[bytes]
+    repeated: int
+
+
+# a frame that waits for the tracker, together with others of its shape: where its answer goes, its
+# number, time and arrival, its values, and what else is to be said
+_Waiting = tuple[int, int, float, float, tuple[Any, ...], dict[str, Any] | None]
+
+
+def take(
+    model: Tracker, place: Place, lines: Sequence[Line], form: Form, earlier: Earlier
+) -> Taken:
+    """Answer lines in their order.
+
+    Parameters
+    ----------
+    model : Tracker
+        Which follows the stream.
+    place : Place
+        Where the stream stands.
+    lines : sequence of Line
+        What came.
+    form : Form
+        How to read them.
+    earlier : Earlier
+        What is answered to numbers that came before.
+
+    Returns
+    -------
+    Taken
+    """
+    try:
+        return _Batch(model, place, form, earlier, alone=False).take(lines)
+    except _UnsoundError:
+        return _Batch(model, place, form, earlier, alone=True).take(lines)
+
+
+class _UnsoundError(Exception):
+    """One of several frames has a value that only a closer look at each tells."""
+
+
+class _Batch:
+    """One call of `take`."""
+
+    def __init__(
+        self, model: Tracker, place: Place, form: Form, earlier: Earlier, alone: bool
+    ) -> None:
+        self._model, self._form, self._earlier, self._alone = model, form, earlier, alone
+        self._place = place
+        self._state = place.state
+        self._sequence = place.sequence
+        self._time = float(place.state.hypotheses.numbers[TIME])
+        self._counts = dataclasses.asdict(_Counts())
+        self._surprise, self._misfit = place.surprise, place.misfit
+        self._answers: list[bytes] = []
+        self._at: dict[int, int] = {}
+        self._repeats: list[tuple[int, int, int]] = []
+        self._waiting: list[_Waiting] = []
+        self._names: tuple[str, ...] | None = None
+        self._shape: Shape | None = None
+
+    def take(self, lines: Sequence[Line]) -> Taken:
+        for line in lines:
+            self._take(line)
+        self._track()
+        new = [self._answers[at] for at in self._at.values()]
+        repeated = len(self._repeats)
+        for at, sequence, last in self._repeats:
+            self._answers[at] = self._said_before(sequence, last)
+        place = dataclasses.replace(
+            self._place,
+            state=self._state,
+            sequence=self._sequence,
+            surprise=self._surprise,
+            misfit=self._misfit,
+            last=new[-1] if new else self._place.last,
+            **{name: getattr(self._place, name) + n for name, n in self._counts.items()},
+        )
+        return Taken(place, self._answers, new, repeated)
+
+    def _take(self, line: Line) -> None:
+        """Answer a line, or let it wait for the tracker."""
+        at = len(self._answers)
+        self._answers.append(b"")
+        after = self._sequence + 1 + line.dropped
+        sequence = max(after, 1) if self._sequence < 0 else after
+        self._counts["dropped"] += line.dropped
+        frame: dict[str, Any] = {}
+        problem: HybridTofError | None = None
+        try:
+            if line.raw is None:
+                raise BodyTooLargeError(f"the line has more than {LONGEST} bytes")
+            frame = self._form.frame_in(line.raw)
+            if (own := frame.get("sequence")) is not None:
+                if type(own) is not int or not 0 <= own <= _LARGEST:
+                    message = "must be an integer from 0 to 2^53 - 1"
+                    raise InvalidInputError.at("/sequence", message)
+                sequence = own
+        except HybridTofError as error:
+            problem = error
+        if sequence <= self._sequence:
+            self._repeats.append((at, sequence, self._sequence))
+            return
+        also = _also(sequence - after if self._sequence >= 0 else 0, line)
+        self._counts["gaps"] += also.get("gap", 0)
+        self._sequence = sequence
+        self._at[sequence] = at
+        try:
+            if problem is not None:
+                raise problem
+            self._wait(at, sequence, also, line, frame)
+        except HybridTofError as error:
+            self._counts["errors"] += 1
+            said = {"sequence": sequence, "error": error_of(error), **also}
+            self._answers[at] = encoded(said | {n: frame[n] for n in frame if passes(n)})
+
+    def _wait(
+        self, at: int, sequence: int, also: dict[str, Any], line: Line, frame: dict[str, Any]
+    ) -> None:
+        """Let a frame wait for the tracker, where nothing is wrong with it."""
+        names = tuple(frame)
+        known = self._shape if names == self._names else None
+        shape = known or shape_of(self._model, names)
+        if shape.problem is not None:
+            raise shape.problem
+        values = shape.values(frame)
+        alone = None
+        if self._alone or not shape.sound(values):
+            alone = one_frame(self._model, frame, shape.columns)
+        time_s = frame["time_s"]
+        if time_s <= self._time:
+            message = f"{time_s:.9g} s is not later than the last frame, {self._time:.9g} s"
+            raise InvalidInputError.at("/time_s", message)
+        if shape is not self._shape or alone is not None:
+            self._track()
+        self._names, self._shape = names, shape
+        self._time = time_s
+        for name in shape.passed:
+            also[name] = frame[name]
+        self._waiting.append((at, sequence, time_s, line.arrived, values, also or None))
+        if alone is not None:
+            self._track(alone)
+
+    def _track(self, frames: Frames | None = None) -> None:
+        """Let the tracker see what waits, and answer it."""
+        waiting, self._waiting = self._waiting, []
+        if not waiting or self._shape is None:
+            return
+        at, sequences, times, arrivals, values, also = zip(*waiting, strict=True)
+        try:
+            if frames is None:
+                frames = frames_of(self._model, self._shape, values)
+            self._state, track = step(self._model, self._state, frames)
+        except InvalidInputError as error:
+            if not self._alone:
+                raise _UnsoundError from None
+            self._time = float(self._state.hypotheses.numbers[TIME])
+            raise of_one_frame(error) from None
+        now = time.perf_counter()
+        said = answers_of(track, sequences, times, [now - begun for begun in arrivals], also)
+        for place, answer in zip(at, said, strict=True):
+            self._answers[place] = answer
+        self._counts["answered"] += len(waiting)
+        surprise = float(track.surprise[-1])
+        self._surprise = surprise if np.isfinite(surprise) else None
+        self._misfit = bool(track.misfit[-1])
+
+    def _said_before(self, sequence: int, last: int) -> bytes:
+        """Return what was answered to a number, or that there is nothing to be said of it."""
+        error: HybridTofError
+        if sequence <= last - WINDOW:
+            error = GoneError(f"{last} was answered before: answers are kept of {WINDOW} numbers")
+        else:
+            at = self._at.get(sequence)
+            before = self._earlier.answer(sequence) if at is None else self._answers[at]
+            if before is not None:
+                return before
+            error = ConflictError(f"it comes too late: {last} was answered before")
+        return encoded({"sequence": sequence, "error": error_of(error)})
+
+
+def _also(gap: int, line: Line) -> dict[str, Any]:
+    """Return what is missing before a line."""
+    also = {}
+    if gap > 0:
+        also["gap"] = gap
+    if line.dropped:
+        also["dropped"] = line.dropped
+    return also
+
+
+@dataclasses.dataclass
+class _Counts:
+    answered: int = 0
+    errors: int = 0
+    dropped: int = 0
+    gaps: int = 0

@@ -1,0 +1,193 @@
+"""Lines of a stream by themselves: cut, read, answered; no network."""
+
+import asyncio
+import itertools
+import json
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from inference.tracking.tracker import Tracker, tracker
+from service.errors import MalformedError
+from service.streams.cutting import LONGEST, Cutter
+from service.streams.forms import JsonLines
+from service.streams.kept import Kept
+from service.streams.room import STALE_S, Room
+from service.streams.taking import WINDOW, Line, Place, take
+from service.strict_json import decode
+from simulator.errors import InvalidInputError
+from simulator.scene import parse_scene
+from simulator.sensor import parse_sensor
+from tests.service.conftest import SCENE, SENSOR
+
+
+@pytest.fixture(scope="module")
+def model() -> Tracker:
+    return tracker(parse_sensor(SENSOR), parse_scene(SCENE | {"discrepancy": 0}))
+
+
+def frame(n: int, **more: Any) -> bytes:
+    return json.dumps({"time_s": 0.1 * n, "w1": 0.02, "w2": 1.7 - 0.01 * n} | more).encode()
+
+
+def answered(model: Tracker, batches: Sequence[Sequence[bytes | None]]) -> list[dict[str, Any]]:
+    place, kept, found = Place(model.first), Kept(), []
+    for batch in batches:
+        taken = take(model, place, [Line(raw, time.perf_counter()) for raw in batch],
+                     JsonLines(), kept)  # fmt: skip
+        kept.add(taken)
+        place = taken.place
+        found += [json.loads(answer) for answer in taken.answers]
+    return [answer | {"latency_s": None} for answer in found]
+
+
+LINES = [
+    frame(1, stamp={"sec": 1}), frame(2), b"junk", frame(3), frame(1), None, frame(5),
+    frame(6, sequence=20), frame(7, sequence=20), frame(7, sequence=3), frame(7, sequence=15),
+    frame(7, gain=2.0), frame(8, gain=0.0), frame(9, gain=1.0), frame(10, object_present=False),
+    frame(11, w1=None), b"[1]", frame(12, w1=1), frame(12, sequence=-1), frame(13, w3=1.0),
+]  # fmt: skip
+
+
+def test_what_is_answered(model: Tracker) -> None:
+    found = answered(model, [LINES])
+    errors = {n: answer["error"]["pointer"] for n, answer in enumerate(found) if "error" in answer}
+    assert errors == {
+        2: "", 4: "/time_s", 5: "", 9: "", 10: "", 12: "/gain", 15: "/w1", 16: "", 18: "/sequence",
+        19: "/w3",
+    }  # fmt: skip
+    assert [answer["sequence"] for answer in found] == [
+        1, 2, 3, 4, 5, 6, 7, 20, 20, 3, 15, 21, 22, 23, 24, 25, 26, 27, 28, 29
+    ]  # fmt: skip
+    assert found[0]["stamp"] == {"sec": 1}
+    assert found[7]["gap"] == 12
+    assert found[8] == found[7]  # a number that came before is answered as before
+    assert found[9] == found[2]
+    assert found[10]["error"]["type"].endswith("conflict")
+    # bad lines change nothing of what the others are answered
+    good = [raw for n, raw in enumerate(LINES) if n not in errors and n != 8]
+    alone = answered(model, [good])
+    kept = [answer for n, answer in enumerate(found) if n not in errors and n != 8]
+    for one, other in zip(alone, kept, strict=True):
+        assert {k: v for k, v in one.items() if k not in ("sequence", "gap")} == {
+            k: v for k, v in other.items() if k not in ("sequence", "gap")
+        }
+
+
+@settings(max_examples=8, deadline=None)
+@given(cuts=st.sets(st.integers(1, len(LINES) - 1)))
+def test_cut_anywhere_is_whole(model: Tracker, cuts: set[int]) -> None:
+    ends = [0, *sorted(cuts), len(LINES)]
+    batches = [LINES[a:b] for a, b in itertools.pairwise(ends)]
+    assert answered(model, batches) == answered(model, [LINES])
+
+
+def test_before_the_window(model: Tracker) -> None:
+    first, last, again = frame(1), frame(2, sequence=WINDOW + 5), frame(3, sequence=1)
+    found = answered(model, [[first], [last], [again]])
+    assert found[2]["error"]["type"].endswith("gone")
+
+
+@given(st.binary(max_size=200), st.lists(st.integers(0, 200)))
+def test_a_cutter_cuts_anywhere(data: bytes, cuts: list[int]) -> None:
+    ends = sorted({0, len(data), *(cut for cut in cuts if cut < len(data))})
+    cutter = Cutter()
+    found = [line for a, b in itertools.pairwise(ends) for line in cutter.feed(data[a:b])]
+    assert found + cutter.end() == [line for line in data.split(b"\n") if line.strip()]
+
+
+@pytest.mark.parametrize("block", [7, 4096, 2**20])
+def test_a_long_line_is_not_kept(block: int) -> None:
+    data = b"a\n" + b"x" * (3 * LONGEST) + b"\nb\n" + b"y" * (LONGEST + 1)
+    cutter = Cutter()
+    found: list[bytes | None] = []
+    for start in range(0, len(data), block):
+        found += cutter.feed(data[start : start + block])
+        assert len(cutter._rest) <= LONGEST
+    assert found + cutter.end() == [b"a", None, b"b", None]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b'{"w1": 1, "w1": 2, "w2" :3}',
+        b'{"w1": 1, "w2": 2, "stamp": {"a": 1, "a": 2}}',
+        b'{"w1": 1, "\\u0077\\u0031": 2}',
+        b'{"a": "\\u003a", "a": 1}',
+        b'{"w1": NaN}',
+        b'{"w1": 1, "x": [1e999]}',
+        b"[" * 1000,
+        b'{"x": ' + b"[" * 40 + b"]" * 40 + b"}",
+        b"\xff\xfe",
+        b'{"x": "\\ud800"}',
+        b"7",
+    ],
+)
+def test_what_the_quick_reader_must_not_take(line: bytes) -> None:
+    with pytest.raises((MalformedError, InvalidInputError)):
+        JsonLines().frame_in(line)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b'{"w1": 1, "at": "2026-11-22T10:00:00Z", "stamp": {"sec": 1, "frame": "a:b"}}',
+        b' { "a" : [1, {"b": null}], "c\\"": "\\u00e9:" } ',
+        b'{"big": 18446744073709551616, "small": -9007199254740993}',
+    ],
+)
+def test_the_quick_reader_reads_what_the_strict_one_does(line: bytes) -> None:
+    assert JsonLines().frame_in(line) == decode(line)
+
+
+def test_a_number_beyond_64_bits_is_passed_through(model: Tracker) -> None:
+    line = b'{"time_s": 0, "w1": 0.02, "w2": 1.7, "id": 18446744073709551616, "at": "a\\u003ab"}'
+    (answer,) = answered(model, [[line]])
+    assert answer["id"] == 2**64
+    assert answer["at"] == "a:b"
+
+
+def test_rooms() -> None:
+    async def run() -> None:
+        every = Room(latest=False)
+        putting = asyncio.create_task(every.put([b"%d" % n for n in range(2500)]))
+        seen: list[bytes | None] = []
+        sizes = []
+        while len(seen) < 2500:
+            lines = await every.take()
+            sizes.append(len(lines))
+            seen += [line.raw for line in lines]
+        await putting
+        assert seen == [b"%d" % n for n in range(2500)]
+        assert max(sizes) == 1000  # the rest had to wait outside
+
+        latest = Room(latest=True)
+        await latest.put([b"%d" % n for n in range(2500)])
+        lines = await latest.take()
+        assert (len(lines), lines[0].raw, lines[0].dropped) == (1000, b"1500", 1500)
+        old = time.perf_counter() - 2 * STALE_S
+        await latest.put([b"a", b"b", b"c"])
+        for n in range(3):
+            latest._lines[n] = latest._lines[n]._replace(arrived=old)
+        await latest.put([b"d"])
+        (line,) = await latest.take()
+        assert (line.raw, line.dropped) == (b"d", 3)
+        latest.end()
+        assert await latest.take() == []
+
+    asyncio.run(run())
+
+
+def test_dropped_lines_have_their_numbers(model: Tracker) -> None:
+    now = time.perf_counter()
+    lines = [Line(frame(1), now), Line(frame(5), now, 3), Line(frame(6, sequence=9), now, 1)]
+    taken = take(model, Place(model.first), lines, JsonLines(), Kept())
+    found = [json.loads(answer) for answer in taken.answers]
+    assert [(a["sequence"], a.get("dropped"), a.get("gap")) for a in found] == [
+        (1, None, None), (5, 3, None), (9, 1, 2)
+    ]  # fmt: skip
+    assert (taken.place.dropped, taken.place.gaps, taken.place.answered) == (4, 2, 3)
