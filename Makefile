@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report readme api picture notebook notebook-data calibrate coverage kills test check lint format types fast lock clean
+.PHONY: help setup demo report readme api picture notebook notebook-data calibrate coverage kills fuzz test check lint format types fast lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -52,6 +52,9 @@ kills: $(READY) ## Kill services and workers 50 times during 20 posteriors: SQLi
 	$(BIN)/python -m benchmarks.kills
 	$(BIN)/python -m benchmarks.kills --postgres
 	$(BIN)/python -m benchmarks.kills --dask
+
+fuzz: $(READY) ## 2,000 requests a route by schemathesis, 10,000 bodies a route that are nearly valid
+	$(BIN)/python -m benchmarks.fuzz
 
 # two processes on two cores: a library that starts threads of its own only makes them wait
 calibrate coverage test fast: export OPENBLAS_NUM_THREADS = 1

@@ -1,9 +1,10 @@
 """No request gets a 500: whatever the body, the answer is 2xx or a 4xx that says what is wrong."""
 
 import asyncio
+import contextlib
 import copy
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -122,9 +123,13 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 
 
 @st.composite
-def spoiled(draw: st.DrawFn, replacements: st.SearchStrategy[Any]) -> dict[str, Any]:
+def spoiled(
+    draw: st.DrawFn,
+    replacements: st.SearchStrategy[Any],
+    bodies: Sequence[dict[str, Any]] = BODIES,
+) -> dict[str, Any]:
     """A good body in which one to three places are something else, are gone, or are new."""
-    body: dict[str, Any] = copy.deepcopy(draw(st.sampled_from(BODIES)))
+    body: dict[str, Any] = copy.deepcopy(draw(st.sampled_from(bodies)))
     for _ in range(draw(st.integers(1, 3))):
         path = draw(st.sampled_from([p for p in places(body) if p]))
         target: Any = body
@@ -152,17 +157,27 @@ def loop() -> Iterator[asyncio.Runner]:
         yield runner
 
 
-@pytest.fixture(scope="module")
-def http(loop: asyncio.Runner) -> Iterator[httpx.AsyncClient]:
+@contextlib.contextmanager
+def answering(loop: asyncio.Runner, **more: Any) -> Iterator[httpx.AsyncClient]:
+    """A client of an application that prepares posteriors, and samples none."""
     fake_fold.order()
     fold: Any = SimpleNamespace(**vars(fake_fold) | {"prepare": prepare})
-    app = create_app(ServiceSettings(workers=1, max_jobs=100_000), fold)
+    app = create_app(ServiceSettings(workers=1, max_jobs=100_000, **more), fold)
     lifespan = app.router.lifespan_context(app)
     loop.run(lifespan.__aenter__())
     # an exception that is not answered fails the test with its own traceback
     transport = httpx.ASGITransport(app)
     yield httpx.AsyncClient(transport=transport, base_url="http://localhost", headers=JSON)
     loop.run(lifespan.__aexit__(None, None, None))
+
+
+@pytest.fixture(scope="module")
+def http(
+    loop: asyncio.Runner, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[httpx.AsyncClient]:
+    database = f"sqlite:///{tmp_path_factory.mktemp('jobs')}/jobs.sqlite"
+    with answering(loop, database=database) as client:
+        yield client
 
 
 def no_constant(name: str) -> None:
