@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.tracking.borrowed import borrowed
-from inference.tracking.hypotheses import Hypotheses, U, V, copy
+from inference.tracking.hypotheses import Hypotheses, U, V, copy, learns_crosstalk
 from inference.tracking.square_root import triangularise
 from simulator.compiled import compiled
 
@@ -82,8 +82,43 @@ def _log_determinant(of: Hypotheses, one: int, other: int, share: float) -> floa
 
 @borrowed
 @compiled
-def _loss(of: Hypotheses, heavy: int, light: int, share: float) -> float:
+def _whole_log_determinant(
+    of: Hypotheses, one: int, other: int, share: float, work: Array
+) -> float:
+    """Return the same of all states, the crosstalk too: roots on a curve must not become a line.
+
+    What nuisance parameters do to both alike is left out.
+    """
+    x, X = of.x, of.X
+    _, n, m = X.shape
+    left, right = math.sqrt(1.0 - share), math.sqrt(share)
+    for i in range(n):
+        for j in range(n):
+            work[i, j] = left * X[one, i, j]
+            work[i, n + j] = right * X[other, i, j]
+        work[i, 2 * n] = left * right * (x[other, i] - x[one, i])
+        for j in range(n, m):
+            work[i, n + 1 + j] = left * right * (X[other, i, j] - X[one, i, j])
+    triangularise(work, 0, n, n + 1 + m)
+    value = 0.0
+    for i in range(n):
+        if i == V and work[i, i] == 0.0:  # at rest
+            continue
+        if not work[i, i] > 0.0:
+            return -math.inf
+        value += 2.0 * math.log(work[i, i])
+    return value
+
+
+@borrowed
+@compiled
+def _loss(of: Hypotheses, heavy: int, light: int, share: float, work: Array) -> float:
     """Return the bound of the information that a merger loses [nats] (Runnalls 2007)."""
+    if learns_crosstalk(of):
+        both = _whole_log_determinant(of, heavy, light, share, work)
+        one = _whole_log_determinant(of, heavy, light, 0.0, work)
+        other = _whole_log_determinant(of, light, heavy, 0.0, work)
+        return 0.5 * (both - (1.0 - share) * one - share * other)
     both = _log_determinant(of, heavy, light, share)
     one = _log_determinant(of, heavy, light, 0.0)
     other = _log_determinant(of, light, heavy, 0.0)
@@ -141,7 +176,7 @@ def merge_equals(of: Hypotheses, count: int, same: float, work: Array) -> int:
         while k <= count:
             heavy, light = (j, k) if weight[j] >= weight[k] else (k, j)
             share = weight[light] / (weight[j] + weight[k])
-            if not _loss(of, heavy, light, share) < same * share:
+            if not _loss(of, heavy, light, share, work) < same * share:
                 k += 1
                 continue
             # the mixture is symmetric in the two: merged into j, whichever is heavier

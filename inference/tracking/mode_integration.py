@@ -167,7 +167,7 @@ def integrate(
         The new length.
     """
     u, scale = mode.u, mode.scale
-    if prior.added.spread.shape[1] > 2:
+    if prior.added.spread.shape[1] > 2 and not prior.position.born:
         top = log_density(u, frame, prior, table)
         log_mass = top + math.log(scale) + _LOG_ROOT_2PI
         return add_candidate(to, count, TrackCandidate(log_mass, u, 0.0, u, parent))

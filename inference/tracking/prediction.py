@@ -57,16 +57,22 @@ def predict(seconds: float, of: Hypotheses, rules: Rules, work: Array) -> None:
     learns = learns_crosstalk(of)
     born = weight[0] * chance.arrived + numbers[PENDING] * (1.0 - chance.left)
     empty = weight[0] * (1.0 - chance.arrived)
+    leaver, heaviest = 0, empty
+    for j in range(1, int(numbers[COUNT]) + 1):
+        left = weight[j] * chance.left
+        empty += left
+        if left > heaviest:
+            leaver, heaviest = j, left
+    if learns and leaver > 0:
+        # the heaviest, not the mean: between a scene that was empty all along and one that an
+        # object has just left, a mean would let the crosstalk follow what an object reflects
+        merge(of, 0, leaver, 1.0, CROSSTALK1, work)
     # an object that may be anywhere by now is one that has just come, but for the crosstalk: the
     # common part of their errors is straight only as far as the curve is
     reach = motion.carry * rules.rate_sd
     noise = motion.noise.r11
     lost = learns and reach * reach + noise * noise > _LOST * _LOST
     for j in range(1, int(numbers[COUNT]) + 1):
-        left = weight[j] * chance.left
-        empty += left
-        if learns and left > 1e-9 * empty:
-            merge(of, 0, j, left / empty, CROSSTALK1, work)
         born += weight[j] * chance.replaced
         weight[j] *= chance.stayed
         if lost:
