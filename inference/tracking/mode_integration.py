@@ -17,7 +17,8 @@ __all__ = ["Nodes", "PeakedMode", "integrate", "nodes_for"]
 Array = NDArray[np.float64]
 
 _GAUSSIAN = 0.3  # nats by which a mode may leave its parabola at sqrt(3) standard deviations
-_WINDOWS = 2  # on either side of the middle one
+_WINDOWS = 4  # on either side of the middle one
+_SPACING = 0.5  # of windows, in standard deviations, and their width
 _NEGLIGIBLE_WINDOW = 1e-3  # share of a mode below which a window's part is left out
 _INTERVALS = 32  # of Simpson's rule on either side of a mode
 _ROOT3 = math.sqrt(3.0)
@@ -82,6 +83,20 @@ def _simpson(
 
 
 @compiled
+def _window_share(x: float, window: int) -> float:
+    """Return what one of the windows takes of a place x standard deviations from the mean."""
+    nearest = min(max(round(x / _SPACING), -_WINDOWS), _WINDOWS)
+    # against the nearest one: far out all are below what numbers hold
+    away = x / _SPACING - nearest
+    windows = 0.0
+    for other in range(-_WINDOWS, _WINDOWS + 1):
+        off = x / _SPACING - other
+        windows += math.exp(0.5 * (away * away - off * off))
+    off = x / _SPACING - window
+    return math.exp(0.5 * (away * away - off * off)) / windows
+
+
+@compiled
 def _divide(
     to: TrackCandidates,
     count: int,
@@ -110,10 +125,7 @@ def _divide(
         share, shift, square = 0.0, 0.0, 0.0
         for row in range(aways.size):
             x = (aways[row] - mean) / sd
-            windows = 0.0
-            for other in range(-_WINDOWS, _WINDOWS + 1):
-                windows += math.exp(-0.5 * ((x - other) * (x - other)))
-            part = masses[row] * math.exp(-0.5 * ((x - window) * (x - window))) / windows
+            part = masses[row] * _window_share(x, window)
             share += part
             shift += part * x
             square += part * x * x
