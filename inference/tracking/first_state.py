@@ -59,7 +59,7 @@ def first_state(
     weight = np.zeros(rows)
     there = settings.visit_s / (settings.visit_s + settings.absence_s)
     weight[0] = 1.0 - there
-    return TrackState(Hypotheses(x, X, weight, np.array([math.nan, there, 1.0, 0.0])))
+    return TrackState(Hypotheses(x, X, weight, np.array([math.nan, there, 1.0, 0.0, 0.0])))
 
 
 def _moments(from_normal: Any) -> tuple[float, float]:

@@ -42,6 +42,7 @@ class Position(NamedTuple):
     """The prior density of u."""
 
     born: bool  # whether u has the prior density of the ranges instead of a normal one
+    again: bool  # whether it had so in frames before: an object that may be anywhere by now
     # of a normal u; the log of sqrt(precision / 2 pi), for a born u the log of its weight
     centre: float
     precision: float

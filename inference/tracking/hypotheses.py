@@ -18,6 +18,7 @@ __all__ = [
     "COUNT",
     "CROSSTALK1",
     "CROSSTALK2",
+    "LOST",
     "PENDING",
     "RUNNING",
     "TIME",
@@ -37,7 +38,7 @@ Array = NDArray[np.float64]
 # states of a hypothesis: log r, its rate, crosstalk, and the log r at which tangents are taken
 U, V, CROSSTALK1, CROSSTALK2, ANCHOR = range(5)
 # places in `Hypotheses.numbers`
-TIME, PENDING, RUNNING, COUNT = range(4)
+TIME, PENDING, RUNNING, COUNT, LOST = range(5)
 
 
 class Hypotheses(NamedTuple):
@@ -49,8 +50,9 @@ class Hypotheses(NamedTuple):
     x: Array
     X: Array  # (rows, n, n + p): roots of the covariances
     weight: Array  # (rows,): probabilities
-    # (4,): time of the last frame [s] (nan: none yet), probability of an object of which nothing is
-    # known yet, running surprise, number of hypotheses
+    # (5,): time of the last frame [s] (nan: none yet), probability of an object of which nothing is
+    # known yet, running surprise, number of hypotheses, and whether an object that was there may be
+    # anywhere by now
     numbers: Array
 
 

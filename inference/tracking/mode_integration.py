@@ -154,7 +154,8 @@ def integrate(
     Three Gauss-Hermite nodes where the mode is near a Gaussian, which is exact to the fifth power
     of the distance.
 
-    Where u is wide because nuisance parameters or crosstalk are uncertain, only the mode is taken.
+    Where u is wide because nuisance parameters or crosstalk are uncertain, only the mode is taken,
+    but for an object that has just come.
     What they do to the readings is linear here, and the curve is not: integrated over a wide
     density, the difference would pass for knowledge of the range, a little in every frame.
 
@@ -179,7 +180,8 @@ def integrate(
         The new length.
     """
     u, scale = mode.u, mode.scale
-    if prior.added.spread.shape[1] > 2 and not prior.position.born:
+    once = prior.position.born and not prior.position.again
+    if prior.added.spread.shape[1] > 2 and not once:
         top = log_density(u, frame, prior, table)
         log_mass = top + math.log(scale) + _LOG_ROOT_2PI
         return add_candidate(to, count, TrackCandidate(log_mass, u, 0.0, u, parent))

@@ -12,6 +12,7 @@ from inference.tracking.hypotheses import (
     COUNT,
     CROSSTALK1,
     CROSSTALK2,
+    LOST,
     PENDING,
     Hypotheses,
     U,
@@ -84,6 +85,7 @@ def predict(seconds: float, of: Hypotheses, rules: Rules, work: Array) -> None:
         move(of, j, motion, work)
         if learns:
             x[j, ANCHOR] += certainty(of, j) * along
+    numbers[LOST] = 1.0 if lost else 0.0
     if lost:
         numbers[COUNT] = 0.0
     weight[0] = empty + numbers[PENDING] * chance.left
@@ -177,7 +179,7 @@ def prior_of(
     if table.by_rate:
         rate = _rate_given_u(of, row, precision)
     return Prior(
-        Position(False, x[row, U], precision, log_scale),
+        Position(False, False, x[row, U], precision, log_scale),
         Added(offset1, offset2, slope1, slope2, root, of.X[0, of.X.shape[1] - 2 :]),
         rate,
         share,
@@ -209,7 +211,7 @@ def born_prior(of: Hypotheses, log_weight: float, rate_sd: float, table: Reading
         for j in range(of.X.shape[-1]):
             root = add_factor(root, of.X[0, CROSSTALK1, j], of.X[0, CROSSTALK2, j])
     return Prior(
-        Position(True, 0.0, 0.0, log_weight),
+        Position(True, of.numbers[LOST] > 0.0, 0.0, 0.0, log_weight),
         Added(offset1, offset2, 0.0, 0.0, root, of.X[0, of.X.shape[1] - 2 :]),
         Rate(0.0, 0.0, rate_sd),
         0.0,

@@ -77,6 +77,27 @@ def test_intervals_hold_the_truth_while_the_object_moves() -> None:
     assert held >= 24
 
 
+@pytest.mark.parametrize("discrepancy", [0, "default"])
+def test_crosstalk_far_above_the_noise_loses_no_track(discrepancy: float | str) -> None:
+    """Crosstalk unknown by 125 read noises, which is half of the object's own light at 0.8 m.
+
+    Taken for a straight line, what follows it was 65 standard deviations off in one of 12 tracks,
+    and held 64 %. Errors of a track go together: five standard deviations at every frame of 12
+    tracks, and 70 % of the 90 % intervals, are what is asked; 86 and 87 % hold.
+    """
+    sd, held = 1e-2, []
+    model = tracker(SENSOR, parse_scene(scene_of(sd, discrepancy=discrepancy)), QUIET)
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        r = wandering(rng, 150)
+        _, found = step(model, model.first, frames_at(r, sd * rng.standard_normal(2), rng))
+        unique = np.isfinite(found.range_m)
+        z = (found.range_m - r)[unique] / found.sd_m[unique]
+        assert np.abs(z).max(initial=0.0) < 5.0
+        held.append(np.mean(np.abs(z) < 1.645))
+    assert np.mean(held) > 0.7
+
+
 @pytest.mark.parametrize("motion", ["static", "radial"])
 def test_frames_of_an_object_at_rest_do_not_tell_range_from_crosstalk(motion: str) -> None:
     """The exact posterior of the one range, on a grid, does not get narrower than a percent."""
@@ -106,8 +127,9 @@ def test_a_discrepancy_does_not_make_crosstalk_known(discrepancy: float | None) 
     scene = parse_scene(scene_of(1e-3, **more))
     found = track(SENSOR, scene, frames_at(r, np.array([0.0, 1e-3]), rng), QUIET)
     assert found.crosstalk_sd is not None
-    # the first frame tells nothing of the whole window's crosstalk: its prior
-    assert found.crosstalk_sd[0, 1] == pytest.approx(1e-3, rel=0.05)
+    # the first frame tells nothing of the whole window's crosstalk: its prior, or a little more for
+    # the parts into which what follows it is divided
+    assert 0.95e-3 < found.crosstalk_sd[0, 1] < 1.1e-3
     z = (found.best_m - r) / found.best_sd_m
     # errors of a track go together: five standard deviations at every frame is what is asked
     assert np.nanmax(np.abs(z)) < 5.0
