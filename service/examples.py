@@ -10,6 +10,7 @@ from service.requests import (
     IdentifiabilityRequest,
     PosteriorRequest,
     SimulationRequest,
+    StreamRequest,
 )
 
 __all__ = ["EXAMPLES"]
@@ -59,6 +60,17 @@ EXAMPLES: Mapping[type[pydantic.BaseModel], Mapping[str, Mapping[str, Any]]] = {
                 },
                 "frames": {"w1": [0.0147, 0.0119, 0.0099], "w2": [0.441, 0.297, 0.212]},
                 "sampler": {"max_seconds": 10.0, "seed": 1},
+            },
+        ),
+    },
+    StreamRequest: {
+        "robot": _example(
+            "A robot that prefers the latest to all",
+            {
+                "sensor": _PULSE,
+                "scene": {"object": _OBJECT},
+                "tracking": {"rate_sd": 0.5},
+                "policy": "latest",
             },
         ),
     },

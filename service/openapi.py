@@ -1,8 +1,8 @@
 """The OpenAPI document: what FastAPI says of the routes, and what it cannot know.
 
 Bodies that the service reads by itself, with examples; what the border answers; where a posterior
-that was asked for is found; and tags of unions, which have to be sent although Python may leave
-them out.
+or a stream that was asked for is found; and tags of unions, which have to be sent although Python
+may leave them out.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,7 +21,8 @@ from service.problems import ProblemDetails, problem_responses
 
 __all__ = ["install", "name_of"]
 
-_POSTERIORS = "/v1/posteriors"
+# what makes something, the answer that says so, and the parameter that names it
+_MADE = (("/v1/posteriors", "202", "job_id"), ("/v1/streams", "201", "stream_id"))
 
 
 def name_of(route: APIRoute) -> str:
@@ -98,22 +99,23 @@ def _tell_what_is_sent(schema: dict[str, Any]) -> None:
 
 
 def _add_links(document: dict[str, Any]) -> None:
-    """Say where a posterior is found that was asked for, and what can be done with it."""
+    """Say where what was made is found, and what can be done with it."""
     paths = document["paths"]
-    links = {
-        operation["operationId"]: {
-            "operationId": operation["operationId"],
-            "parameters": {"job_id": "$response.body#/id"},
+    for root, status, parameter in _MADE:
+        links = {
+            operation["operationId"]: {
+                "operationId": operation["operationId"],
+                "parameters": {parameter: "$response.body#/id"},
+            }
+            for path, operations in paths.items()
+            for operation in operations.values()
+            if path.startswith(f"{root}/{{{parameter}}}")
         }
-        for path, operations in paths.items()
-        for operation in operations.values()
-        if path.startswith(_POSTERIORS + "/{job_id}")
-    }
-    made = paths[_POSTERIORS]["post"]["responses"]["202"]
-    made["links"] = links
-    made["headers"] = {
-        "Location": {"required": True, "schema": {"type": "string", "format": "uri-reference"}}
-    }
+        made = paths[root]["post"]["responses"][status]
+        made["links"] = links
+        made["headers"] = {
+            "Location": {"required": True, "schema": {"type": "string", "format": "uri-reference"}}
+        }
 
 
 def _add_border(document: dict[str, Any]) -> None:

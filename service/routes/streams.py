@@ -3,10 +3,10 @@
 import asyncio
 import re
 from collections.abc import AsyncIterable, AsyncIterator
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Query, Request, WebSocket, WebSocketDisconnect
-from fastapi.responses import JSONResponse, Response
+from fastapi.responses import Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.exceptions import HTTPException
 from starlette.types import Receive, Scope, Send
@@ -14,6 +14,7 @@ from starlette.types import Receive, Scope, Send
 from service.answers.streams import StreamLine, StreamPage, StreamResponse, stream_of
 from service.bodies import BodyOf, check_media_type, read_limited
 from service.errors import MalformedError, SlowClientError
+from service.json_text import encode
 from service.problems import problem_responses, response_of
 from service.requests import StreamRequest
 from service.shared import client_of, shared_of
@@ -32,6 +33,10 @@ _KINDS = re.compile(r"application/(x-ndjson|ndjson|jsonl|json-seq|json|x-jsonlin
 _QUIET_S = 60.0
 
 
+def _answer(body: Any, status: int = 200, headers: dict[str, str] | None = None) -> Response:
+    return Response(encode(body), status, headers, "application/json")
+
+
 @router.post(
     "",
     status_code=201,
@@ -43,7 +48,7 @@ async def create(request: Request, body: Body) -> Response:
     streams = shared_of(request).streams
     record = await streams.create(body[1], client_of(request))
     headers = {"Location": f"/v1/streams/{record.id}"}
-    return JSONResponse(stream_of(record, streams.status(record)), 201, headers)
+    return _answer(stream_of(record, streams.status(record)), 201, headers)
 
 
 @router.get(
@@ -64,7 +69,7 @@ async def page(
     records = await streams.page(after, limit + 1, client_of(request))
     more = str(records[limit - 1].arrival) if len(records) > limit else None
     items = [stream_of(record, streams.status(record)) for record in records[:limit]]
-    return JSONResponse({"items": items, "next_cursor": more})
+    return _answer({"items": items, "next_cursor": more})
 
 
 @router.get(
@@ -76,7 +81,7 @@ async def get(request: Request, stream_id: str) -> Response:
     """Return a stream as it stands: counts, health, its last answer."""
     streams = shared_of(request).streams
     record = await streams.get(stream_id, client_of(request))
-    return JSONResponse(stream_of(record, streams.status(record)))
+    return _answer(stream_of(record, streams.status(record)))
 
 
 @router.delete(
