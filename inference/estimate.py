@@ -133,7 +133,11 @@ def _solved(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> Techniqu
         return solve(Task(sensor, scene, frames, known_of(scene)))
 
     def at(stated: Scene) -> TechniqueResult:
-        return solve(Task(sensor, stated, frames, known_of(stated), physical=False))
+        known = known_of(stated)
+        reason = obstacle(ALL_TECHNIQUES[name], sensor, stated, known, frames)
+        if reason is not None:
+            raise RefusedError(f"a standard deviation off the scene's centre it {reason}")
+        return solve(Task(sensor, stated, frames, known, physical=False))
 
     middle = centre(sensor, scene)
     result = solve(Task(sensor, middle, frames, known_of(middle)))

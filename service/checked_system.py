@@ -2,6 +2,7 @@
 
 from simulator.errors import InvalidInputError, Problem, RefusedError
 from simulator.frames import FrameColumns, Frames, frames_from_columns
+from simulator.joint_scene import around
 from simulator.scene import Scene
 from simulator.scene_checks import check_scene
 from simulator.sensor import PulsedSensor, Sensor
@@ -85,6 +86,8 @@ def aliases_of(sensor: Sensor, scene: Scene) -> float:
     """
     if isinstance(sensor, PulsedSensor) or scene.background is None:
         return 1.0
+    if scene.joint is not None:
+        return max(aliases_of(sensor, each) for pair in around(sensor, scene) for each in pair)
     distance = scene.background.distance_m
     if not isinstance(distance, float | int):
         return 1.0

@@ -20,6 +20,7 @@ __all__ = [
 
 _LOOSE = pydantic.Strict(False)  # JSON arrays arrive as lists; the elements stay strict
 _MOST = 32  # unknowns, modes
+_FARTHEST = 100.0  # standard deviations of a prior
 _SYMMETRIC = 1e-6  # of the standard deviations
 
 Name = Annotated[str, pydantic.Field(max_length=64)]
@@ -54,6 +55,11 @@ class NormalMode(Validated):
         if not (np.diagonal(matrix) > 0).all():
             raise ValueError("covariance must have positive variances on its diagonal")
         sd = np.sqrt(np.diagonal(matrix))
+        if not (np.abs(self.mean) + sd <= _FARTHEST).all():
+            raise ValueError(
+                f"reaches beyond {_FARTHEST:g} standard deviations of the prior of an unknown: "
+                "state that prior wider"
+            )
         correlation = matrix / sd[:, None] / sd
         if not np.allclose(correlation, correlation.T, rtol=0.0, atol=_SYMMETRIC):
             raise ValueError("covariance must be symmetric")

@@ -3,9 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from simulator.errors import RefusedError, listed
 from simulator.parameters import parameters_of
 from simulator.scene import Scene, Shadow
 from simulator.sensor import Sensor
+from simulator.validated import is_number
 
 __all__ = ["around", "centre"]
 
@@ -24,6 +26,11 @@ def centre(sensor: Sensor, scene: Scene) -> Scene:
     -------
     Scene
         Without a joint law; the scene itself where it has none.
+
+    Raises
+    ------
+    RefusedError
+        Where a number is beyond what can be computed with.
     """
     if scene.joint is None:
         return scene
@@ -47,6 +54,11 @@ def around(sensor: Sensor, scene: Scene) -> tuple[tuple[Scene, Scene], ...]:
     -------
     tuple of (Scene, Scene)
         Without joint laws.
+
+    Raises
+    ------
+    RefusedError
+        As of `centre`.
     """
     assert scene.joint is not None  # noqa: S101  # see above
     parameters = parameters_of(sensor, scene)
@@ -67,6 +79,12 @@ def _at(sensor: Sensor, scene: Scene, names: tuple[str, ...], values: Array) -> 
         for name, value in zip(names, values.tolist(), strict=True)
         if name in scene.joint.unknowns
     }
+    beyond = [name for name, value in numbers.items() if not is_number(value)]
+    if beyond:
+        raise RefusedError(
+            f"within a standard deviation of the scene's joint law {listed(beyond)} is beyond what "
+            "can be computed with; calibrate with frames that tell it, or state a narrower prior"
+        )
 
     def of(path: str) -> dict[str, float]:
         return {

@@ -7,7 +7,7 @@ import pydantic
 
 from simulator.errors import InvalidInputError, Problem, escape
 
-__all__ = ["NonNegative", "Number", "Positive", "Validated", "parse", "problems_of"]
+__all__ = ["NonNegative", "Number", "Positive", "Validated", "is_number", "parse", "problems_of"]
 
 T = TypeVar("T", bound="Validated")
 
@@ -15,8 +15,13 @@ T = TypeVar("T", bound="Validated")
 _LARGEST = 1e50
 
 
+def is_number(value: float) -> bool:
+    """Tell whether a value is zero or of a size that can be computed with."""
+    return value == 0 or 1 / _LARGEST <= abs(value) <= _LARGEST
+
+
 def _of_size(value: float) -> float:
-    if value != 0 and not 1 / _LARGEST <= abs(value) <= _LARGEST:
+    if not is_number(value):
         raise ValueError(
             f"must lie between {1 / _LARGEST:g} and {_LARGEST:g} in magnitude, is {value:g}; state "
             "it in another unit"

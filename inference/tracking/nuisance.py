@@ -66,6 +66,12 @@ def nuisance_of(
                 "from frames of this scene first, and pass it, or calibrate the scene"
             )
         steps = np.eye(len(names))[[names.index(name) for name in told]]
+        near = parameters.natural(np.concatenate([origin[None], steps, -steps]))
+        if not np.isfinite(near).all():
+            raise RefusedError(
+                "the scene's joint law reaches beyond what can be computed with; calibrate with "
+                "frames that tell more of its unknowns"
+            )
         return _around(parameters, origin, steps)
     draws = _draws(parameters, posterior)
     with np.errstate(all="ignore"):

@@ -196,6 +196,11 @@ def _law(stated: RangePrior, centre: Terms) -> Any:
     law = centre.ranges.copy()
     if isinstance(stated, Stroke | Reference):
         low, high = law[0, 6], law[0, 7]
+        if not high > low:
+            raise RefusedError(
+                f"the scene's background is known to be nearer than every range from {low:g} m on, "
+                "and an object stands before it; lower `range_m`, or raise `background.distance_m`"
+            )
         law[0] = [-math.log(math.log(high / low)), -1.0, 0.0, 0.0, 0.0, 0.0, low, high]
     return prior_of(law[0])
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from simulator.errors import InvalidInputError
+from simulator.errors import InvalidInputError, RefusedError
+from simulator.joint_scene import around, centre
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import Scene, parse_scene
 from simulator.scene_checks import check_scene
@@ -157,6 +158,7 @@ def changed(mode: int, **members: Any) -> dict[str, Any]:
             "symmetric",
         ),
         ({"joint": changed(0, weight=0.5)}, "/joint", "add up to 1"),
+        ({"joint": changed(0, mean=[0.0, 101.0, 0.0])}, "/joint/modes/0", "wider"),
         ({"joint": JOINT | {"modes": []}}, "/joint/modes", "at least 1"),
         ({"joint": JOINT | {"unknowns": ["object.c0"] * 3}}, "/joint", "once"),
         (
@@ -205,3 +207,14 @@ def test_a_word_takes_what_failed_and_noise_may_be_stated_anew() -> None:
     noise = {"read": [2e-6, 1e-6]}
     other = parse_sensor({"kind": "pulsed", "pulse_width_s": 1e-7, "noise": noise})
     check_scene(other, scene(calibration=bad))
+
+
+def test_numbers_that_overflow_are_refused() -> None:
+    """A law inside the bounds of its coordinates, of a prior that is wide enough for anything."""
+    wide = {"c2": {"prior": "lognormal", "median": 1.0, "sigma": 100.0}}
+    mode = {"mean": [0.0], "covariance": [[4.0]]}
+    joint = {"unknowns": ["object.c2"], "modes": [mode]}
+    stated = parse_scene({"object": wide, "joint": joint})
+    assert centre(SENSOR, stated).object.c2 == 1.0
+    with pytest.raises(RefusedError, match=r"object\.c2 is beyond"):
+        around(SENSOR, stated)
