@@ -10,6 +10,7 @@ from service.errors import MalformedError
 from service.strict_json import check_bulk
 from simulator.errors import HybridTofError, InvalidInputError, escape
 from simulator.frames import FrameColumns
+from simulator.known_ranges import MAY_BE_NULL
 from simulator.validated import parse
 
 __all__ = ["BadRow", "FrameTable", "Row", "table_of", "value_of_json", "value_of_text"]
@@ -151,16 +152,18 @@ def _take(
             return BadRow(index, row.line, name, f"must be {must}, is {repr(said)[:42]}")
         if name == "gain" and value <= 0:
             return BadRow(index, row.line, name, f"must be above 0, is {value:g}")
-        values.append(value)
+        values.append(None if math.isnan(value) else value)
     for (_, name), value in zip(wanted, values, strict=True):
         columns[name].append(value)
     return None
 
 
 def value_of_json(name: str, value: Any) -> float | bool | None:
-    """Return a JSON value that a column may hold; None for any other."""
+    """Return a JSON value that a column may hold, nan for null in its place; None for any other."""
     if name == "object_present":
         return value if isinstance(value, bool) else None
+    if value is None and name in MAY_BE_NULL:
+        return math.nan
     if type(value) not in (int, float):
         return None
     return value if math.isfinite(value) else None
@@ -170,6 +173,8 @@ def value_of_text(name: str, text: str) -> float | bool | None:
     """Return the value of a CSV field; None for what Python alone takes for a number (1_000)."""
     if name == "object_present":
         return {"true": True, "false": False}.get(text.strip().lower())
+    if name in MAY_BE_NULL and text.strip().lower() in ("", "nan", "null"):
+        return math.nan
     try:
         value = float(text)
     except ValueError:

@@ -90,8 +90,14 @@ class IdentifiabilityRequest(SystemDescription):
     at : dict of str to float, optional
         Values of unknowns by scene path at which the bounds are computed; the others are at the
         medians of their priors.
+    known_range_sd_m : list of float or null, optional
+        To how much a ruler or a robot tells the range of each frame [m]; null where nothing does.
+    displacement_sd_m : list of float or null, optional
+        The same of odometry, which tells ranges up to one offset that all frames share.
     """
 
     ranges_m: Annotated[list[Positive], _PLANNED]
+    known_range_sd_m: Annotated[list[Positive | None], _PLANNED] | None = None
+    displacement_sd_m: Annotated[list[Positive | None], _PLANNED] | None = None
     object_present: Annotated[list[bool], _PLANNED] | None = None
     at: Annotated[dict[Name, float], pydantic.Field(max_length=64)] | None = None

@@ -14,6 +14,7 @@ import orjson
 
 from service.errors import MalformedError
 from simulator.errors import InvalidInputError, Problem, escape
+from simulator.known_ranges import MAY_BE_NULL
 
 __all__ = ["MAX_DEPTH", "MAX_ENTRIES", "SHORT", "check_bulk", "decode"]
 
@@ -22,6 +23,7 @@ MAX_DEPTH = 32
 # a list or an object longer than this is a column of numbers or of booleans, or it is wrong
 SHORT = 64
 MAX_ENTRIES = 2_000_000
+_NULLABLE = tuple(f"/{name}" for name in MAY_BE_NULL)
 
 # a string that is never closed ends with the document: searching on from each of its quotes would
 # take a time that grows with the square of its length
@@ -183,9 +185,9 @@ def check_bulk(value: Any) -> None:
     Raises
     ------
     InvalidInputError
-        For a list of more than `SHORT` entries that is not all finite numbers or all booleans
-        (the first offending entry is named), for one of more than `MAX_ENTRIES`, and for an
-        object of more than `SHORT` members.
+        For a list of more than `SHORT` entries that is not all finite numbers (or null, in a column
+        that may hold it) or all booleans (the first offending entry is named), for one of more than
+        `MAX_ENTRIES`, and for an object of more than `SHORT` members.
     """
     if _is_plain(value):
         return
@@ -197,7 +199,7 @@ def check_bulk(value: Any) -> None:
             problems.append(Problem(pointer, f"has more than {SHORT} members"))
         elif len(container) > MAX_ENTRIES:
             problems.append(Problem(pointer, f"has more than {MAX_ENTRIES} entries"))
-        elif (index := _first_odd(container)) is not None:
+        elif (index := _first_odd(container, pointer.endswith(_NULLABLE))) is not None:
             wanted = "true or false" if isinstance(container[0], bool) else "a finite number"
             problems.append(Problem(f"{pointer}/{index}", f"must be {wanted}"))
         if len(problems) == SHORT:
@@ -225,8 +227,10 @@ def _is_column(column: list[Any]) -> bool:
     return types <= {int, float} and (math.isfinite(sum(column)) or all(map(math.isfinite, column)))
 
 
-def _first_odd(column: list[Any]) -> int | None:
+def _first_odd(column: list[Any], nullable: bool = False) -> int | None:
     """Index of the first entry that does not fit a column of numbers or of booleans."""
+    if nullable:
+        column = [0.0 if entry is None else entry for entry in column]
     if _is_column(column):
         return None
     boolean = isinstance(column[0], bool)

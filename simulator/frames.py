@@ -9,6 +9,7 @@ import pydantic
 from numpy.typing import ArrayLike, NDArray
 
 from simulator.errors import InvalidInputError, Problem
+from simulator.known_ranges import MAY_BE_NULL, known_range_problems
 from simulator.sensor import Sensor
 from simulator.validated import Validated
 
@@ -18,6 +19,7 @@ Array = NDArray[np.float64]
 # a bad column is answered by its first bad entry, not by one problem for each of a million
 _BOUNDS = pydantic.Field(max_length=2_000_000, fail_fast=True)
 Column = Annotated[list[float], _BOUNDS]
+NullableColumn = Annotated[list[float | None], _BOUNDS]
 
 
 class FrameColumns(Validated):
@@ -34,6 +36,10 @@ class FrameColumns(Validated):
     dq_dt: Column | None = None
     gain: Annotated[list[Annotated[float, pydantic.Field(gt=0)]], _BOUNDS] | None = None
     object_present: Annotated[list[bool], _BOUNDS] | None = None
+    known_range_m: NullableColumn | None = None
+    known_range_sd_m: NullableColumn | None = None
+    displacement_m: NullableColumn | None = None
+    displacement_sd_m: NullableColumn | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,6 +59,11 @@ class Frames:
         not crosstalk, which is given in reading units.
     object_present : ndarray of bool, shape (n,), optional
         False where the scene is known to hold no object.
+    known_range_m, known_range_sd_m : ndarray, shape (n,), optional
+        Ranges that a ruler or a robot tells, and their standard deviations [m]; nan where nothing
+        is known. Posteriors use them.
+    displacement_m, displacement_sd_m : ndarray, shape (n,), optional
+        The same of ranges less one offset of all frames, as odometry tells them.
     """
 
     readings: Array
@@ -60,6 +71,10 @@ class Frames:
     derivatives: Array | None = None
     gain: Array | None = None
     object_present: NDArray[np.bool_] | None = None
+    known_range_m: Array | None = None
+    known_range_sd_m: Array | None = None
+    displacement_m: Array | None = None
+    displacement_sd_m: Array | None = None
 
     def __len__(self) -> int:
         return int(self.readings.shape[0])
@@ -79,7 +94,7 @@ class Frames:
         }
         return Frames(**parts)
 
-    def to_columns(self, sensor: Sensor) -> dict[str, list[float] | list[bool]]:
+    def to_columns(self, sensor: Sensor) -> dict[str, list[Any]]:
         """Return the columns by name (docs/scenes.md, frames), those that are present."""
         first, second = sensor.columns
         columns: dict[str, Any] = {} if self.time_s is None else {"time_s": self.time_s}
@@ -91,7 +106,11 @@ class Frames:
             columns["gain"] = self.gain
         if self.object_present is not None:
             columns["object_present"] = self.object_present
-        return {name: column.tolist() for name, column in columns.items()}
+        lists = {name: column.tolist() for name, column in columns.items()}
+        for name in MAY_BE_NULL:
+            if (column := getattr(self, name)) is not None:
+                lists[name] = [None if np.isnan(value) else value for value in column.tolist()]
+        return lists
 
 
 def frames_from_columns(
@@ -115,7 +134,7 @@ def frames_from_columns(
     ------
     InvalidInputError
         A pointer for each column that is missing, unknown, of another length, not numeric, not
-        finite, empty, or (gain) not positive.
+        finite, empty, or (gain) not positive, or that tells ranges which cannot be.
     """
     if isinstance(columns, FrameColumns):
         # in the order of the fields, which a set has not: an answer has its problems in one order
@@ -124,7 +143,7 @@ def frames_from_columns(
     given = {name: column for name, column in columns.items() if column is not None}
     first, second = sensor.columns
     slopes = (f"d{first}_dt", f"d{second}_dt")
-    allowed = {"time_s", first, second, *slopes, "gain", "object_present"}
+    allowed = {"time_s", first, second, *slopes, "gain", "object_present", *MAY_BE_NULL}
     problems = [
         Problem(f"/{name}", f"is not a column of a {sensor.kind} sensor")
         for name in given
@@ -152,6 +171,8 @@ def frames_from_columns(
         ]
         if "gain" in arrays and np.any(arrays["gain"] <= 0):
             problems.append(Problem("/gain", "must be positive"))
+    if not problems:
+        problems = known_range_problems(arrays, sensor.max_range_m)
     if problems:
         raise InvalidInputError(*problems)
     readings = np.empty((n, 2))
@@ -164,6 +185,7 @@ def frames_from_columns(
         ),
         gain=arrays.get("gain"),
         object_present=arrays.get("object_present"),
+        **{name: arrays.get(name) for name in MAY_BE_NULL},
     )
 
 
@@ -193,6 +215,7 @@ def check_frames(sensor: Sensor, frames: Frames) -> None:
         "time_s": frames.time_s,
         "gain": frames.gain,
         "object_present": frames.object_present,
+        **{name: getattr(frames, name) for name in MAY_BE_NULL},
     }
     if frames.derivatives is not None:
         slopes = np.asarray(frames.derivatives)
@@ -216,6 +239,9 @@ def _as_column(name: str, values: ArrayLike) -> tuple[NDArray[Any], str | None]:
         return np.empty(0, dtype=wanted), None
     if array.ndim != 1:
         return np.empty(0), f"must be one-dimensional, has {array.ndim} dimensions"
+    nullable = name in MAY_BE_NULL
+    if nullable and array.dtype == object:
+        array = np.array([np.nan if value is None else value for value in array.tolist()])
     if wanted is bool:
         if array.dtype != np.bool_:
             return array, "must be true or false for each frame"
@@ -223,5 +249,5 @@ def _as_column(name: str, values: ArrayLike) -> tuple[NDArray[Any], str | None]:
     if array.dtype.kind not in "fiu":
         return array, "must hold numbers"
     array = array.astype(np.float64, copy=False)
-    finite = np.isfinite(array)
-    return array, None if finite.all() else f"entry {finite.argmin()} is not finite"
+    good = ~np.isinf(array) if nullable else np.isfinite(array)
+    return array, None if good.all() else f"entry {good.argmin()} is not finite"

@@ -63,6 +63,17 @@ class JointLaw:
 
         return Unknown(of.name, from_normal, to_normal)
 
+    def with_another(self) -> "JointLaw":
+        """Return the law with one more unknown, independent of all others, as the last."""
+        d, modes = self.mean.size + 1, self.weights.size
+        mixing, factors = np.eye(d), np.tile(np.eye(d), (modes, 1, 1))
+        mixing[:-1, :-1], factors[:, :-1, :-1] = self.mixing, self.factors
+        mean, sd = np.append(self.mean, 0.0), np.append(self.sd, 1.0)
+        centres = np.concatenate([self.centres, np.zeros((modes, 1))], axis=1)
+        return dataclasses.replace(
+            self, mean=mean, sd=sd, mixing=mixing, centres=centres, factors=factors
+        )
+
     def log_density(self, z: Array) -> Array:
         """Return the log density, shape (n,), up to that of a standard normal at its centre."""
         if self.weights.size == 0:

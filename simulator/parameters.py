@@ -11,19 +11,24 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.errors import RefusedError
+from simulator.errors import InvalidInputError, RefusedError
 from simulator.joint_law import JointLaw, joint_law
+from simulator.priors import UniformDistribution
 from simulator.range_prior import RangePrior, range_prior, range_prior_rows, stroke_unknowns
 from simulator.scene import Reference, Scene, Stroke
 from simulator.scene_checks import check_scene
 from simulator.sensor import PulsedSensor, Sensor
 from simulator.unknowns import Unknown, Values, add_quantity, add_reflectance, add_shape
 
-__all__ = ["Parameters", "Terms", "Unknown", "parameters_of"]
+__all__ = ["OFFSET", "Parameters", "Terms", "Unknown", "parameters_of", "with_offset"]
+
+OFFSET = "odometry.offset_m"
+"""The range at a displacement of zero, an unknown wherever frames tell displacements [m]."""
 
 Array = NDArray[np.float64]
 
 _MOST_REJECTIONS = 1_000_000
+_NEAREST = 1e-3  # of the farthest range, where the prior of the ranges begins at zero
 _FAR = 4.0  # standard deviations of a prior of the ranges that `Parameters.reach_m` takes in
 
 
@@ -42,12 +47,15 @@ class Terms:
     ranges : ndarray, shape (n, 8)
         Prior density of a range: log p(r) = a0 + a1 log r - ((r - a2) a3)^2 / 2
         - ((log r - a4) a5)^2 / 2 on [a6, a7] [m].
+    offset : ndarray, shape (n,), optional
+        Range at a displacement of zero [m].
     """
 
     object: Array
     crosstalk: Array | None
     background: Array | None
     ranges: Array
+    offset: Array | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -156,6 +164,7 @@ class Parameters:
             crosstalk,
             background,
             range_prior_rows(self.range_prior, values, background, z.shape[0]),
+            values.get(OFFSET),
         )
 
     def sample(self, rng: np.random.Generator, n: int) -> Array:
@@ -263,3 +272,42 @@ def parameters_of(sensor: Sensor, scene: Scene) -> Parameters:
         prior,
         law,
     )
+
+
+def with_offset(parameters: Parameters, displacement_m: Array) -> Parameters:
+    """Add the offset of displacements to the unknowns.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of a scene.
+    displacement_m : ndarray, shape (n,)
+        Displacements of frames with an object [m], at least one.
+
+    Returns
+    -------
+    unknowns : Parameters
+        With `OFFSET` as the last. The nearest of the ranges is log-uniform where all of them lie
+        within the prior of the ranges.
+
+    Raises
+    ------
+    InvalidInputError
+        Where they do not fit there.
+    """
+    least, span = float(displacement_m.min()), float(np.ptp(displacement_m))
+    low, high = parameters.reach_m
+    low = max(low, _NEAREST * high)
+    if not high - span > low:
+        raise InvalidInputError.at(
+            "/frames/displacement_m",
+            f"spans {span:.4g} m, and the ranges that the scene allows span {high - low:.4g} m",
+        )
+    law = UniformDistribution(log=True, low=low, high=high - span)
+    offset = Unknown(
+        OFFSET,
+        lambda z, _: law.from_normal(z) - least,
+        lambda x, _: law.to_normal(x + least),
+    )
+    known = None if parameters.law is None else parameters.law.with_another()
+    return dataclasses.replace(parameters, unknowns=(*parameters.unknowns, offset), law=known)

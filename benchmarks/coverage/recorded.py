@@ -4,6 +4,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.coverage.classes import TERMS
 from benchmarks.coverage.intervals import interval_row
@@ -12,11 +13,12 @@ from inference.posterior.settings import SamplerSettings
 from service.adapters.histograms import pulsed, sine_wave
 from simulator.frames import Frames
 from simulator.scene import parse_scene
+from simulator.sensor import Sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
 from tests.recorded.experiment import C2, GAIN, calibration_of, near_recording
 
-__all__ = ["CELLS", "RecordedCell", "recorded_row"]
+__all__ = ["CELLS", "EMPTY", "RecordedCell", "recorded_frames", "recorded_row"]
 
 EMPTY = 5  # frames without object, where there are any
 _RANGE_M = 0.3  # of the signal that crosstalk is compared with
@@ -65,12 +67,22 @@ CELLS = tuple(
 
 
 def recorded_row(term: str, number: int, version: str = "") -> Row:
-    """Infer the ranges of a cell; nothing is known of object and crosstalk.
-
-    The prior of the crosstalk is as wide as the signal at 0.3 m. Intervals are those of the frames
-    with an object.
-    """
+    """Infer the ranges of a cell; intervals are those of the frames with an object."""
     cell = CELLS[number]
+    sensor, scene, frames, truth = recorded_frames(cell, number)
+    settings = SamplerSettings(ensembles=2, seed=number, target_ess=200)
+    told = {**scene, **TERMS[term]}
+    return interval_row(cell.name, sensor, told, frames, truth, settings, version)
+
+
+def recorded_frames(
+    cell: RecordedCell, seed: int
+) -> tuple[Sensor, dict[str, Any], Frames, NDArray[np.float64]]:
+    """Return the sensor, what is told of the scene, the frames, and their ranges [m].
+
+    Nothing is told of object and crosstalk. The prior of the crosstalk is as wide as the signal at
+    0.3 m. Frames without an object are drawn from the seed; their range is nan.
+    """
     recording = near_recording()
     calibration = calibration_of(recording)
     recording = recording.select(recording.distance_m >= cell.low_m - 1e-9)
@@ -85,7 +97,7 @@ def recorded_row(term: str, number: int, version: str = "") -> Row:
     crosstalk = cell.share * size * direction
     absent = SampledTrajectory(range_m=[1.0] * EMPTY, object_present=[False] * EMPTY)
     known = parse_scene({"crosstalk": crosstalk.tolist()})
-    empty = simulate(sensor, known, absent, number).frames.readings[: cell.empty]
+    empty = simulate(sensor, known, absent, seed).frames.readings[: cell.empty]
     present = np.arange(truth.size + cell.empty) < truth.size
     frames = Frames(
         np.concatenate([clean.readings + crosstalk, empty]),
@@ -93,8 +105,7 @@ def recorded_row(term: str, number: int, version: str = "") -> Row:
     )
     truth = np.concatenate([truth, np.full(cell.empty, np.nan)])
     prior: dict[str, Any] = {"prior": "normal", "mean": 0.0, "sd": size}
-    scene = {"object": {"c2": C2}, "crosstalk": [prior, prior], **TERMS[term]}
+    scene = {"object": {"c2": C2}, "crosstalk": [prior, prior]}
     if cell.kind == "pulsed":  # windows count photons
         scene["crosstalk"] = [{"prior": "halfnormal", "sd": abs(float(s))} for s in signal]
-    settings = SamplerSettings(ensembles=2, seed=number, target_ess=200)
-    return interval_row(cell.name, sensor, scene, frames, truth, settings, version)
+    return sensor, scene, frames, truth

@@ -20,6 +20,7 @@ from inference.frame.arguments import (
     scene_of,
 )
 from inference.frame.blocks import GAIN, Data, block_of, is_empty, own_blocks
+from inference.frame.known_range import columns_of, with_displacements
 from inference.frame.log_density import empty_log_likelihood
 from inference.frame.modes import find_modes, room_for_modes
 from inference.frame.range_prior import integration_bounds
@@ -81,8 +82,8 @@ class CollapsedDensity:
     ----------
     parameters : Parameters
         The unknowns; z are their standard normal coordinates.
-    frames : ndarray, shape (n, 3)
-        Usable frames: two readings and the gain factor.
+    frames : ndarray, shape (n, 3 or 7)
+        Usable frames: two readings, the gain factor, and what is known of the ranges.
     present : ndarray of bool, optional
         False where a frame is known to hold no object; None where all may.
     sensor : Sensor
@@ -108,7 +109,7 @@ class CollapsedDensity:
         return self.blocks_of(self.frames)
 
     def blocks_of(self, frames: Array) -> Data:
-        """Return frames, shape (n, 3), as blocks that have a range of their own."""
+        """Return frames, shape (n, 3 or 7), as blocks that have a range of their own."""
         return own_blocks(frames, self.present)
 
     def rows(self, terms: Terms) -> Rows:
@@ -119,7 +120,7 @@ class CollapsedDensity:
         c0, c1, c2 = terms.object.T
         with np.errstate(over="ignore", invalid="ignore"):
             shapes = np.column_stack([self.sensor.gain * c0 * c2, c0, c1])
-        return Rows(shapes, terms.crosstalk, terms.background, terms.ranges)
+        return Rows(shapes, terms.crosstalk, terms.background, terms.ranges, offsets=terms.offset)
 
     def integral_rows(self, terms: Terms) -> Rows:
         """Return parameter vectors for kernels that integrate ranges out, or draw them."""
@@ -283,13 +284,13 @@ def collapsed_density(sensor: Sensor, scene: Scene, frames: Frames) -> Collapsed
     Raises
     ------
     InvalidInputError
-        Where the scene breaks a rule.
+        Where the scene breaks a rule, or displacements lead beyond the ranges that it allows.
     """
-    gain = np.ones(len(frames)) if frames.gain is None else frames.gain
     all_present = frames.object_present is None or bool(frames.object_present.all())
+    columns = columns_of(frames)
     return CollapsedDensity(
-        parameters_of(sensor, scene),
-        np.ascontiguousarray(np.column_stack([frames.readings, gain])),
+        with_displacements(parameters_of(sensor, scene), columns),
+        columns,
         None if all_present else frames.object_present,
         sensor,
         None,

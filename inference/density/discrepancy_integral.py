@@ -216,6 +216,7 @@ def _without_reference(scene: FrameScene) -> FrameScene:
         RangePrior(constant, power, mean, inverse_sd, log_mean, log_inverse_sd, low, high, None),
         scene.instrument,
         scene.flux_error,
+        scene.offset,
     )
 
 

@@ -11,6 +11,7 @@ from inference.frame.arguments import FluxError, FrameScene, Pair, ReferencePrio
 from inference.frame.blocks import Block, frame_of
 from inference.frame.flux_error import cubic_weights, slope_weights
 from inference.frame.gaussian import covariance_slope, gaussian, precision_times, squared_cross
+from inference.frame.known_range import known_information, known_log_density, known_slope
 from inference.frame.mean_readings import readings_along
 from inference.frame.modes import LEFT, POSITION, RIGHT, SD, TOP
 from inference.frame.range_prior import (
@@ -88,21 +89,23 @@ def expand(u: float, block: Block, scene: FrameScene) -> Expansion:
         As for `inference.frame.log_density.log_density`; a block of one.
     """
     r, prior, instrument = math.exp(u), scene.range_prior, scene.instrument
-    first, second, gain = frame_of(block, 0)
+    first, second, gain, known = frame_of(block, 0)
     signal, signal_slope, mean, slope = readings_along(u, r, gain, scene)
     e1, e2 = first - mean[0], second - mean[1]
     (o1, o2), (t1, t2) = signal, slope
     density = gaussian((e1, e2), mean, signal, instrument)
-    density += log_range_density(r, u, prior)
+    density += log_range_density(r, u, prior) + known_log_density(r, known, scene.offset)
     pressed = precision_times(slope, mean, signal, instrument)
     q1, q2 = precision_times(signal, mean, signal, instrument)
     pull = precision_times((e1, e2), mean, signal, instrument)
     along = e1 * pressed[0] + e2 * pressed[1] + prior_slope(r, u, prior)
     along += covariance_slope(pull, mean, slope, signal, signal_slope, instrument)
+    along += known_slope(r, known, scene.offset)
     flux = e1 * q1 + e2 * q2
     flux += covariance_slope(pull, mean, signal, signal, signal, instrument)
     of_logarithm, of_range = prior_curvature(r, prior)
-    held = of_logarithm + of_range
+    told = known_information(r, known)
+    held = of_logarithm + of_range + told
     bend = t1 * pressed[0] + t2 * pressed[1] + held
     mixed = t1 * q1 + t2 * q2
     stiff = o1 * q1 + o2 * q2
@@ -111,7 +114,7 @@ def expand(u: float, block: Block, scene: FrameScene) -> Expansion:
     if bend > 0.0:
         cross = squared_cross(slope, signal, mean, signal, instrument)
         free = (cross + held * stiff) / bend
-    information = LEAST_INFORMATION + t1 * pressed[0] + t2 * pressed[1]
+    information = LEAST_INFORMATION + t1 * pressed[0] + t2 * pressed[1] + told
     resolved, pushed, turn = _resolution(
         information, signal, signal_slope, pressed, prior.reference
     )

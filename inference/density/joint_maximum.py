@@ -82,6 +82,7 @@ def with_error(scene: FrameScene, error: FluxError) -> FrameScene:
         scene.range_prior,
         scene.instrument,
         error,
+        scene.offset,
     )
 
 

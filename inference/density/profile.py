@@ -39,11 +39,11 @@ class Linearisation:
 
     Attributes
     ----------
-    residual : ndarray, shape (frames, 2)
+    residual : ndarray, shape (frames, m)
         Whitened, the direction along the range projected out, times the root of what a frame stands
-        for; with a discrepancy more rows, those of its coefficients, and their directions projected
-        out, too.
-    jacobian : ndarray, shape (frames, 2, d)
+        for; m = 2 or, with what is known beside the readings, 4. With a discrepancy more rows,
+        those of its coefficients, and their directions projected out, too.
+    jacobian : ndarray, shape (frames, m, d)
         Derivative of the residual along z, projected likewise.
     """
 
@@ -78,22 +78,25 @@ def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearis
     with np.errstate(divide="ignore", invalid="ignore"):
         inside = (np.exp(positions) > low * (1 + 1e-9)) & (np.exp(positions) < high * (1 - 1e-9))
     ranges = density.range_of_frame
-    direction = np.where(inside[:, None], at.along, 0.0)
+    seen, along, by_z = at.rows
+    direction = np.where(inside[:, None], along, 0.0)
     length = np.sqrt(_sums(ranges, np.sum(direction * direction, axis=1)))[:, None]
     unit = np.divide(direction, length, out=np.zeros_like(direction), where=length > 0)
 
     def across(vectors: Array) -> Array:
-        """Project the directions of the ranges out of vectors of shape (frames, 2, k)."""
+        """Project the directions of the ranges out of vectors of shape (frames, m, k)."""
         shares = _sums(ranges, np.einsum("ni,nid->nd", unit, vectors))
         return np.asarray(vectors - unit[:, :, None] * shares[:, None, :])
 
-    residual, jacobian = across(at.residual[:, :, None])[:, :, 0], across(-at.jacobian)
+    residual, jacobian = across(seen[:, :, None])[:, :, 0], across(-by_z)
     if density.weights is not None:
         size = np.sqrt(density.weights)
         residual, jacobian = residual * size[:, None], jacobian * size[:, None, None]
     if basis is None:
         return Linearisation(residual, jacobian)
-    flux = across(-at.signal[:, :, None])
+    signal = np.zeros_like(seen)
+    signal[:, :2] = at.signal
+    flux = across(-signal[:, :, None])
     return _eliminate(residual, jacobian, flux * basis.values[:, None, :], basis)
 
 
@@ -109,9 +112,9 @@ def _eliminate(residual: Array, jacobian: Array, other: Array, basis: FluxBasis)
 
     Parameters
     ----------
-    residual, jacobian : ndarray, shape (frames, 2) and (frames, 2, d)
+    residual, jacobian : ndarray, shape (frames, m) and (frames, m, d)
         Of what stays.
-    other : ndarray, shape (frames, 2, k)
+    other : ndarray, shape (frames, m, k)
         Derivative of the residual along the coefficients.
     basis : FluxBasis
         Where.
@@ -119,16 +122,16 @@ def _eliminate(residual: Array, jacobian: Array, other: Array, basis: FluxBasis)
     Returns
     -------
     Linearisation
-        With half as many rows more as there are coefficients.
+        With the rows of the coefficients behind.
     """
-    d, k = jacobian.shape[2], basis.coefficients.size
+    (m, d), k = jacobian.shape[1:], basis.coefficients.size
     q = np.linalg.qr(np.concatenate([other.reshape(-1, k), np.eye(k)]))[0]
-    pad = k % 2
+    pad = -k % m
     rows = np.concatenate([residual.ravel(), basis.coefficients])
     rows = rows - q @ (q.T @ rows)
     matrix = np.concatenate([jacobian.reshape(-1, d), np.zeros((k, d))])
     matrix = matrix - q @ (q.T @ matrix)
     return Linearisation(
-        np.concatenate([rows, np.zeros(pad)]).reshape(-1, 2),
-        np.concatenate([matrix, np.zeros((pad, d))]).reshape(-1, 2, d),
+        np.concatenate([rows, np.zeros(pad)]).reshape(-1, m),
+        np.concatenate([matrix, np.zeros((pad, d))]).reshape(-1, m, d),
     )

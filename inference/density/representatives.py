@@ -76,7 +76,7 @@ def drawn_by_information(
     log_r = best_ranges(density, z[None])[0, :, 0]
     jacobian = linearise(density, z, log_r).jacobian.reshape(-1, d)
     basis = linalg.qr(np.concatenate([jacobian, np.eye(d)]), mode="economic")[0]
-    told = np.square(basis[: 2 * n]).sum(axis=1).reshape(n, 2).sum(axis=1)
+    told = np.square(basis[: len(jacobian)]).sum(axis=1).reshape(n, -1).sum(axis=1)
     total = told.sum()
     share = np.full(n, 1.0 / n) if not total > 0 else _EVEN / n + (1 - _EVEN) * told / total
     order = np.argsort(log_r, kind="stable")  # frames without object come last

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.frame.coordinates import coordinate_slopes
+from inference.frame.known_range import Beside, beside, offset_slopes
 from inference.frame.sensitivity import sensitivity, whiteners
 from simulator.parameters import Parameters
 from simulator.sensor import Sensor
@@ -31,6 +32,10 @@ class Whitened:
         W times the object's part of m; zero for a frame without object.
     jacobian : ndarray, shape (n, 2, d)
         W dm / dz.
+    beside : Beside or None
+        The same of what is known of ranges beside the readings.
+    by_offset : ndarray, shape (d,)
+        Derivative of the offset of displacements along z [m].
     """
 
     whitener: Array
@@ -38,6 +43,29 @@ class Whitened:
     along: Array
     signal: Array
     jacobian: Array
+    beside: Beside | None
+    by_offset: Array
+
+    @property
+    def rows(self) -> tuple[Array, Array, Array]:
+        """``residual``, ``along`` and ``jacobian`` with what is known beside the readings.
+
+        Of shape (n, m), (n, m) and (n, m, d), m = 4 or, where nothing is known, 2.
+        """
+        if self.beside is None:
+            return self.residual, self.along, self.jacobian
+        residual, along, _ = self.beside
+        return (
+            np.concatenate([self.residual, residual], axis=1),
+            np.concatenate([self.along, along], axis=1),
+            np.concatenate([self.jacobian, self.beside_jacobian], axis=1),
+        )
+
+    @property
+    def beside_jacobian(self) -> Array:
+        """Derivatives along z of what would be known beside the readings, shape (n, 2, d)."""
+        assert self.beside is not None  # noqa: S101  # asked where something is known
+        return self.beside.by_offset[:, :, None] * self.by_offset
 
     @property
     def across(self) -> Array:
@@ -63,8 +91,8 @@ def whitened(
         The sensor.
     parameters : Parameters
         The unknowns.
-    frames : ndarray, shape (n, 3)
-        Two readings and the gain factor.
+    frames : ndarray, shape (n, 3 or 7)
+        Two readings, the gain factor, and what is known of the range.
     z : ndarray, shape (d,)
         The parameters.
     log_r : ndarray, shape (n,)
@@ -87,4 +115,6 @@ def whitened(
         np.einsum("nij,nj->ni", whitener, at.by_range),
         np.einsum("nij,nj->ni", whitener, at.signal),
         np.einsum("nij,njt,td->nid", whitener, by_term, slopes),
+        beside(frames, log_r, terms),
+        offset_slopes(parameters, z),
     )

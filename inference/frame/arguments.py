@@ -150,6 +150,8 @@ class FrameScene(NamedTuple):
         The sensor.
     flux_error : FluxError or None
         By what the object's flux differs from the model's.
+    offset : float or None
+        Range at a displacement of zero [m]; None where frames tell no displacement.
     """
 
     shape: Shape
@@ -158,6 +160,7 @@ class FrameScene(NamedTuple):
     range_prior: RangePrior
     instrument: Instrument
     flux_error: FluxError | None
+    offset: float | None = None
 
 
 class Rows(NamedTuple):
@@ -179,6 +182,8 @@ class Rows(NamedTuple):
         Knots of a `FluxError` each.
     flux_grid : (float, float) or None
         First knot and rate of all of them.
+    offsets : ndarray, shape (n,), or None
+        As `FrameScene.offset`.
     """
 
     shapes: Array
@@ -188,6 +193,7 @@ class Rows(NamedTuple):
     reference: ReferencePrior | None = None
     flux_errors: Array | None = None
     flux_grid: Pair | None = None
+    offsets: Array | None = None
 
 
 def instrument_of(sensor: Sensor) -> Instrument:
@@ -214,6 +220,7 @@ def row_of(rows: Rows, i: int) -> Rows:
         rows.reference,
         None if rows.flux_errors is None else rows.flux_errors[one],
         rows.flux_grid,
+        None if rows.offsets is None else rows.offsets[one],
     )
 
 
@@ -238,6 +245,7 @@ def scene_of(rows: Rows, instrument: Instrument, i: int) -> FrameScene:
         ),
         instrument,
         _flux_error_of(rows.flux_errors, rows.flux_grid, i),
+        _offset_of(rows.offsets, i),
     )
 
 
@@ -253,6 +261,10 @@ def _background_of(rows: Array | None, i: int) -> Background | None:
 
 def _flux_error_of(knots: Array | None, grid: Pair | None, i: int) -> FluxError | None:
     return None if knots is None or grid is None else FluxError(knots[i], grid[0], grid[1])
+
+
+def _offset_of(offsets: Array | None, i: int) -> float | None:
+    return None if offsets is None else float(offsets[i])
 
 
 @when_compiling
@@ -276,3 +288,9 @@ def _overload_members() -> None:
         if is_none(knots):
             return lambda knots, grid, i: None  # noqa: ARG005
         return lambda knots, grid, i: FluxError(knots[i], grid[0], grid[1])
+
+    @overload(_offset_of)
+    def _offset(offsets: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
+        if is_none(offsets):
+            return lambda offsets, i: None  # noqa: ARG005
+        return lambda offsets, i: offsets[i]

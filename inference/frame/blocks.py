@@ -18,10 +18,12 @@ __all__ = [
     "Block",
     "Data",
     "Frame",
+    "Known",
     "block_of",
     "frame_count",
     "frame_of",
     "is_empty",
+    "known_of",
     "one_block",
     "own_blocks",
 ]
@@ -29,16 +31,44 @@ __all__ = [
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# columns of frames
+# columns of frames; the last four only where something is known of ranges
 FIRST, SECOND, GAIN = 0, 1, 2
+RANGE, RATE, DISPLACEMENT, DISPLACEMENT_RATE = 3, 4, 5, 6
+_PLAIN = 3  # columns of frames of whose ranges nothing is known
+
+
+class Known(NamedTuple):
+    """What is known of a frame's range beside its readings.
+
+    Attributes
+    ----------
+    range_m : float
+        The range [m].
+    rate : float
+        One over its standard deviation [1/m]; 0 where it is not known.
+    displacement_m, displacement_rate : float
+        The same of the range less an offset that all frames share.
+    """
+
+    range_m: float
+    rate: float
+    displacement_m: float
+    displacement_rate: float
+
+
+class Told(NamedTuple):
+    """Marks frames that have columns of what is known of their ranges."""
+
+    ranges: bool
 
 
 class Frame(NamedTuple):
-    """Two readings [reading units] and the factor on the sensor's gain."""
+    """Two readings [reading units], the factor on the sensor's gain, what is known of the range."""
 
     first: float
     second: float
     gain: float
+    known: Known | None = None
 
 
 class Block(NamedTuple):
@@ -48,12 +78,15 @@ class Block(NamedTuple):
     ----------
     one : Frame or None
         The frame of a block of one: numbers that need no memory.
-    many : ndarray, shape (frames, 3), or None
+    many : ndarray, shape (frames, 3 or 7), or None
         The frames of any other block.
+    told : Told or None
+        Not None where those have what is known of their ranges.
     """
 
     one: Frame | None
     many: Array | None
+    told: Told | None = None
 
 
 class Data(NamedTuple):
@@ -61,7 +94,7 @@ class Data(NamedTuple):
 
     Attributes
     ----------
-    frames : ndarray, shape (n, 3)
+    frames : ndarray, shape (n, 3 or 7)
         As `Frame`.
     present : ndarray of bool, shape (n,)
         False where it is known that no object is there, the same within a block.
@@ -69,12 +102,15 @@ class Data(NamedTuple):
         First frame of each block, and last the number of frames; None where every frame is a block.
     strongest : float
         Largest gain factor of frames that may hold an object.
+    told : Told or None
+        Not None where something is known of ranges.
     """
 
     frames: Array
     present: Flags
     starts: NDArray[np.int64] | None
     strongest: float
+    told: Told | None
 
     @property
     def blocks(self) -> int:
@@ -89,7 +125,12 @@ def _flags(frames: Array, present: Flags | None) -> Flags:
 
 def own_blocks(frames: Array, present: Flags | None) -> Data:
     """Return every frame as a block of its own."""
-    return Data(frames, _flags(frames, present), None, float(frames[:, GAIN].max()))
+    strongest = float(frames[:, GAIN].max())
+    return Data(frames, _flags(frames, present), None, strongest, _told(frames))
+
+
+def _told(frames: Array) -> Told | None:
+    return Told(True) if frames.shape[1] > _PLAIN else None
 
 
 def one_block(frames: Array, present: Flags | None) -> Data:
@@ -100,7 +141,7 @@ def one_block(frames: Array, present: Flags | None) -> Data:
     starts = np.concatenate([[0], np.arange(count, len(frames) + 1)])
     order = np.argsort(~flags, kind="stable")
     strongest = float((seen if len(seen) else frames)[:, GAIN].max())
-    return Data(frames[order], flags[order], starts, strongest)
+    return Data(frames[order], flags[order], starts, strongest, _told(frames))
 
 
 @compiled
@@ -120,13 +161,13 @@ def _count(many: Array | None) -> int:
 @compiled
 def frame_of(block: Block, j: int) -> Frame:
     """Return frame j of a block."""
-    return _frame(block.one, block.many, j)
+    return _frame(block.one, block.many, block.told, j)
 
 
 @compiled
-def _frame(one: Frame | None, many: Array | None, j: int) -> Frame:
+def _frame(one: Frame | None, many: Array | None, told: Told | None, j: int) -> Frame:
     if many is not None:
-        return Frame(many[j, FIRST], many[j, SECOND], many[j, GAIN])
+        return Frame(many[j, FIRST], many[j, SECOND], many[j, GAIN], known_of(many, told, j))
     else:  # noqa: RET505
         return one  # type: ignore[return-value]
 
@@ -134,27 +175,48 @@ def _frame(one: Frame | None, many: Array | None, j: int) -> Frame:
 @compiled
 def block_of(data: Data, b: int) -> Block:
     """Return block b."""
-    return _block(data.frames, data.starts, b)
+    return _block(data.frames, data.starts, data.told, b)
 
 
-def _block(frames: Array, starts: NDArray[np.int64] | None, b: int) -> Block:
+def known_of(frames: Array, told: Told | None, j: int) -> Known | None:
+    """Return what is known of the range of frame j."""
+    return None if told is None else Known(*frames[j, RANGE:].tolist())
+
+
+def _block(frames: Array, starts: NDArray[np.int64] | None, told: Told | None, b: int) -> Block:
     if starts is None:
-        return Block(Frame(*frames[b].tolist()), None)
-    return Block(None, frames[starts[b] : starts[b + 1]])
+        first, second, gain = frames[b, :RANGE].tolist()
+        return Block(Frame(first, second, gain, known_of(frames, told, b)), None, None)
+    return Block(None, frames[starts[b] : starts[b + 1]], told)
 
 
 @when_compiling
 def _overload_block() -> None:
     from simulator.machine_code import is_none, overload
 
+    # the type of what is returned depends on that of an argument
+    @overload(known_of)
+    def _known(frames: Any, told: Any, j: Any) -> Callable[..., Any]:  # noqa: ARG001
+        if is_none(told):
+            return lambda frames, told, j: None  # noqa: ARG005
+        return lambda frames, told, j: Known(  # noqa: ARG005
+            frames[j, RANGE],
+            frames[j, RATE],
+            frames[j, DISPLACEMENT],
+            frames[j, DISPLACEMENT_RATE],
+        )
+
     @overload(_block)
-    def _(frames: Any, starts: Any, b: Any) -> Callable[..., Any]:  # noqa: ARG001
-        # the type of what is returned depends on that of an argument
+    def _(frames: Any, starts: Any, told: Any, b: Any) -> Callable[..., Any]:  # noqa: ARG001
         if is_none(starts):
-            return lambda frames, starts, b: Block(  # noqa: ARG005
-                Frame(frames[b, FIRST], frames[b, SECOND], frames[b, GAIN]), None
+            return lambda frames, starts, told, b: Block(  # noqa: ARG005
+                Frame(
+                    frames[b, FIRST], frames[b, SECOND], frames[b, GAIN], known_of(frames, told, b)
+                ),
+                None,
+                None,
             )
-        return lambda frames, starts, b: Block(None, frames[starts[b] : starts[b + 1]])
+        return lambda frames, starts, told, b: Block(None, frames[starts[b] : starts[b + 1]], told)
 
 
 @compiled

@@ -39,7 +39,8 @@ def some_of(terms: Terms, k: slice) -> Terms:
     """Return some of the parameter vectors of terms."""
     crosstalk = None if terms.crosstalk is None else terms.crosstalk[k]
     background = None if terms.background is None else terms.background[k]
-    return Terms(terms.object[k], crosstalk, background, terms.ranges[k])
+    offset = None if terms.offset is None else terms.offset[k]
+    return Terms(terms.object[k], crosstalk, background, terms.ranges[k], offset)
 
 
 def term_changes(reference: Terms, plus: Terms, minus: Terms) -> Array:

@@ -14,6 +14,12 @@ from inference.frame.gaussian import (
     log_top,
     precision_times,
 )
+from inference.frame.known_range import (
+    known_information,
+    known_log_density,
+    known_rounding,
+    known_slope,
+)
 from inference.frame.mean_readings import readings_along, readings_at, with_surroundings
 from inference.frame.range_prior import (
     LEAST_INFORMATION,
@@ -49,6 +55,9 @@ def log_resolution(
 ) -> float:
     """Return log sqrt(1 + I / I0), I the Fisher information of a block on its log r.
 
+    What is known of the range beside the readings is part of it: a range that is known exactly has
+    no other law than that.
+
     It is the density of the reference prior where the readings tell ranges apart, and that of a
     log-uniform one where they do so to worse than I0 = `LEAST_INFORMATION`; 0 for any other prior.
     """
@@ -57,6 +66,7 @@ def log_resolution(
         for j in range(frame_count(block)):
             frame = frame_of(block, j)
             total += _information(u, frame.gain, scene)
+            total += known_information(math.exp(u), frame.known)
         return 0.5 * math.log1p(max(total, 0.0) / LEAST_INFORMATION)
     else:  # noqa: RET505  # a branch, so that it is pruned at compile time
         return 0.0
@@ -81,6 +91,7 @@ def log_density(u: float, block: Block, scene: FrameScene) -> float:
         signal, mean = readings_at(u, r, frame.gain, scene)
         residual = (frame.first - mean[0], frame.second - mean[1])
         total += gaussian(residual, mean, signal, scene.instrument)
+        total += known_log_density(r, frame.known, scene.offset)
     total += log_range_density(r, u, prior)
     return total + log_resolution(u, block, scene, prior.reference)
 
@@ -102,6 +113,8 @@ def slope_and_curvature(u: float, block: Block, scene: FrameScene) -> Pair:
         rise += e1 * p1 + e2 * p2
         rise += covariance_slope(pull, mean, slope, signal, signal_slope, instrument)
         bend += slope[0] * p1 + slope[1] * p2
+        rise += known_slope(r, frame.known, scene.offset)
+        bend += known_information(r, frame.known)
     ahead = log_resolution(u + _DIFFERENCE, block, scene, prior.reference)
     behind = log_resolution(u - _DIFFERENCE, block, scene, prior.reference)
     rise += (ahead - behind) / (2 * _DIFFERENCE)
@@ -131,6 +144,7 @@ def rounding(u: float, block: Block, scene: FrameScene) -> float:
         total += size * (abs(pull[0]) + math.sqrt(first))
         size = abs(frame.second) + abs(mean[1]) + abs(signal[1]) + moved[1]
         total += size * (abs(pull[1]) + math.sqrt(second))
+        total += known_rounding(r, u, frame.known, scene.offset)
     return _EPSILON * total
 
 

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.frame.arguments import FrameScene, Pair, ReferencePrior
-from inference.frame.blocks import Block, Frame, frame_count, frame_of
+from inference.frame.blocks import Block, Frame, Known, frame_count, frame_of
 from inference.frame.gaussian import gaussian
+from inference.frame.known_range import known_log_density
 from inference.frame.log_density import log_density, slope_and_curvature
 from inference.frame.table import LOG_PRIOR, LOG_RANGE, MEAN_1, MEAN_2, SIGNAL_1, SIGNAL_2
 from simulator.compiled import compiled
@@ -78,6 +79,15 @@ def _scan(
             e1 = (first - gain * table[MEAN_1, k]) * i1
             e2 = (second - gain * table[MEAN_2, k]) * i2
             values[k] = before[k] - 0.5 * (e1 * e1 + e2 * e2)
+    _add_known(values, table, frame.known, scene.offset)
+
+
+@compiled
+def _add_known(values: Array, table: Array, known: Known | None, offset: float | None) -> None:
+    """Add what is known of a frame's range at every knot."""
+    if known is not None:
+        for k in range(table.shape[1]):
+            values[k] += known_log_density(math.exp(table[LOG_RANGE, k]), known, offset)
 
 
 @compiled

@@ -133,7 +133,7 @@ def tabulate(bounds: Pair, scene: FrameScene, strongest: float) -> Array:
     instrument = scene.instrument
     r0, wave, read, shot, _ = instrument
     # a frame at its gain, and noise that does not depend on the object's part of the readings
-    frame = Block(Frame(0.0, 0.0, strongest), None)
+    frame = Block(Frame(0.0, 0.0, strongest, None), None, None)
     plain = FrameScene(
         scene.shape,
         scene.crosstalk,
@@ -141,6 +141,7 @@ def tabulate(bounds: Pair, scene: FrameScene, strongest: float) -> Array:
         scene.range_prior,
         Instrument(r0, wave, read, shot, None),
         scene.flux_error,
+        None,
     )
     n = max(_FEWEST_KNOTS, math.ceil((bounds[1] - bounds[0]) / KNOT_SPACING) + 1)
     unit = (read[0] / strongest, read[1] / strongest)

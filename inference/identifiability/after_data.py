@@ -29,6 +29,7 @@ def statuses_of_draws(
     *,
     discrepancy: float | None = None,
     common_range: bool = False,
+    rates: Array | None = None,
 ) -> tuple[Identifiability, ...]:
     """Say whether every unknown is identified, by its spread in the posterior, and why.
 
@@ -50,6 +51,8 @@ def statuses_of_draws(
         Standard deviation of a smooth error of the object's log flux.
     common_range : bool
         Whether the object is known not to move.
+    rates : ndarray, shape (frames, 2), optional
+        As of `Experiment`.
 
     Returns
     -------
@@ -79,6 +82,7 @@ def statuses_of_draws(
         gain,
         discrepancy=discrepancy,
         common_range=common_range,
+        rates=rates,
     )
     expected = expected_posterior(experiment) if experiment.finite else None
     return statuses_of(experiment, spread, expected, still)

@@ -18,7 +18,7 @@ from inference.identifiability.reasons import Diagnosis
 from inference.identifiability.status import Identifiability
 from inference.identifiability.statuses import Spread, statuses_of
 from simulator.errors import InvalidInputError, Problem, RefusedError, escape
-from simulator.parameters import Parameters, parameters_of
+from simulator.parameters import Parameters, parameters_of, with_offset
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
@@ -107,6 +107,25 @@ def _log_ranges(ranges_m: Sequence[float], object_present: Sequence[bool] | None
     return log_r if object_present is None else np.where(object_present, log_r, np.nan)
 
 
+def _rates(
+    known: Sequence[float | None] | None, moved: Sequence[float | None] | None, log_r: Array
+) -> Array | None:
+    """Return one over the standard deviations to which ranges are known, as of `Experiment`."""
+    rates = np.zeros((log_r.size, 2))
+    for k, (name, sds) in enumerate((("known_range_sd_m", known), ("displacement_sd_m", moved))):
+        if sds is None:
+            continue
+        sd = np.array([math.inf if value is None else value for value in sds], dtype=float)
+        if sd.size != log_r.size:
+            message = f"has {sd.size} entries where ranges_m has {log_r.size}"
+            raise InvalidInputError.at(f"/{name}", message)
+        bad = np.flatnonzero(~(sd > 0))
+        if bad.size:
+            raise InvalidInputError.at(f"/{name}/{bad[0]}", "must be above 0, or null")
+        rates[:, k] = np.where(np.isfinite(log_r), 1.0 / sd, 0.0)
+    return None if known is None and moved is None else rates
+
+
 def _reference(parameters: Parameters, at: Mapping[str, float] | None) -> Array:
     """Return z of the values given, the medians of the priors elsewhere."""
     given = {} if at is None else dict(at)
@@ -182,6 +201,8 @@ def identifiability(
     object_present: Sequence[bool] | None = None,
     at: Mapping[str, float] | None = None,
     gain: Sequence[float] | None = None,
+    known_range_sd_m: Sequence[float | None] | None = None,
+    displacement_sd_m: Sequence[float | None] | None = None,
 ) -> Foresight:
     """Foresee what frames at given ranges tell of a scene, before any data.
 
@@ -200,6 +221,11 @@ def identifiability(
         others are at the medians of their priors.
     gain : sequence of float, optional
         Factor of each frame on the sensor's gain.
+    known_range_sd_m : sequence of float or None, optional
+        Standard deviation to which a ruler or a robot tells the range of each frame [m]; None where
+        nothing does.
+    displacement_sd_m : sequence of float or None, optional
+        The same of odometry, which tells ranges up to one offset that all frames share.
 
     Returns
     -------
@@ -209,7 +235,7 @@ def identifiability(
     ------
     InvalidInputError
         With pointers relative to the request: "/scene/...", "/ranges_m/i", "/object_present",
-        "/at/...".
+        "/at/...", "/known_range_sd_m", "/displacement_sd_m".
     RefusedError
         For tangential motion, a discrepancy of an object at rest, and where a number overflows.
     """
@@ -224,7 +250,12 @@ def identifiability(
             "computed for one amplitude and a range that changes; state radial motion"
         )
     log_r = _log_ranges(ranges_m, object_present)
+    rates = _rates(known_range_sd_m, displacement_sd_m, log_r)
     z = _reference(parameters, at)
+    if rates is not None and (moved := rates[:, 1] > 0).any():
+        least = float(np.exp(log_r[moved].min()))
+        parameters = with_offset(parameters, np.exp(log_r[moved]) - least)
+        z = np.append(z, parameters.unknowns[-1].to_normal(np.array([least]), {}))
     experiment = Experiment(
         sensor,
         parameters,
@@ -233,6 +264,7 @@ def identifiability(
         None if gain is None else np.asarray(gain, dtype=float),
         discrepancy=scene.stated_flux_error,
         common_range=scene.motion == "static",
+        rates=rates,
     )
     _check_ranges(experiment, scene)
     if not experiment.finite:
@@ -246,7 +278,7 @@ def identifiability(
     spread = Spread(posterior.sd, posterior.scale_sd)
     diagnosis = Diagnosis(experiment, still)
     rows = statuses_of(experiment, spread, posterior, still)
-    if 0 < diagnosis.distinct == diagnosis.needed:
+    if 0 < diagnosis.distinct == diagnosis.needed and rates is None:
         rows = tuple(dataclasses.replace(row, reason=row.reason + _JUST_ENOUGH) for row in rows)
     return Foresight(
         experiment,

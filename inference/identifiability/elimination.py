@@ -1,8 +1,11 @@
 """Whitened readings of many frames with every frame's range eliminated."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.frame.known_range import free_of_range
 from inference.identifiability.information import Information
 
 __all__ = ["eliminate"]
@@ -17,6 +20,7 @@ def eliminate(
     errors: Array | None = None,
     *,
     common_range: bool = False,
+    beside: tuple[Array, Array] | None = None,
 ) -> Information:
     """Eliminate the range of every frame.
 
@@ -33,6 +37,9 @@ def eliminate(
         Whitened derivatives along independent standard normal errors that all frames share.
     common_range : bool
         Whether all frames with an object have one range.
+    beside : (ndarray, ndarray), shapes (n, 2) and (n, 2, d), optional
+        Derivatives of what is known of range and displacement beside the readings, in units of its
+        noise, along log r and along the unknowns; 0 where nothing is.
 
     Returns
     -------
@@ -69,6 +76,11 @@ def eliminate(
         variance[moves] = 1 / length[moves] ** 2
     rows = np.concatenate([across, whole.reshape(2 * len(whole), d + k)])
     before = np.concatenate([before, np.repeat(sizes[~moves], 2, axis=0)])
+    if beside is not None:
+        more, response, variance = _with_beside(both, along, beside, common_range)
+        rows = np.concatenate([rows, more])
+        size = np.hypot(sizes, np.linalg.norm(beside[1], axis=1))
+        before = np.concatenate([before, np.repeat(size, 2, axis=0)])
     response[empty], variance[empty] = np.nan, np.nan
     return Information(
         names,
@@ -80,3 +92,28 @@ def eliminate(
         response[:, d:],
         common_range,
     )
+
+
+def _with_beside(
+    both: Array, along: Array, beside: tuple[Array, Array], common_range: bool
+) -> tuple[Array, Array, Array]:
+    """Return rows of what readings and knowledge beside them tell together, response, variance."""
+    n, _, unknowns = both.shape
+    other = np.zeros_like(both)
+    other[:, :, : beside[1].shape[2]] = beside[1]
+    told = beside[0]
+    if common_range:  # one range: all that is known of it is known once, of one long frame
+        length, size = np.linalg.norm(along), np.linalg.norm(told)
+        share = np.einsum("ni,nid->d", along, both) / max(length, 1e-300)
+        whole = math.hypot(length, size)
+        rows = np.zeros((n, 2, unknowns))
+        rows[0, 0] = size / whole * share if whole > 0 else 0.0
+        response = np.broadcast_to(-share * length / whole**2 if whole > 0 else 0.0, (n, unknowns))
+        variance = np.full(n, 1.0 / whole**2 if whole > 0 else math.inf)
+    else:
+        rows = free_of_range(along, told, both, other)
+        whole = np.square(along).sum(axis=1) + np.square(told).sum(axis=1)
+        moved = np.einsum("ni,nid->nd", along, both) + np.einsum("ni,nid->nd", told, other)
+        response = -np.divide(moved, whole[:, None], where=whole[:, None] > 0, out=0.0 * moved)
+        variance = np.divide(1.0, whole, where=whole > 0, out=np.full(n, math.inf))
+    return rows.reshape(2 * n, unknowns), np.array(response), variance

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from inference.frame.known_range import offset_slopes
 from inference.identifiability.experiment import Experiment
 from simulator.parameters import Parameters
 from simulator.scene import Reference, Stroke
@@ -113,14 +114,17 @@ def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
 def rows_of(experiment: Experiment) -> tuple[Array, Array, list[Array]]:
     """Return what readings and priors tell.
 
-    Of every frame two whitened readings and the prior of its range: derivatives along z and the
-    coefficients of the flux's error, shape (n, 3, d + k), and along its log r, shape (n, 3).
-    Further rows tell of z alone.
+    Of every frame two whitened readings and the prior of its range, and where something is known of
+    ranges beside the readings also that: derivatives along z and the coefficients of the flux's
+    error, shape (n, 3 or 5, d + k), and along its log r, shape (n, 3 or 5). Further rows tell of z
+    alone.
     """
     p, log_r = experiment.parameters, experiment.log_r
     by_term, by_range, by_error = experiment.whitened_terms()
     d, n, k = len(p), log_r.size, by_error.shape[-1]
-    jacobian, along = np.zeros((n, 3, d + k)), np.zeros((n, 3))
+    rates = experiment.rates
+    m = 3 if rates is None else 5
+    jacobian, along = np.zeros((n, m, d + k)), np.zeros((n, m))
     with np.errstate(over="ignore", invalid="ignore"):
         jacobian[:, :2, :d] = by_term @ experiment.change
     jacobian[:, :2, [p.names.index(name) for name in experiment.known]] = 0.0
@@ -131,13 +135,18 @@ def rows_of(experiment: Experiment) -> tuple[Array, Array, list[Array]]:
     along[present, 2] = np.sqrt(
         law.log_inverse_sd**2 + (np.exp(log_r[present]) * law.inverse_sd) ** 2
     )
+    if rates is not None:
+        along[present, 3:] = np.exp(log_r[present])[:, None] * rates[present]
+        slopes = offset_slopes(p, experiment.z)
+        jacobian[present, 4, :d] = -rates[present, 1, None] * slopes
+        jacobian[:, 4, [p.names.index(name) for name in experiment.known]] = 0.0
     extra = [np.eye(d + k)]
     if isinstance(p.range_prior, Stroke):
         steps = STEP * np.eye(d)
         plus, minus = p.terms(experiment.z + steps).ranges, p.terms(experiment.z - steps).ranges
         centre = (plus[:, _LOG_MEAN] - minus[:, _LOG_MEAN]) / (2 * STEP)
         jacobian[present, 2, :d] = -centre * law.log_inverse_sd
-        told = np.square(along[present, :2]).sum(axis=1)
+        told = np.square(np.delete(along[present], 2, axis=1)).sum(axis=1)
         if experiment.common_range:
             told = told.sum(keepdims=True)  # one range, however often it was read
         spread = _spread_row(told, plus, minus, law.log_inverse_sd)

@@ -13,7 +13,7 @@ from inference.frame.sensitivity import Sensitivity, Value, sensitivity, whitene
 from inference.identifiability.elimination import eliminate
 from inference.identifiability.information import Information
 from simulator.discrepancy import discrepancy_basis
-from simulator.parameters import Parameters, Terms
+from simulator.parameters import OFFSET, Parameters, Terms
 from simulator.sensor import Sensor
 
 __all__ = ["Experiment", "information"]
@@ -45,6 +45,9 @@ class Experiment:
         Whether all frames have one unknown range: an object that is known not to move.
     error : ndarray, shape (k,), optional
         Coefficients of the flux's error that the readings have; left out: none.
+    rates : ndarray, shape (n, 2), optional
+        One over the standard deviations of what is known of range and displacement of each frame
+        beside its readings [1/m], 0 where nothing is; left out: of no frame.
     """
 
     sensor: Sensor
@@ -56,6 +59,7 @@ class Experiment:
     discrepancy: float | None = None
     common_range: bool = False
     error: Array | None = None
+    rates: Array | None = None
 
     @functools.cached_property
     def terms(self) -> Terms:
@@ -125,11 +129,12 @@ class Experiment:
     def directions(self) -> Array:
         """How the coordinates of `COORDINATES` move with each of ``names``, (9, d).
 
-        Along log c0, c1 / sqrt(c0), log c2, the crosstalk in `units`, log B, log R, log c0' and
-        c1' / sqrt(c0'), as in the tables of Cramer-Rao bounds: c0 moves with c1 / sqrt(c0) held
-        where c1 is unknown.
+        Along log c0, c1 / sqrt(c0), log c2, the crosstalk in `units`, log B, log R, log c0', c1' /
+        sqrt(c0'), and the offset of displacements over a typical range, as in the tables of
+        Cramer-Rao bounds: c0 moves with c1 / sqrt(c0) held where c1 is unknown.
         """
         columns = dict(zip(self._paths, np.diag(self.units), strict=True))
+        columns[OFFSET] = np.zeros(len(COORDINATES))  # readings do not depend on it
         for path, (c0, c1) in self._shapes.items():
             if f"{path}.c1" in self.names:
                 row = COORDINATES.index(f"{path}.c1")
@@ -174,6 +179,8 @@ class Experiment:
                     result[j, self.names.index(f"{path}.c0")] = 0.5 * c1
             elif name in (self.parameters.crosstalk or ()):
                 result[j, j] = self.units[self._paths.index(name)]
+            elif name == OFFSET:
+                result[j, j] = self._typical_m
             else:
                 result[j, j] = values[name]
         return result
@@ -239,6 +246,33 @@ class Experiment:
             by_error = np.einsum("nij,njk->nik", whitener, self.by_error)
         return by_term, along, by_error
 
+    @property
+    def told(self) -> Array:
+        """Range and displacement of every frame at z [m], shape (n, 2); 0 without an object."""
+        r = np.where(np.isfinite(self.log_r), np.exp(self.log_r), 0.0)
+        offset = self.terms.offset
+        return np.stack([r, r if offset is None else r - offset[0]], axis=1)
+
+    @property
+    def beside(self) -> tuple[Array, Array] | None:
+        """Derivatives of what is known beside the readings, in units of its noise.
+
+        Along log r, shape (n, 2), and along ``names``, shape (n, 2, d).
+        """
+        if self.rates is None:
+            return None
+        along = self.told[:, :1] * self.rates
+        by_name = np.zeros((*along.shape, len(self.names)))
+        if OFFSET in self.names:
+            by_name[:, 1, self.names.index(OFFSET)] = -self._typical_m * self.rates[:, 1]
+        return along, by_name
+
+    @property
+    def _typical_m(self) -> float:
+        """A typical range [m], by which the offset of displacements is measured."""
+        present = np.isfinite(self.log_r)
+        return float(np.exp(self.log_r[present].mean())) if present.any() else 1.0
+
     def whitened(self, whitener: Array | None = None) -> tuple[Array, Array, Array]:
         """Return the same with the first along ``names``, shape (n, 2, d)."""
         by_term, along, by_error = self.whitened_terms(whitener)
@@ -259,4 +293,9 @@ def information(experiment: Experiment) -> Information:
     Information
         In the dimensionless coordinates of `Experiment.directions`.
     """
-    return eliminate(experiment.names, *experiment.whitened(), common_range=experiment.common_range)
+    return eliminate(
+        experiment.names,
+        *experiment.whitened(),
+        common_range=experiment.common_range,
+        beside=experiment.beside,
+    )

@@ -113,8 +113,8 @@ def model_response(
     ----------
     experiment : Experiment
         A draw with its ranges; its ``discrepancy`` is the size of the flux's error.
-    readings : ndarray, shape (n, 2)
-        Of the frames.
+    readings : ndarray, shape (n, 2 or 4)
+        Of the frames, and range and displacement [m] where they are known beside them.
     pull : ndarray, shape (rows,), optional
         What is ``followed`` by all draws, as `common_pull` finds it. Then steps are repeated until
         they settle, each with its own derivatives; left out: the first is all.
@@ -162,6 +162,12 @@ def _moved(experiment: Experiment, by: _Point) -> Experiment:
     return dataclasses.replace(experiment, z=z, log_r=log_r, error=by.error)
 
 
+def _means(experiment: Experiment) -> Array:
+    """Return mean readings, and behind them what is known beside them where anything is."""
+    mean = experiment.readings.mean
+    return mean if experiment.rates is None else np.concatenate([mean, experiment.told], axis=1)
+
+
 def _settled(rows: Rows, first: FluxStep, point: _Point, pull: Array) -> tuple[_Point, FluxStep]:
     """Repeat steps until they settle: where they lead, and the last one's derivatives.
 
@@ -170,17 +176,23 @@ def _settled(rows: Rows, first: FluxStep, point: _Point, pull: Array) -> tuple[_
     pulls all draws, so that the mode would be where the draw is.
     """
     e, d = rows.experiment, rows.experiment.z.size
-    n = e.log_r.size
+    n, m = rows.along.shape
     off_by = first.left + pull
-    left = off_by[: 3 * n].reshape(n, 3)
+    left = off_by[: m * n].reshape(n, m)
     whitener = whiteners(e.sensor, e.readings)
-    readings = e.readings.mean + np.linalg.solve(whitener, left[:, :2, None])[:, :, 0]
-    of_prior = off_by[3 * n : 3 * n + d]
+    means, rates = _means(e), e.rates
+    readings = means.copy()
+    readings[:, :2] += np.linalg.solve(whitener, left[:, :2, None])[:, :, 0]
+    if rates is not None:
+        readings[:, 2:] += np.divide(left[:, 3:], rates, out=np.zeros((n, 2)), where=rates > 0)
+    of_prior = off_by[m * n : m * n + d]
 
     def cost(by: _Point) -> float:
         with np.errstate(all="ignore"):
-            mean = _moved(e, by).readings.mean
-            off = np.einsum("nij,nj->ni", whitener, readings - mean)
+            off = readings - _means(_moved(e, by))
+            off[:, :2] = np.einsum("nij,nj->ni", whitener, off[:, :2])
+            if rates is not None:
+                off[:, 2:] *= rates
         pulls = of_prior - by.z, by.error
         value = float(np.square(off).sum() + sum(np.square(pull).sum() for pull in pulls))
         return value if math.isfinite(value) else math.inf
@@ -246,10 +258,10 @@ def curvature_of_response(experiment: Experiment, response: ModelResponse, norma
         of.error.mean + of.error.spread @ normal,
     )
     with np.errstate(all="ignore"):
-        off = rows.residual(2.0 * e.readings.mean - _moved(e, by).readings.mean)
+        off = rows.residual(2.0 * _means(e) - _means(_moved(e, by)))
     # to first order the readings stay where they are, but for what across leaves of the error
     linear = rows.by_error @ by.error + rows.jacobian @ by.z + rows.along * by.log_r[:, None]
-    off[:, :2] += linear[:, :2]
+    off += linear
     off[:, 2] = 0.0
     if not np.isfinite(off).all():
         return math.inf

@@ -12,6 +12,7 @@ from inference.identifiability.information import Information
 from inference.identifiability.remedies import Remedy, remedies, span
 from simulator.errors import listed
 from simulator.object_model import log_slope
+from simulator.parameters import OFFSET
 
 __all__ = ["Diagnosis"]
 
@@ -36,6 +37,8 @@ def _relative(parameter: str, sd: float) -> str:
         unit = "sqrt(c0)"
     elif parameter.startswith("crosstalk"):
         unit = "the scene's light"
+    elif parameter == OFFSET:
+        unit = "a typical range"
     if sd < 1:
         return f"{100 * sd:.2g} %" + ("" if unit == "itself" else f" of {unit}")
     return f"{_count(sd)} times {unit}"
@@ -88,7 +91,9 @@ class Diagnosis:
         many = np.append(np.linspace(middle - wide / 2, middle + wide / 2, 2 * d + 2), empty)
         ranks = [
             information(
-                dataclasses.replace(self.experiment, log_r=where, gain=None, common_range=False)
+                dataclasses.replace(
+                    self.experiment, log_r=where, gain=None, common_range=False, rates=None
+                )
             ).rank
             for where in (many, empty)
             if where.size
@@ -119,7 +124,7 @@ class Diagnosis:
     def _open(self, parameter: str) -> str:
         """Say why even noise-free readings do not tell a parameter."""
         unknowns = len(self.experiment.names)
-        if self.needed > self.distinct > 0:
+        if self.needed > self.distinct > 0 and self.experiment.rates is None:
             if self.distinct == 1:
                 return (
                     "the object must move: all frames show it at one range, and "

@@ -77,7 +77,11 @@ def _with_frames(experiment: Experiment, log_r: Array) -> Experiment:
     gain = experiment.gain
     if gain is not None:
         gain = np.full(log_r.size, float(np.median(gain)))
-    return dataclasses.replace(experiment, log_r=log_r, gain=gain, common_range=False)
+    rates = experiment.rates
+    if rates is not None:  # ranges of a new stroke are told as well as most of those that were
+        usual = np.median(rates[np.isfinite(experiment.log_r)], axis=0)
+        rates = np.where(np.isfinite(log_r)[:, None], usual, 0.0)
+    return dataclasses.replace(experiment, log_r=log_r, gain=gain, common_range=False, rates=rates)
 
 
 def _emptied(experiment: Experiment) -> Experiment:
@@ -85,7 +89,10 @@ def _emptied(experiment: Experiment) -> Experiment:
     if gain is not None:
         gain = np.append(gain, np.full(EMPTY_FRAMES, float(np.median(gain))))
     log_r = np.append(experiment.log_r, np.full(EMPTY_FRAMES, np.nan))
-    return dataclasses.replace(experiment, log_r=log_r, gain=gain)
+    rates = experiment.rates
+    if rates is not None:
+        rates = np.append(rates, np.zeros((EMPTY_FRAMES, 2)), axis=0)
+    return dataclasses.replace(experiment, log_r=log_r, gain=gain, rates=rates)
 
 
 def _room(experiment: Experiment) -> tuple[float, float]:

@@ -44,17 +44,17 @@ class Rows:
 
     @property
     def by_error(self) -> Array:
-        """Whitened derivatives along the flux's errors, shape (n, 3, k)."""
+        """Whitened derivatives along the flux's errors, shape (n, m, k); m as of `rows_of`."""
         return self._all[1]
 
     @property
     def jacobian(self) -> Array:
-        """Whitened derivatives along z, shape (n, 3, d)."""
+        """Whitened derivatives along z, shape (n, m, d)."""
         return self._all[0]
 
     @property
     def along(self) -> Array:
-        """Whitened derivatives along log r, shape (n, 3)."""
+        """Whitened derivatives along log r, shape (n, m)."""
         return self._all[2]
 
     def follow(self, errors: Array, of_prior: Array | None = None) -> tuple[Array, Array, Array]:
@@ -62,8 +62,8 @@ class Rows:
 
         Parameters
         ----------
-        errors : ndarray, shape (n, 3, k)
-            Of two whitened readings, and of the prior of log r.
+        errors : ndarray, shape (n, m, k)
+            Of two whitened readings, of the prior of log r, and of what is known beside them.
         of_prior : ndarray, shape (d, k), optional
             Of the prior of z; left out: none.
 
@@ -91,16 +91,24 @@ class Rows:
         return change, response[:, :d] @ change - response[:, d:], seen
 
     def residual(self, seen: Array) -> Array:
-        """Return what readings, shape (n, 2), and priors of the ranges are off, (n, 3)."""
+        """Return what readings and priors of the ranges are off, shape (n, m).
+
+        Parameters
+        ----------
+        seen : ndarray, shape (n, 2 or 4)
+            The readings, and range and displacement [m] where they are known beside them.
+        """
         e, law = self.experiment, self.experiment.range_prior
         present, along = np.isfinite(e.log_r), self._all[2]
         u = np.where(present, e.log_r, 0.0)
-        off = np.zeros((u.size, 3))
+        off = np.zeros(along.shape)
         whitener = whiteners(e.sensor, e.readings)
-        off[:, :2] = np.einsum("nij,nj->ni", whitener, seen - e.readings.mean)
+        off[:, :2] = np.einsum("nij,nj->ni", whitener, seen[:, :2] - e.readings.mean)
         pull = np.exp(u) * (law.mean - np.exp(u)) * law.inverse_sd**2
         pull += (law.log_mean - u) * law.log_inverse_sd**2
         np.divide(pull, along[:, 2], out=off[:, 2], where=along[:, 2] > 0)
+        if e.rates is not None:
+            off[:, 3:] = np.where(e.rates > 0, (seen[:, 2:] - e.told) * e.rates, 0.0)
         return off
 
     def spreads(self) -> tuple[Array, Array, Array, Array]:
@@ -152,7 +160,7 @@ class FluxStep:
 
 
 def flux_step(rows: Rows, off: Array, of_prior: Array) -> FluxStep:
-    """Return the step from what readings, shape (n, 3), and priors of z, shape (d,), are off."""
+    """Return the step from what readings, shape (n, m), and priors of z, shape (d,), are off."""
     k = rows.by_error.shape[2]
     prior = np.zeros((of_prior.size, k + 1))
     prior[:, k] = of_prior

@@ -114,7 +114,7 @@ def contraction_of(spread: float) -> float:
 
 def is_positive(name: str) -> bool:
     """Tell whether an unknown of a scene path can only be positive; its logarithm is judged."""
-    return not name.startswith("crosstalk") and not name.endswith(".c1")
+    return not name.startswith(("crosstalk", "odometry")) and not name.endswith(".c1")
 
 
 def spread_of_fit(

@@ -90,9 +90,11 @@ def scene_of_draws(
     """
     prior = scene.model_copy(update={"joint": None, "calibration": None})
     parameters = parameters_of(sensor, prior)
-    kept = [j for j, name in enumerate(draws.names) if not name.startswith("range_m.")]
+    kept = [j for j, name in enumerate(parameters.names) if not name.startswith("range_m.")]
     names = [draws.names[j] for j in kept]
-    natural = draws.parameters.reshape(-1, len(draws.names))
+    # behind the scene's unknowns is the offset of these frames' displacements, which says nothing
+    # of others
+    natural = draws.parameters.reshape(-1, len(draws.names))[:, : len(parameters)]
     error = scene.model_error
     document = prior.model_dump(mode="json", exclude_none=True)
     calibration = {

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.density.collapsed import CollapsedDensity
+from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.frame.gaussian import log_top
 from inference.identifiability.before_data import check_discrepancy
 from inference.posterior.criticism.prior_conflict import ranges_beyond
@@ -28,7 +28,9 @@ MOST_UNKNOWNS = 11
 MOST_FRAMES = 100_000
 # whose likelihoods do not add up frame by frame, or are taken out one by one
 MOST_COUPLED = 2000
+MOST_DISPLACED = 600  # one offset is sampled with all of them
 _PRIOR_DRAWS = 256
+_OUTSIDE = 5.0  # standard deviations of a known range beyond the support
 # standard deviations by which readings may miss the best fit, root mean square. A model that is
 # wrong misses by less than the signal, which no sensor reads a million times above its noise; and
 # a log density of 1e12 a reading has rounding errors that a sampler takes for structure
@@ -70,6 +72,9 @@ def check_scene_for_posterior(sensor: Sensor, scene: Scene, frames: Frames) -> N
         )
     _check_coupled(scene, len(frames))
     _check_priors(parameters)
+    _check_known_ranges(parameters, frames)
+    if frames.displacement_m is not None and np.isfinite(frames.displacement_m).any():
+        _check_displacements(sensor, scene, frames)
     if not frames.present.any():
         _check_empty(parameters)
 
@@ -187,6 +192,36 @@ def _check_priors(parameters: Parameters) -> None:
         "the shadow's c1 is so far below zero that the background would be negative at every "
         f"range in `range_m`{also}; raise `background.shadow.c1`, or widen `range_m`"
     )
+
+
+def _check_displacements(sensor: Sensor, scene: Scene, frames: Frames) -> None:
+    """Refuse displacements that do not fit the scene, and more than are sampled together."""
+    if scene.motion == "static":
+        raise InvalidInputError.at(
+            "/frames/displacement_m", "is given, and the scene states an object that does not move"
+        )
+    if len(frames) > MOST_DISPLACED:
+        raise RefusedError(
+            f"{len(frames)} frames that are not saturated, and with displacements posteriors take "
+            f"{MOST_DISPLACED}: send fewer frames of the same stroke, or their means"
+        )
+    collapsed_density(sensor, scene, frames)
+
+
+def _check_known_ranges(parameters: Parameters, frames: Frames) -> None:
+    """Refuse ranges that are known to lie where the scene allows none."""
+    known, sd = frames.known_range_m, frames.known_range_sd_m
+    if known is None or sd is None:
+        return
+    low, high = parameters.range_prior.low, parameters.range_prior.high
+    beyond = np.maximum(low - known, known - high) > _OUTSIDE * sd
+    if beyond.any():
+        first = known[np.flatnonzero(beyond)[0]]
+        raise InvalidInputError.at(
+            "/frames/known_range_m",
+            f"{int(beyond.sum())} known ranges, the first {first:g} m, lie outside what range_m "
+            f"allows, {low:.4g} to {high:.4g} m: state a wider range_m",
+        )
 
 
 def _check_empty(parameters: Parameters) -> None:

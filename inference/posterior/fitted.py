@@ -6,14 +6,19 @@ the prior then sees only false valleys, which can lie thousands of nats below th
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.fits.likelihood.multistart import find_maxima
 from inference.fits.likelihood.problem import fit_problem
+from inference.frame.blocks import DISPLACEMENT, DISPLACEMENT_RATE
 from inference.posterior.job import Job
 from inference.posterior.sampling.start import Optimum, climb, refine
+from simulator.parameters import OFFSET
 
 __all__ = ["fitted_optima"]
+
+Array = NDArray[np.float64]
 
 _MOST = 3
 _DEVIANCE = 100.0  # above the best: what priors could make up for
@@ -36,7 +41,7 @@ def fitted_optima(job: Job, density: CollapsedDensity) -> list[Optimum]:
         Not sorted, some of them perhaps the same; empty where the fit has other unknowns, as for an
         object at rest or ranges whose law is unknown.
     """
-    names = density.parameters.names
+    names = tuple(name for name in density.parameters.names if name != OFFSET)
     if job.scene.motion != "radial":
         return []
     problem = fit_problem(job.sensor, job.scene, job.frames.select(job.usable))
@@ -47,7 +52,17 @@ def fitted_optima(job: Job, density: CollapsedDensity) -> list[Optimum]:
     for fit in fits[:_MOST]:
         if not fit.deviance < fits[0].deviance + _DEVIANCE:
             break
-        z = density.parameters.standard(problem.natural(fit.x)[None])[0]
+        natural = problem.natural(fit.x)
+        if len(names) < len(density.parameters):
+            natural = np.append(natural, _offset(density.frames, fit.positions))
+        z = density.parameters.standard(natural[None])[0]
         start = np.clip(np.nan_to_num(z), -_FARTHEST, _FARTHEST)
         found.append(refine(density, climb(density, start)[0]))
     return [optimum for optimum in found if optimum is not None]
+
+
+def _offset(frames: Array, log_r: Array) -> float:
+    """Return the offset of displacements at given ranges."""
+    moved = (frames[:, DISPLACEMENT_RATE] > 0) & np.isfinite(log_r)
+    offsets = (np.exp(log_r) - frames[:, DISPLACEMENT])[moved]
+    return float(np.median(offsets)) if offsets.size else 0.0

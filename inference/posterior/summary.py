@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
+from inference.frame.known_range import rates_of
 from inference.identifiability.after_data import statuses_of_draws
 from inference.identifiability.status import Identifiability, weak_at_best
 from inference.posterior.answer.draws import Draws, draws_of
@@ -105,6 +106,7 @@ def _judged(job: Job, density: CollapsedDensity, whole: Whole) -> tuple[Identifi
         # at rest it is no different from another c2
         discrepancy=None if static else job.scene.model_error.flux or None,
         common_range=static,
+        rates=rates_of(density.frames),
     )
     rows = with_model_part(rows, whole.scale_error, whole.spread.scale, whole.budget.curvature)
     rows = mark_sensitive(density.parameters.names, rows, whole.sensitivity)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.density.profile import best_ranges
 from inference.frame.blocks import GAIN
+from inference.frame.known_range import rates_of
 from inference.identifiability.before_data import identifiability
 from inference.identifiability.status import Identifiability
 from inference.posterior.answer.error_parts import ErrorParts, ParameterErrorParts
@@ -23,6 +24,7 @@ from inference.posterior.findings import Findings
 from inference.posterior.job import Job
 from inference.posterior.stages.stage import Tempering, Walking
 from simulator.errors import HybridTofError
+from simulator.parameters import OFFSET
 
 __all__ = ["without_draws"]
 
@@ -75,6 +77,11 @@ def without_draws(job: Job, density: CollapsedDensity, stage: Tempering | Walkin
     )
 
 
+def _sds(rates: Array) -> list[float | None]:
+    """Return standard deviations for their inverses, None where nothing is known."""
+    return [1.0 / rate if rate > 0 else None for rate in rates.tolist()]
+
+
 def _foreseen(
     job: Job, density: CollapsedDensity, best: Array, log_r: Array
 ) -> tuple[Identifiability, ...]:
@@ -85,15 +92,16 @@ def _foreseen(
     names = density.parameters.names
     values = density.parameters.natural(best)[0].tolist()
     present = np.isfinite(log_r)
-    ranges = np.where(present, np.exp(log_r), 1.0)
+    ranges, rates = np.where(present, np.exp(log_r), 1.0), rates_of(density.frames)
     try:
         found = identifiability(
             job.sensor,
             job.scene,
             ranges.tolist(),
             present.tolist(),
-            dict(zip(names, values, strict=True)),
+            {name: at for name, at in zip(names, values, strict=True) if name != OFFSET},
             density.frames[:, GAIN].tolist(),
+            *([] if rates is None else [_sds(rate) for rate in rates.T]),
         ).identifiability
     except HybridTofError as error:
         reason = f"not known yet: nothing was drawn, and nothing can be foreseen ({error})"

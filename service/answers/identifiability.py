@@ -119,7 +119,13 @@ def identifiability_of(request: IdentifiabilityRequest) -> ForeseenIdentifiabili
         For tangential motion, and where a number overflows.
     """
     found: Foresight = identifiability(
-        request.sensor, request.scene, request.ranges_m, request.object_present, request.at
+        request.sensor,
+        request.scene,
+        request.ranges_m,
+        request.object_present,
+        request.at,
+        known_range_sd_m=request.known_range_sd_m,
+        displacement_sd_m=request.displacement_sd_m,
     )
     bounds, posterior = found.sd, found.posterior_sd
     ranges = np.exp(found.experiment.log_r)

@@ -57,7 +57,7 @@ def test_every_frame_is_a_block_of_its_own() -> None:
     for b in range(3):
         block = block_of(data, b)
         assert frame_count(block) == 1
-        assert tuple(frame_of(block, 0)) == tuple(FRAMES[b])
+        assert tuple(frame_of(block, 0)) == (*FRAMES[b], None)
         assert is_empty(data, b) == (not PRESENT[b])
 
 
@@ -68,8 +68,8 @@ def test_frames_of_one_range_come_first_and_empty_ones_alone() -> None:
     counts = [frame_count(block_of(data, b)) for b in range(data.blocks)]
     assert counts == [2, 1]
     assert [bool(is_empty(data, b)) for b in range(data.blocks)] == [False, True]
-    assert tuple(frame_of(block_of(data, 0), 1)) == tuple(FRAMES[2])
-    assert tuple(frame_of(block_of(data, 1), 0)) == tuple(FRAMES[1])
+    assert tuple(frame_of(block_of(data, 0), 1)) == (*FRAMES[2], None)
+    assert tuple(frame_of(block_of(data, 1), 0)) == (*FRAMES[1], None)
 
 
 @pytest.mark.parametrize("present", [None, np.zeros(3, dtype=bool)])

@@ -27,6 +27,21 @@ def with_reading(value: float) -> Frames:
     return Frames(readings)
 
 
+def told(range_m: float | None, sd_m: float | None) -> Frames:
+    """Frames of which the range of the fourth alone is known."""
+
+    def column(value: float | None, rest: float) -> np.ndarray | None:
+        return None if value is None else np.where(np.arange(20) == 3, value, rest)
+
+    known, sd = column(range_m, np.nan), column(sd_m, 0.01)
+    return dataclasses.replace(FRAMES, known_range_m=known, known_range_sd_m=sd)
+
+
+def moved(displacement_m: np.ndarray, sd_m: float | None) -> Frames:
+    sd = None if sd_m is None else np.full(20, sd_m)
+    return dataclasses.replace(FRAMES, displacement_m=displacement_m, displacement_sd_m=sd)
+
+
 @pytest.mark.parametrize(
     ("frames", "pointer"),
     [
@@ -42,12 +57,51 @@ def with_reading(value: float) -> Frames:
             dataclasses.replace(FRAMES, object_present=np.ones(3, dtype=bool)),
             "/frames/object_present",
         ),
+        (moved(np.full(20, 1.0), None), "/frames/displacement_sd_m"),
+        (moved(np.full(20, 1.0), 0.0), "/frames/displacement_sd_m"),
+        (moved(np.linspace(0.0, 15.0, 20), 0.01), "/frames/displacement_m"),  # r0 is 14.99 m
+        (moved(np.linspace(0.0, 14.98, 20), 0.01), "/frames/displacement_m"),  # from 0.02 m on
+        (
+            dataclasses.replace(
+                moved(np.linspace(0.0, 1.0, 20), 0.01),
+                known_range_m=np.linspace(0.5, 1.4, 20),
+                known_range_sd_m=np.full(20, 0.001),
+            ),
+            "/frames/displacement_m",
+        ),
+        (told(None, 0.01), "/frames/known_range_m"),
+        (told(1.0, None), "/frames/known_range_sd_m"),
+        (told(1.0, 0.0), "/frames/known_range_sd_m"),
+        (told(1.0, -1.0), "/frames/known_range_sd_m"),
+        (told(1.0, np.nan), "/frames/known_range_sd_m"),
+        (told(0.0, 0.01), "/frames/known_range_m"),
+        (told(np.inf, 0.01), "/frames/known_range_m"),
+        (told(15.0, 0.01), "/frames/known_range_m"),  # r0 is 14.99 m
+        (told(0.01, 1e-3), "/frames/known_range_m"),  # range_m begins at 0.02 m
+        (
+            dataclasses.replace(told(1.0, 0.1), known_range_sd_m=np.ones(3)),
+            "/frames/known_range_sd_m",
+        ),
+        (
+            dataclasses.replace(told(1.0, 0.1), object_present=np.zeros(20, dtype=bool)),
+            "/frames/known_range_m",
+        ),
     ],
 )
 def test_frames_that_no_border_has_checked(frames: Frames, pointer: str) -> None:
     with pytest.raises(InvalidInputError) as caught:
         fold.prepare(SENSOR, parse_scene({}), frames, QUICK)
     assert pointer in {problem.pointer for problem in caught.value.problems}
+
+
+def test_what_does_not_move_has_no_displacement() -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        fold.prepare(SENSOR, parse_scene({"motion": "static"}), moved(np.zeros(20), 0.01), QUICK)
+    assert [problem.pointer for problem in caught.value.problems] == ["/frames/displacement_m"]
+    many = Frames(np.tile(FRAMES.readings, (40, 1)))
+    many = dataclasses.replace(many, displacement_m=np.zeros(800), displacement_sd_m=np.ones(800))
+    with pytest.raises(RefusedError, match="displacements posteriors take 600"):
+        fold.prepare(SENSOR, parse_scene({}), many, QUICK)
 
 
 @pytest.mark.parametrize(

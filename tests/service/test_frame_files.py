@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from service.errors import MalformedError
 from service.frame_files import SUFFIXES, read_frames, write_frames
 from simulator.errors import InvalidInputError
+from simulator.frames import frames_from_columns
+from simulator.sensor import parse_sensor
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 frames = st.lists(st.tuples(finite, finite, st.booleans()), min_size=1, max_size=80)
@@ -51,6 +53,40 @@ def test_csv_as_spreadsheets_write_it(tmp_path: Path) -> None:
 def test_integers(tmp_path: Path) -> None:
     assert read(tmp_path, ".ndjson", '{"w1": 1, "w2": 2}\n\n{"w2": 3, "w1": 4}').w2 == [2, 3]
     assert read(tmp_path, ".json", '{"w1": [1], "w2": [2]}').w1 == [1]
+
+
+NULLS = {
+    ".csv": "w1,w2,known_range_m,known_range_sd_m\n1,2,0.5,1e-3\n1,2,,\n1,2, nan ,0.1\n",
+    ".ndjson": '{"w1":1,"w2":2,"known_range_m":0.5,"known_range_sd_m":1e-3}\n'
+    '{"w1":1,"w2":2,"known_range_m":null,"known_range_sd_m":null}\n'
+    '{"w1":1,"w2":2,"known_range_m":null,"known_range_sd_m":0.1}\n',
+    ".json": '{"w1":[1,1,1],"w2":[2,2,2],"known_range_m":[0.5,null,null],'
+    '"known_range_sd_m":[1e-3,null,0.1]}',
+}
+
+
+@pytest.mark.parametrize("suffix", NULLS)
+def test_ranges_that_are_known_or_null(tmp_path: Path, suffix: str) -> None:
+    sensor = parse_sensor({"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1, 1]}})
+    columns = read(tmp_path, suffix, NULLS[suffix])
+    assert columns.known_range_m == [0.5, None, None]
+    assert columns.known_range_sd_m == [1e-3, None, 0.1]
+    frames = frames_from_columns(sensor, columns)
+    path = tmp_path / f"again{suffix}"
+    write_frames(path, frames.to_columns(sensor))
+    again = read_frames(path)
+    assert (again.known_range_m, again.known_range_sd_m) == (
+        columns.known_range_m,
+        columns.known_range_sd_m,
+    )
+
+
+@pytest.mark.parametrize("odd", ["", "x", True, [1]])
+def test_null_is_not_written_otherwise(tmp_path: Path, odd: Any) -> None:
+    line = {"w1": 1, "w2": 2, "known_range_m": odd, "known_range_sd_m": 0.1}
+    with pytest.raises(InvalidInputError, match="finite number") as caught:
+        read(tmp_path, ".ndjson", json.dumps(line))
+    assert [p.pointer for p in caught.value.problems] == ["/known_range_m/0"]
 
 
 ODD = ["nan", "NaN", "inf", "-Infinity", "1e400", "1_000", "", "x", "true", "0x10", "١", "1,5"]

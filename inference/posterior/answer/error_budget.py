@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from inference.density.collapsed import CollapsedDensity
+from inference.frame.blocks import DISPLACEMENT, RANGE
+from inference.frame.known_range import rates_of
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.model_response import (
     ModelResponse,
@@ -171,6 +173,7 @@ def error_budget(
     count = int(np.clip(_FRAMES // max(log_r.shape[1], 1), _FEWEST, _REFERENCES))
     chosen = np.linspace(0, len(z) - 1, min(count, len(z))).astype(np.intp)
     flux = 0.0 if error.integrated else error.flux
+    rates = rates_of(density.frames)
     experiments = [
         Experiment(
             density.sensor,
@@ -180,10 +183,11 @@ def error_budget(
             density.frames[:, 2],
             discrepancy=flux or None,
             common_range=job.scene.motion == "static",
+            rates=rates,
         )
         for i in chosen
     ]
-    readings = density.frames[:, :2]
+    readings = density.frames[:, [0, 1] if rates is None else [0, 1, RANGE, DISPLACEMENT]]
     responses = [model_response(each, readings) for each in experiments]
     curvature = _curvature(experiments, responses, rng) if flux > 0 else 0.0
     pull = common_pull(responses)

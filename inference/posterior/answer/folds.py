@@ -9,6 +9,7 @@ from scipy import linalg
 from inference.density.collapsed import CollapsedDensity
 from inference.density.whitened import Whitened, whitened
 from inference.frame.coordinates import some_of
+from inference.frame.known_range import free_of_range, rates_of
 from inference.frame.sensitivity import sensitivity
 from inference.posterior.job import Job
 from simulator.parameters import Terms
@@ -70,8 +71,13 @@ def _turned(density: CollapsedDensity, z: Array, log_r: Array) -> NDArray[np.boo
     mean = path.mean.reshape(*u.shape, 2)
     way = np.einsum("nij,nkj->nki", scale, mean - mean[:, [_STEPS.size]])
     direction = np.einsum("nij,nkj->nki", scale, path.by_range.reshape(*u.shape, 2))
+    off = np.sum(way**2, axis=2)
     with np.errstate(invalid="ignore", over="ignore"):
-        near = (np.sum(way**2, axis=2) < _REACH**2) & (u >= low) & (u <= high)
+        rates = rates_of(density.frames)
+        if rates is not None:  # of what is known beside the readings no curve turns back
+            moved = np.exp(u) - np.exp(u[:, [_STEPS.size]])
+            off = off + np.square(moved[:, :, None] * rates[:, None, :]).sum(axis=2)
+        near = (off < _REACH**2) & (u >= low) & (u <= high)
     # only what hangs together with the frame's own range
     middle = _STEPS.size
     near[:, middle] = True
@@ -96,8 +102,11 @@ def _with_unknowns(at: Whitened, present: NDArray[np.bool_]) -> Array:
     if d == 0:
         return at.whitener
     rows = np.einsum("ni,nid->nd", at.across, at.jacobian)
-    empty = at.jacobian[~present].reshape(-1, d)
-    triangle = linalg.qr(np.concatenate([np.eye(d), rows, empty]), mode="economic")[1]
+    told = [np.eye(d), rows, at.jacobian[~present].reshape(-1, d)]
+    if at.beside is not None:
+        own, other = at.jacobian, at.beside_jacobian
+        told.append(free_of_range(at.along, at.beside.along, own, other).reshape(-1, d))
+    triangle = linalg.qr(np.concatenate(told), mode="economic")[1]
     # rows R^-1: the posterior covariance of all frames is R^-1 R^-T
     reduced = np.linalg.solve(triangle.T, at.jacobian.reshape(-1, d).T).T.reshape(-1, 2, d)
     own = np.einsum("ni,nid->nd", at.across, reduced)

@@ -7,13 +7,14 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.frame.arguments import Instrument, Rows, scene_of
-from inference.frame.blocks import GAIN
+from inference.frame.blocks import DISPLACEMENT, GAIN, RANGE
+from inference.frame.known_range import rates_of
 from inference.frame.mean_readings import with_surroundings
 from inference.frame.noise import noise_of
 from simulator.compiled import compiled
 from simulator.readings import object_readings
 
-__all__ = ["draw_ranges", "replicate"]
+__all__ = ["draw_ranges", "replicate", "replicate_frames"]
 
 Array = NDArray[np.float64]
 
@@ -107,4 +108,34 @@ def replicate(
     normals = rng.standard_normal((*positions.shape, 4))
     gains = np.ascontiguousarray(density.frames[:, GAIN])
     _replicate(out, normals, rows, positions, gains, density.instrument, errors)
+    return out
+
+
+def replicate_frames(
+    density: CollapsedDensity, z: Array, positions: Array, rng: np.random.Generator
+) -> Array:
+    """Draw frames anew: the readings, and what is known of ranges beside them.
+
+    Parameters
+    ----------
+    density, z, positions, rng
+        As of `replicate`.
+
+    Returns
+    -------
+    ndarray, shape (n, frames, 3 or 7)
+        As `CollapsedDensity.frames`.
+    """
+    out = np.repeat(density.frames[None], len(positions), axis=0)
+    out[:, :, :GAIN] = replicate(density, z, positions, rng)
+    rates = rates_of(density.frames)
+    if rates is None:
+        return out
+    offset = density.parameters.terms(z).offset
+    r = np.where(np.isfinite(positions), np.exp(positions), 0.0)
+    means = r, r - (0.0 if offset is None else offset[:, None])
+    for column, mean, rate in zip((RANGE, DISPLACEMENT), means, rates.T, strict=True):
+        known = np.flatnonzero(rate > 0)
+        noise = rng.standard_normal((len(out), known.size)) / rate[known]
+        out[:, known, column] = mean[:, known] + noise
     return out

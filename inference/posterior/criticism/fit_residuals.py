@@ -10,8 +10,9 @@ from inference.density.collapsed import CollapsedDensity
 from inference.density.discrepant import DiscrepantDensity, with_discrepancy
 from inference.density.profile import best_ranges
 from inference.density.static import StaticDensity
-from inference.density.whitened import whitened
-from inference.posterior.answer.ranges import replicate
+from inference.density.whitened import Whitened, whitened
+from inference.frame.known_range import beside, free_of_range, rates_of
+from inference.posterior.answer.ranges import replicate_frames
 from inference.posterior.job import Job
 
 __all__ = ["FitResiduals", "fit_residuals"]
@@ -61,13 +62,36 @@ def _without_flux_error(density: CollapsedDensity) -> CollapsedDensity:
 
 
 def _stacked(density: CollapsedDensity, readings: Array) -> CollapsedDensity:
-    """Return the density of many sets of frames, one behind the other."""
-    sets, n, _ = readings.shape
-    frames = np.empty((sets * n, 3))
-    frames[:, :2] = readings.reshape(sets * n, 2)
-    frames[:, 2] = np.tile(density.frames[:, 2], sets)
+    """Return the density of many sets of frames, shape (sets, n, 3 or 7), one behind the other."""
+    sets, n, m = readings.shape
+    frames = readings.reshape(sets * n, m)
     present = None if density.present is None else np.tile(density.present, sets)
     return dataclasses.replace(density, frames=frames, present=present)
+
+
+def _known_beside(density: CollapsedDensity) -> NDArray[np.bool_]:
+    """Return of which frames something is known of the range beside the readings."""
+    rates = rates_of(density.frames)
+    if rates is None:
+        return np.zeros(len(density.frames), dtype=bool)
+    return np.asarray((rates > 0).any(axis=1))
+
+
+def _off_known(at: Whitened, columns: Array | None = None) -> Array:
+    """Return what no range makes up for between readings and what is known beside them, (n, 2, k).
+
+    Of the residuals, or of derivatives of the readings, shape (m, 2, k), m <= n, of which the first
+    are along z.
+    """
+    if at.beside is None:
+        return np.zeros((len(at.residual), 2, 1 if columns is None else columns.shape[2]))
+    if columns is None:
+        own, other = at.residual[:, :, None], at.beside.residual[:, :, None]
+        return free_of_range(at.along, at.beside.along, own, other)
+    n = len(columns)
+    other = np.zeros_like(columns)
+    other[:, :, : at.by_offset.size] = at.beside_jacobian[:n]
+    return free_of_range(at.along[:n], at.beside.along[:n], columns, other)
 
 
 def fit_residuals(
@@ -102,8 +126,8 @@ def fit_residuals(
     plain = _without_flux_error(density)
     seen = best_ranges(plain, z[None])[0, :, 0]
     many = np.broadcast_to(z, (replicates, d))
-    anew = replicate(density, many, np.broadcast_to(seen, (replicates, n)).copy(), rng)
-    readings = np.concatenate([density.frames[None, :, :2], anew])
+    anew = replicate_frames(density, many, np.broadcast_to(seen, (replicates, n)).copy(), rng)
+    readings = np.concatenate([density.frames[None], anew])
     if isinstance(density, StaticDensity):
         return _of_one_range(density, z, seen, readings)
     stacked = _stacked(plain, readings)
@@ -113,6 +137,8 @@ def fit_residuals(
     across = np.einsum("ni,ni->n", at.across, at.residual).reshape(sets, n)
     square = np.sum(at.residual**2, axis=1).reshape(sets, n)
     present = np.isfinite(seen)
+    told = present & _known_beside(density)
+    known = _off_known(at)[:, :, 0].reshape(sets, n, 2)[:, told].reshape(sets, -1)
     # rows of the frames themselves stand for those of the replicates: only noise lies between
     own, of_z = at.jacobian[:n], d
     if isinstance(density, DiscrepantDensity):
@@ -123,19 +149,23 @@ def fit_residuals(
     rows = np.concatenate(
         [
             np.einsum("ni,nid->nd", at.across[:n], own)[present],
-            own[~present].reshape(-1, d) if d else np.empty((2 * int((~present).sum()), 0)),
+            own[~present].reshape(2 * int((~present).sum()), d),
+            _off_known(at, own)[:n][told].reshape(2 * int(told.sum()), d),
         ]
     )
     empty = at.residual.reshape(sets, n, 2)[:, ~present].reshape(sets, -1)
-    before = np.concatenate([across[:, present], empty], axis=1)
+    before = np.concatenate([across[:, present], empty, known], axis=1)
     followed, found = _followed(before, rows)
     fitted = before - followed
     count = int(present.sum())
     squared = np.empty((sets, n))
-    # what is left along a curve, at the ends of the prior, stays as it is
-    along = square[:, present] - across[:, present] ** 2
+    # what is left along a curve, at the ends of the prior, stays as it is; that of a range which is
+    # known beside the readings is among the rows
+    along = np.where(told, 0.0, square - across**2)[:, present]
     squared[:, present] = fitted[:, :count] ** 2 + np.maximum(along, 0.0)
-    squared[:, ~present] = np.sum(fitted[:, count:].reshape(sets, -1, 2) ** 2, axis=2)
+    rest = np.sum(fitted[:, count:].reshape(sets, -1, 2) ** 2, axis=2)
+    squared[:, ~present] = rest[:, : n - count]
+    squared[:, told] += rest[:, n - count :]
     order = np.argsort(seen[present])
     error = np.square(found[:, of_z:]).sum(axis=1)
     return FitResiduals(fitted[:, :count][:, order], squared, seen[present][order], error)
@@ -145,19 +175,24 @@ def _of_one_range(density: StaticDensity, z: Array, seen: Array, readings: Array
     """Do the same where all frames have one range, which is fitted like a parameter."""
     sets, n, _ = readings.shape
     at = whitened(density.sensor, density.parameters, density.frames, z, seen)
-    off = readings - (
+    off = readings[:, :, :2] - (
         density.frames[:, :2] - np.linalg.solve(at.whitener, at.residual[..., None])[..., 0]
     )
-    residuals = np.einsum("nij,snj->sni", at.whitener, off).reshape(sets, 2 * n)
-    rows = at.jacobian.reshape(2 * n, z.size)
+    residuals = np.einsum("nij,snj->sni", at.whitener, off)
+    _, direction, rows = at.rows
+    m = direction.shape[1]
+    if m > 2:
+        known = [beside(frames, seen, density.parameters.terms(z[None])) for frames in readings]
+        residuals = np.concatenate([residuals, [each.residual for each in known if each]], axis=2)
+    residuals, rows = residuals.reshape(sets, m * n), rows.reshape(m * n, z.size)
     law = density.parameters.terms(z[None]).ranges[0]
     with np.errstate(divide="ignore"):
         at_end = np.abs(np.nanmax(seen) - np.log(law[6:8])) < _AT_END
     if not at_end.any():
-        rows = np.concatenate([rows, at.along.reshape(2 * n, 1)], axis=1)
+        rows = np.concatenate([rows, direction.reshape(m * n, 1)], axis=1)
     # a range at an end of its prior cannot follow what lies beyond
     fitted = residuals - _followed(residuals, rows, free=0 if at_end.any() else 1)[0]
-    squared = np.sum(fitted.reshape(sets, n, 2) ** 2, axis=2)
+    squared = np.sum(fitted.reshape(sets, n, m) ** 2, axis=2)
     return FitResiduals(np.empty((sets, 0)), squared, np.empty(0), np.zeros(sets))
 
 

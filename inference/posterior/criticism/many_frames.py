@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from inference.density.collapsed import CollapsedDensity
-from inference.posterior.answer.ranges import replicate
+from inference.posterior.answer.ranges import replicate_frames
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
 
 __all__ = ["bias_of_many_frames", "following"]
@@ -51,8 +51,7 @@ def bias_of_many_frames(density: CollapsedDensity, z: Array, rng: np.random.Gene
     points = np.concatenate([centre + factor.T, centre - factor.T])
     slopes = []
     for _ in range(sets):
-        frames = density.frames.copy()
-        frames[:, :2] = replicate(density, centre[None], log_r, rng)[0]
+        frames = replicate_frames(density, centre[None], log_r, rng)[0]
         values = dataclasses.replace(density, frames=frames).log_likelihood(points)
         slopes.append(0.5 * (values[:d] - values[d:]))
     slope = np.mean(slopes, axis=0)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
+from inference.frame.known_range import rates_of
 from inference.frame.range_prior import LEAST_INFORMATION
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.status import Identifiability, weak_at_best
@@ -44,14 +45,8 @@ def mark_dark(
     """
     if not (len(density.parameters) and isinstance(density.parameters.range_prior, Reference)):
         return rows
-    gain = density.frames[:, 2]
     chosen = np.linspace(0, len(z) - 1, min(len(z), _DRAWS)).astype(int)
-    told = [
-        np.square(
-            Experiment(density.sensor, density.parameters, z[i], log_r[i], gain).whitened_terms()[1]
-        ).sum(axis=1)
-        for i in chosen
-    ]
+    told = [_told(density, z[i], log_r[i]) for i in chosen]
     present = np.isfinite(log_r[0])
     dark = int((np.median(told, axis=0)[present] < LEAST_INFORMATION).sum())
     if not dark > _MANY * present.sum():
@@ -62,3 +57,11 @@ def mark_dark(
         "lie: leave these frames out, or measure with more light"
     )
     return weak_at_best(rows, reason)
+
+
+def _told(density: CollapsedDensity, z: Array, log_r: Array) -> Array:
+    """Return the information on every log r, shape (frames,), of readings and of what is known."""
+    rates, gain = rates_of(density.frames), density.frames[:, 2]
+    of = Experiment(density.sensor, density.parameters, z, log_r, gain, rates=rates)
+    told = np.square(of.whitened_terms()[1]).sum(axis=1)
+    return np.asarray(told if of.beside is None else told + np.square(of.beside[0]).sum(axis=1))

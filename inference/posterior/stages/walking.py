@@ -21,7 +21,6 @@ from inference.posterior.sampling.warm import MAP_SHARE
 from inference.posterior.stages.chunk import steps_from
 from inference.posterior.stages.ensembles import POPULATIONS
 from inference.posterior.stages.stage import Tempering, Walking
-from simulator.parameters import parameters_of
 
 __all__ = ["WalkTask", "merge", "tasks"]
 
@@ -86,7 +85,7 @@ def merge(
     """
     made = sum(ensemble.steps for ensemble in ensembles) - stage.steps * len(ensembles)
     stage = dataclasses.replace(stage, ensembles=tuple(ensembles))
-    kept = stage.chains(parameters_of(job.sensor, job.scene).names)
+    kept = stage.chains(job.density().parameters.names)
     return _judged(job, stage, kept), made * stage.ensembles[0].walkers
 
 
