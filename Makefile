@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report readme api picture notebook notebook-data calibrate coverage kills fuzz test check lint format types fast lock clean
+.PHONY: help setup demo report readme api picture notebook notebook-data calibrate coverage kills fuzz stress test check lint format types fast lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -56,8 +56,11 @@ kills: $(READY) ## Kill services and workers 50 times during 20 posteriors: SQLi
 fuzz: $(READY) ## 2,000 requests a route by schemathesis, 10,000 bodies a route that are nearly valid
 	$(BIN)/python -m benchmarks.fuzz
 
+stress: $(READY) ## Extreme and stiff cases against exact arithmetic, 100,000 frames: the table of docs/stability.md
+	$(BIN)/python -m benchmarks.stability
+
 # two processes on two cores: a library that starts threads of its own only makes them wait
-calibrate coverage test fast: export OPENBLAS_NUM_THREADS = 1
+calibrate coverage stress test fast: export OPENBLAS_NUM_THREADS = 1
 
 test: $(READY) ## Run every test
 	$(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder

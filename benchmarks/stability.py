@@ -1,0 +1,46 @@
+"""Numbers of roots and their errors over 24 decades, against exact arithmetic: docs/stability.md.
+
+    python -m benchmarks.stability --scenes 1200 --seed 1     (`make stress`)
+
+Prints a row a technique: frames, roots, frames that lie at a fold to within the rounding of their
+readings, wrong counts, and the worst root in units of its condition times rounding. The exit code
+is 1 where a count is wrong or a root is off by more than a thousand.
+"""
+
+import argparse
+import sys
+
+import numpy as np
+
+from tests.extreme.certified import FAMILIES, tally
+
+_BAR = 1e3
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", type=int, default=1200, help="scenes a technique")
+    parser.add_argument("--frames", type=int, default=16, help="random ranges a scene")
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    failed = False
+    print("| technique | frames | roots | at a fold | wrong counts | worst root |")
+    print("|---|---|---|---|---|---|")
+    for number, technique in enumerate(FAMILIES):
+        rng = np.random.default_rng([options.seed, number])
+        t = tally(technique, options.scenes, options.frames, rng)
+        failed |= bool(t.wrong) or t.worst > _BAR
+        print(
+            f"| `{technique}` | {t.frames:,} | {t.roots:,} | {t.excused:,} | {len(t.wrong)} "
+            f"| {t.worst:.2g} |",
+            flush=True,
+        )
+        for wrong in t.wrong[:5]:
+            print("WRONG", wrong, file=sys.stderr)
+        if t.worst > _BAR:
+            print("OFF", t.where, file=sys.stderr)
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()
