@@ -24,7 +24,7 @@ from service.demo.running import running_service
 
 PAGE = (Path(__file__).parents[1] / "docs" / "recipes.md").read_text(encoding="utf-8")
 MARK = "executed by tests/test_recipes.py"
-SYSTEM = {
+SYSTEM: dict[str, Any] = {
     "sensor": {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [2e-5, 1e-3]}},
     "scene": {"crosstalk": [0.004, 0.02]},
 }
@@ -69,19 +69,38 @@ def test_c(flags: list[str], tmp_path: Path, system: Path, monkeypatch: pytest.M
     assert f"`{said.strip()}`" in PAGE
 
 
+def lines_through(name: str, address: str, system: Path, folder: Path) -> list[str]:
+    """What a recipe prints of frames of a steady object, one of which is none."""
+    program = folder / "lines.py"
+    program.write_text(block(f"{name}: {MARK}"))
+    # a tracker needs an object: c0 c2 / (r^2 (r^2 + c1 r + c0)) at 0.75 m, and the crosstalk
+    known = SYSTEM["scene"] | {"object": {"c0": 0.08, "c1": 0.05, "c2": 0.1}}
+    system.write_text(json.dumps(SYSTEM | {"scene": known}))
+    w2 = 0.08 * 0.1 / (0.75**2 * (0.75**2 + 0.05 * 0.75 + 0.08))
+    steady = {"w1": 0.004 + w2 * 0.75 / 14.98962, "w2": 0.02 + w2}
+    frames = [{"time_s": 0.1 * n, **steady} for n in range(12)]
+    lines = [json.dumps(frame) for frame in frames]
+    lines.insert(6, '{"time_s": 0.55, "w1": "x", "w2": 1}')
+    run = subprocess.run(
+        [sys.executable, str(program), str(system), address],
+        input="".join(line + "\n" for line in lines), capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return run.stdout.splitlines()
+
+
 def test_ndjson(address: str, system: Path, tmp_path: Path) -> None:
-    program = tmp_path / "lines.py"
-    program.write_text(block(f"ndjson: {MARK}"))
-    command = [sys.executable, str(program), str(system), address]
-    lines = "".join(json.dumps(frame) + "\n" for frame in FRAMES)
-    run = subprocess.run(command, input=lines, capture_output=True, text=True, check=True)
-    answers = [json.loads(line) for line in run.stdout.splitlines()]
-    found = [answer["range_m"] for answer in answers]
-    assert found[:2] == pytest.approx(RANGES[:2], abs=1e-4)
-    assert found[2] is None
-    bad = subprocess.run(command, input='{"w1": 1, "w2": "x"}\n', capture_output=True, text=True)
-    assert bad.returncode == 1
-    assert "/frames/w2/0" in bad.stderr
+    answers = [json.loads(line) for line in lines_through("ndjson", address, system, tmp_path)]
+    assert [answer["sequence"] for answer in answers] == list(range(1, 14))
+    assert answers[6]["error"]["pointer"] == "/w1"
+    assert answers[-1]["status"] == "unique"
+    assert answers[-1]["range_m"] == pytest.approx(0.75, abs=3 * answers[-1]["sd_m"])
+
+
+def test_websocket(address: str, system: Path, tmp_path: Path) -> None:
+    said = lines_through("websocket", address, system, tmp_path)
+    assert len(said) == 13
+    assert said[6].endswith("/w1")
+    assert re.fullmatch(r"0\.7[45]\d m, sd 0\.0\d\d m", said[-1])
 
 
 @contextlib.contextmanager
