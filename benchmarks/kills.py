@@ -4,8 +4,8 @@
     python -m benchmarks.kills --postgres          a PostgreSQL of its own, two services
     python -m benchmarks.kills --dask              chunks on a Dask cluster of two workers, with TLS
 
-Jobs are asked for, services and workers (and a scheduler) are killed at random moments while they
-run, and started anew. No accepted job may be lost or doubled, none may fail, and answers (their run
+Jobs are asked for, and services, workers (scheduler, database) are killed at random moments, and
+started anew. No accepted job may be lost or doubled, none may fail, and answers (their run
 times apart) and draws must be those of an undisturbed run, byte for byte.
 """
 
@@ -179,34 +179,47 @@ def _create(running: Fleet, key: str, body: Any) -> Any:
     return response.json()
 
 
-@contextlib.contextmanager
-def postgres() -> Iterator[str | None]:
-    """Run a PostgreSQL of its own, reached through a socket; None where none is installed."""
+def _postgres_binaries() -> Path | None:
     folders = sorted(Path("/usr/lib/postgresql").glob("*/bin"))
-    binaries = shutil.which("initdb") or (str(folders[-1] / "initdb") if folders else None)
-    if binaries is None:
-        yield None
-        return
-    here = Path(binaries).resolve().parent
-    home = Path(tempfile.mkdtemp(prefix="hybridtof-pg-"))
+    found = shutil.which("initdb") or (str(folders[-1] / "initdb") if folders else None)
+    return None if found is None else Path(found).resolve().parent
+
+
+def _run_postgres(home: Path, program: str, *arguments: str) -> None:
+    binaries = _postgres_binaries()
+    assert binaries is not None
     who: tuple[str, ...] = ()
     if os.geteuid() == 0:  # the server refuses to run as root
         shutil.chown(home, "postgres")
         who = ("setpriv", "--reuid=postgres", "--regid=postgres", "--clear-groups")
-    run = {"check": True, "stdout": subprocess.DEVNULL, "cwd": home}
-    data = str(home / "data")
+    command = (*who, str(binaries / program), "-D", str(home / "data"), *arguments)
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=home)  # noqa: S603
+
+
+@contextlib.contextmanager
+def postgres() -> Iterator[str | None]:
+    """Run a PostgreSQL of its own, reached through a socket; None where none is installed."""
+    if _postgres_binaries() is None:
+        yield None
+        return
+    home = Path(tempfile.mkdtemp(prefix="hybridtof-pg-"))
     options = f"-k {home} -c listen_addresses= -c max_connections=60"
     try:
-        subprocess.run((*who, here / "initdb", "-D", data, "-U", "me", "-A", "trust"), **run)  # type: ignore[call-overload]  # noqa: S603
-        start = (*who, here / "pg_ctl", "-D", data, "-w", "-l", home / "log", "-o", options)
-        subprocess.run((*start, "start"), **run)  # type: ignore[call-overload]  # noqa: S603
+        _run_postgres(home, "initdb", "-U", "me", "-A", "trust")
+        _run_postgres(home, "pg_ctl", "-w", "-l", str(home / "log"), "-o", options, "start")
         try:
             yield f"postgresql://me@/postgres?host={home}"
         finally:
-            stop = (*who, here / "pg_ctl", "-D", data, "-m", "immediate", "-w", "stop")
-            subprocess.run(stop, **run)  # type: ignore[call-overload]  # noqa: S603
+            _run_postgres(home, "pg_ctl", "-m", "immediate", "-w", "stop")
     finally:
         shutil.rmtree(home, ignore_errors=True)
+
+
+def restart(address: str) -> str:
+    """Crash a server that `postgres` runs, and start it anew."""
+    home = Path(address.rpartition("host=")[2])
+    _run_postgres(home, "pg_ctl", "-m", "immediate", "-w", "-l", str(home / "log"), "restart")
+    return "database"
 
 
 def requests(count: int) -> dict[str, Any]:
@@ -266,7 +279,9 @@ def main() -> None:
         with fleet(SERVE, settings, 2 if args.postgres else 1) as running:
 
             def kill() -> None:
-                if cluster is not None and rng.random() < 0.75:
+                if args.postgres and rng.random() < 0.1:
+                    killed[restart(settings["HYBRIDTOF_DATABASE"])] += 1
+                elif cluster is not None and rng.random() < 0.75:
                     killed[cluster.kill(rng)] += 1
                 else:
                     killed[running.kill(rng)] += 1

@@ -4,6 +4,9 @@ from service.errors import BusyError
 
 __all__ = ["Held", "Room"]
 
+# a body of no more than so small a share of the room is always taken: connections have an end, too
+_SHARES = 512
+
 
 class Room:
     """Bytes that may be held at a time.
@@ -38,9 +41,10 @@ class Held:
         Raises
         ------
         BusyError
-            Where there is no room.
+            Where there is no room, and it is not small.
         """
-        if self._room.used + count > self._room.limit:
+        small = self._bytes + count <= self._room.limit // _SHARES
+        if not small and self._room.used + count > self._room.limit:
             raise BusyError("too many bytes of other requests are held: send it again later")
         self.answer(count)
 

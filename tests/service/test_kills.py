@@ -1,13 +1,13 @@
-"""Services and workers are killed while jobs run; the long version is `make kills`."""
+"""Services, workers and databases are killed while jobs run; the long version is `make kills`."""
 
 import random
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from benchmarks.kills import Fleet, fleet, postgres, survived
+from benchmarks.kills import Fleet, fleet, postgres, restart, survived
 from tests.service.conftest import FRAMES, SENSOR
 from tests.service.fake_fold import CHUNKS, STEPS
 from tests.service.test_jobs import undisturbed
@@ -44,7 +44,10 @@ def test_kills_change_nothing(database: tuple[str, int]) -> None:
     settings = {"HYBRIDTOF_DATABASE": address}
     with fleet(fake_server(sleep=0.2), settings, services) as running:
         bodies = dict.fromkeys("abc", body)
-        found = survived(running, bodies, [lambda: running.kill(rng)] * 4, further)
+        kills: list[Callable[[], str]] = [lambda: running.kill(rng)] * 4
+        if services > 1:
+            kills[1] = lambda: restart(address)
+        found = survived(running, bodies, kills, further)
     answers = [answer for answer, _ in found.values()]
     assert [a["parameters"]["object.c0"]["mean"] for a in answers] == [undisturbed()] * 3
     assert all(one == found["a"] for one in found.values())

@@ -6,14 +6,20 @@ import json
 import logging
 import socket
 from collections.abc import AsyncIterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from benchmarks.kills import Service
+from benchmarks.manners import ask, crowd, heaviest, memory_mb, probes
 from service.app import create_app
+from service.border.held import Held, Room
+from service.errors import BusyError
 from service.service_settings import ServiceSettings
 from tests.service import fake_fold
 from tests.service.conftest import FRAMES, SCENE, SENSOR, listening, speaking
+from tests.service.test_server import fake_server
 
 pytestmark = pytest.mark.anyio
 
@@ -165,3 +171,54 @@ async def test_a_hang_up_is_one_line(address: str, caplog: pytest.LogCaptureFixt
     assert len(told) == 1, told
     assert told[0].exc_info is None
     assert "/v1/estimates" in told[0].getMessage()
+
+
+def test_a_small_body_has_room_where_large_ones_have_none() -> None:
+    room = Room(512 * 100)
+    large, small = Held(room), Held(room)
+    large.take(512 * 100)
+    for _ in range(2):
+        small.take(50)
+    with pytest.raises(BusyError):
+        small.take(1)
+    small.release()
+    large.release()
+    assert room.used == 0
+
+
+async def test_a_crowd_costs_the_others_nothing(tmp_path: Path) -> None:
+    """The long version, with what is waited for, is `python -m benchmarks.manners`."""
+    settings = {"HYBRIDTOF_DATABASE": f"sqlite:///{tmp_path}/jobs.sqlite"}
+    service = Service(fake_server(2**25), settings)
+    address = service.address.removeprefix("http://")
+    try:
+        for path, body, status in probes().values():  # what is imported by the first
+            assert (await ask(address, path, body))[0] == status
+        before = memory_mb(service.process.pid)
+        async with crowd(address, slow=40, half=4, deaf=2):
+            for _ in range(5):
+                for path, body, status in probes().values():
+                    assert (await ask(address, path, body))[0] == status
+                assert memory_mb(service.process.pid) < before + 64
+    finally:
+        service.kill()
+
+
+async def test_heavy_requests_hold_up_nobody(tmp_path: Path) -> None:
+    """Others are answered before two fits that would take minutes."""
+    settings = {"HYBRIDTOF_DATABASE": f"sqlite:///{tmp_path}/jobs.sqlite"}
+    service = Service(fake_server(2**25), settings)
+    address = service.address.removeprefix("http://")
+    path, body = heaviest()["fit of 10,000 frames, all unknown"]
+    try:
+        fits = [asyncio.ensure_future(ask(address, path, body)) for _ in range(2)]
+        await asyncio.sleep(0)
+        for _ in range(2):
+            for other, small, status in probes().values():
+                assert (await ask(address, other, small))[0] == status
+        assert not any(fit.done() for fit in fits)
+        for fit in fits:
+            fit.cancel()
+        await asyncio.gather(*fits, return_exceptions=True)
+    finally:
+        service.kill()
