@@ -15,6 +15,7 @@ from inference.identifiability.expected_posterior import (
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.information import Information
 from inference.identifiability.reasons import Diagnosis
+from inference.identifiability.remedies import Offer
 from inference.identifiability.status import Identifiability
 from inference.identifiability.statuses import Spread, statuses_of
 from simulator.errors import InvalidInputError, Problem, RefusedError, escape
@@ -50,6 +51,8 @@ class Foresight:
         Number of distinct ranges.
     identifiability : tuple of Identifiability
         A row for every unknown and one for "range_m".
+    remedies : dict of str to tuple of Offer
+        Of every parameter that is not identified what would lower its bound, the cheapest first.
     """
 
     experiment: Experiment
@@ -58,6 +61,7 @@ class Foresight:
     needed: int
     distinct: int
     identifiability: tuple[Identifiability, ...]
+    remedies: dict[str, tuple[Offer, ...]]
 
     @property
     def reference(self) -> dict[str, float]:
@@ -287,4 +291,9 @@ def identifiability(
         diagnosis.needed,
         diagnosis.distinct,
         rows,
+        {
+            row.parameter: diagnosis.offers(row.parameter)
+            for row in rows
+            if row.status != "identified" and not row.parameter.startswith("range_m.")
+        },
     )

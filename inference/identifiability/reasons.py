@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from inference.identifiability.experiment import Experiment, information
 from inference.identifiability.information import Information
-from inference.identifiability.remedies import Remedy, remedies, span
+from inference.identifiability.remedies import Offer, Remedy, cheap_remedies, remedies, span
 from simulator.errors import listed
 from simulator.object_model import log_slope
 from simulator.parameters import OFFSET
@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 _ALIKE = 0.98  # correlation of two bounds above which one parameter hides behind the other
 _HELP = 2.0  # a change that lowers a bound by less is not worth its words
+_BETTER = 1.2  # by which what costs more has to be better
 _POWER_LAW = 0.15  # distance of the exponent from a whole number
 _WANTED = 0.1  # relative error that a bound is held against
 _BACKGROUND = ("background.strength", "background.distance_m")
@@ -67,6 +68,31 @@ class Diagnosis:
     @functools.cached_property
     def _remedies(self) -> list[Remedy]:
         return remedies(self.experiment)
+
+    @functools.cached_property
+    def _cheap(self) -> list[Remedy]:
+        return cheap_remedies(self.experiment)
+
+    def offers(self, parameter: str) -> tuple[Offer, ...]:
+        """Return what would lower the bound of a parameter to a half or less, the cheapest first.
+
+        Of remedies that cost the same the best, and none that is worse than a cheaper one.
+
+        Parameters
+        ----------
+        parameter : str
+            An unknown on which the readings depend, or "range_m".
+        """
+        if self.distinct == 0 and parameter == "range_m":
+            return ()
+        changes = [r for r in self._remedies if r.kind in ("empty", "motion")]
+        least, found = self.bound(parameter) / _HELP, []
+        ordered = [(r.cost, r.bound(parameter), r) for r in (*changes, *self._cheap)]
+        for _, bound, remedy in sorted(ordered, key=lambda item: item[:2]):
+            if bound < least and math.isfinite(bound):
+                found.append(Offer(remedy.kind, remedy.words.rstrip(","), bound))
+                least = bound / _BETTER
+        return tuple(found)
 
     @functools.cached_property
     def distinct(self) -> int:
@@ -234,6 +260,11 @@ class Diagnosis:
         chosen = [item for item in useful if item[0] < 1][:2]
         # frames without the object cost nothing: they are named whenever they help
         chosen += [item for item in useful if item[1].kind == "empty" and item not in chosen]
+        told = self._cheapest(parameter, sd)
+        if told is not None and not any(
+            remedy.cost <= told[1].cost and after < _WANTED for after, remedy in chosen
+        ):
+            chosen.append(told)
         words = []
         for after, remedy in chosen:
             fold = f" {_count(sd / after)} times," if math.isfinite(sd) else ""
@@ -242,3 +273,12 @@ class Diagnosis:
         if not words and math.isfinite(sd) and sd > _WANTED:
             words.append(f"noise {_count(sd / _WANTED)} times lower would tell it to 10 %")
         return words
+
+    def _cheapest(self, parameter: str, sd: float) -> tuple[float, Remedy] | None:
+        """Return the cheapest knowledge of ranges, or of the empty scene, that is enough."""
+        enough = [
+            (remedy.bound(parameter), remedy)
+            for remedy in self._cheap
+            if _HELP * remedy.bound(parameter) < min(sd, _HELP * _WANTED)
+        ]
+        return min(enough, key=lambda item: (item[1].cost, item[0]), default=None)

@@ -8,12 +8,19 @@ from numpy.typing import NDArray
 
 from inference.identifiability.experiment import Experiment, information
 from inference.identifiability.information import Information
+from simulator.parameters import OFFSET, with_offset
 
-__all__ = ["EMPTY_FRAMES", "Remedy", "remedies", "span"]
+__all__ = ["EMPTY_FRAMES", "Offer", "Remedy", "cheap_remedies", "remedies", "span"]
 
 Array = NDArray[np.float64]
 
 EMPTY_FRAMES = 3
+_MORE_EMPTY = {10: "ten", 30: "thirty"}
+_TARGETS = 5  # frames of an object at a known distance
+_TOLD_M = 1e-3  # to which a ruler or odometry tells a range [m]
+# what is done to the scene, the cheapest first: the object taken away, put at a place, at two
+# places, moved by something that counts its way, moved farther
+_CHEAPEST = ("empty", "distance", "distances", "odometry", "motion")
 _LEAST_SPAN = math.log(4.0)
 _FRAMES = 40  # of a stroke that is tried, at least
 # what a calibration would tell at once
@@ -39,11 +46,20 @@ class Remedy:
         "empty", "motion", or the start of the paths of the unknowns that it makes known.
     information : Information
         What its readings would tell.
+    frames : int
+        Frames that it adds; 0 where it changes those that there are.
     """
 
     words: str
     kind: str
     information: Information
+    frames: int = 0
+
+    @property
+    def cost(self) -> tuple[int, int]:
+        """What cheaper remedies have less of: trouble, then frames."""
+        known = self.kind in _CHEAPEST
+        return _CHEAPEST.index(self.kind) if known else len(_CHEAPEST), self.frames
 
     def bound(self, parameter: str) -> float:
         """Return the bound of an unknown or of "range_m"; inf where the change makes it known."""
@@ -53,6 +69,26 @@ class Remedy:
         return (
             float(self.information.sd[names.index(parameter)]) if parameter in names else math.inf
         )
+
+
+@dataclasses.dataclass(frozen=True)
+class Offer:
+    """Something to be done about a parameter that is not identified.
+
+    Attributes
+    ----------
+    kind : "empty", "distance", "distances", "odometry" or "motion"
+        Frames without the object, the object at one or two known distances, odometry, a stroke.
+    words : str
+        It in full.
+    bound : float
+        Cramer-Rao bound that it would give: relative, of c1 over sqrt(c0), of crosstalk over the
+        scene's light, of "range_m" that of the mean of log r.
+    """
+
+    kind: str
+    words: str
+    bound: float
 
 
 def span(log_r: Array) -> float:
@@ -84,15 +120,20 @@ def _with_frames(experiment: Experiment, log_r: Array) -> Experiment:
     return dataclasses.replace(experiment, log_r=log_r, gain=gain, common_range=False, rates=rates)
 
 
-def _emptied(experiment: Experiment) -> Experiment:
-    gain = experiment.gain
+def _with_more(experiment: Experiment, log_r: Array, rate: float | None = None) -> Experiment:
+    """Return the experiment with more frames, of the median gain, their ranges told or not."""
+    gain, rates = experiment.gain, experiment.rates
     if gain is not None:
-        gain = np.append(gain, np.full(EMPTY_FRAMES, float(np.median(gain))))
-    log_r = np.append(experiment.log_r, np.full(EMPTY_FRAMES, np.nan))
-    rates = experiment.rates
-    if rates is not None:
-        rates = np.append(rates, np.zeros((EMPTY_FRAMES, 2)), axis=0)
+        gain = np.append(gain, np.full(log_r.size, float(np.median(gain))))
+    if rates is not None or rate is not None:
+        before = np.zeros((experiment.log_r.size, 2)) if rates is None else rates
+        rates = np.append(before, np.tile([rate or 0.0, 0.0], (log_r.size, 1)), axis=0)
+    log_r = np.append(experiment.log_r, log_r)
     return dataclasses.replace(experiment, log_r=log_r, gain=gain, rates=rates)
+
+
+def _emptied(experiment: Experiment, count: int) -> Experiment:
+    return _with_more(experiment, np.full(count, np.nan))
 
 
 def _room(experiment: Experiment) -> tuple[float, float]:
@@ -152,7 +193,7 @@ def remedies(experiment: Experiment) -> list[Remedy]:
     names = experiment.names
     if any(not name.startswith("object.") for name in names):
         words = "three frames without the object"
-        found.append(Remedy(words, "empty", information(_emptied(experiment))))
+        found.append(_empty(experiment, EMPTY_FRAMES, words))
     strokes = (_moved(experiment), _at_the_bend(experiment))
     found += [Remedy(s[0], "motion", information(s[1])) for s in strokes if s is not None]
     for prefix, words in _GROUPS.items():
@@ -162,3 +203,74 @@ def remedies(experiment: Experiment) -> list[Remedy]:
         known = dataclasses.replace(experiment, known=(*experiment.known, *group))
         found.append(Remedy(f"knowing {words}", prefix, information(known)))
     return found
+
+
+def _empty(experiment: Experiment, count: int, words: str) -> Remedy:
+    return Remedy(words, "empty", information(_emptied(experiment, count)), count)
+
+
+def cheap_remedies(experiment: Experiment) -> list[Remedy]:
+    """Compute what little more than the frames that there are would tell.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        As it is.
+
+    Returns
+    -------
+    list of Remedy
+        More frames without the object, the object at one or two distances that a ruler tells to a
+        millimetre, odometry that tells the way of the frames that there are to as much, a wider
+        stroke.
+    """
+    found = []
+    if any(not name.startswith("object.") for name in experiment.names):
+        for count, words in _MORE_EMPTY.items():
+            found.append(_empty(experiment, count, f"{words} frames without the object"))
+    present = experiment.log_r[np.isfinite(experiment.log_r)]
+    if present.size == 0 or experiment.common_range:
+        return found
+    low, high = float(present.min()), float(present.max())
+    places = sorted({low, 0.5 * (low + high), high})
+    stops: list[tuple[float, ...]] = [(place,) for place in places]
+    if high > low:
+        stops.append((low, high))
+    found += [_told(experiment, distances) for distances in stops]
+    if OFFSET not in experiment.parameters.names and high > low:
+        found.append(_moving(experiment))
+    return found
+
+
+def _told(experiment: Experiment, distances: tuple[float, ...]) -> Remedy:
+    """Put the object at distances that are known, in frames of their own."""
+    more = np.repeat(distances, _TARGETS)
+    of = information(_with_more(experiment, more, 1.0 / _TOLD_M))
+    # of these ranges nothing is asked
+    own = of.own_variance.copy()
+    own[experiment.log_r.size :] = np.nan
+    where = " and ".join(f"{math.exp(place):.2g}" for place in distances)
+    words = f"{_TARGETS} frames with the object at {where} m" + (
+        " each" if len(distances) > 1 else ""
+    )
+    kind = "distance" if len(distances) == 1 else "distances"
+    words += f", known to {1e3 * _TOLD_M:g} mm,"
+    return Remedy(words, kind, dataclasses.replace(of, own_variance=own), more.size)
+
+
+def _moving(experiment: Experiment) -> Remedy:
+    """Let odometry tell the way of the frames that there are."""
+    present = np.isfinite(experiment.log_r)
+    ranges = np.exp(experiment.log_r[present])
+    parameters = with_offset(experiment.parameters, ranges - ranges.min())
+    offset = parameters.unknowns[-1].to_normal(ranges[[ranges.argmin()]], {})
+    rates = np.zeros((present.size, 2)) if experiment.rates is None else experiment.rates.copy()
+    rates[present, 1] = 1.0 / _TOLD_M
+    changed = dataclasses.replace(
+        experiment, parameters=parameters, z=np.append(experiment.z, offset), rates=rates
+    )
+    words = (
+        f"odometry to {1e3 * _TOLD_M:g} mm over the stroke from {ranges.min():.2g} to "
+        f"{ranges.max():.2g} m"
+    )
+    return Remedy(words, "odometry", information(changed))

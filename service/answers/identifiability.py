@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.identifiability.before_data import Foresight, identifiability
+from inference.identifiability.remedies import Offer
 from inference.identifiability.status import Identifiability
 from service.answers.posteriors import SHAPES
 from service.answers.shape import model_of
@@ -73,6 +74,11 @@ class ForeseenIdentifiability:
         the ranges (the mean of log r).
     identifiability : list
         A status and a reason for every unknown and for ``range_m``.
+    remedies : dict
+        For each of them that is not identified what would lower its Cramer-Rao bound to a half or
+        less, the cheapest first: the kind (``empty``: frames without the object; ``distance``,
+        ``distances``: the object at one or two known distances; ``odometry``; ``motion``: a wider
+        stroke), words for it, and the bound that it would give, relative as in the reasons.
     """
 
     rank: int
@@ -85,6 +91,7 @@ class ForeseenIdentifiability:
     parameters: dict[str, Bound]
     range_m: RangeBounds
     identifiability: tuple[Identifiability, ...]
+    remedies: dict[str, tuple[Offer, ...]]
 
 
 IdentifiabilityResponse = model_of(ForeseenIdentifiability, SHAPES)
@@ -154,4 +161,5 @@ def identifiability_of(request: IdentifiabilityRequest) -> ForeseenIdentifiabili
             scale_posterior_sd=_number(found.posterior.scale_sd),
         ),
         identifiability=tuple(found.identifiability),
+        remedies=found.remedies,
     )

@@ -181,3 +181,48 @@ def test_reference_values_are_those_given() -> None:
     found = identifiability(sensor, parse_scene(scene), STROKE, at=at)
     assert {name: found.reference[name] for name in at} == pytest.approx(at)
     assert found.reference["background.strength"] == pytest.approx(0.0177)  # the prior's median
+
+
+def test_remedies_give_what_they_promise() -> None:
+    """Each bound is that of the experiment with the remedy taken; the cheapest come first."""
+    scene = parse_scene({"background": BACKGROUND})
+    stroke, sensor = np.geomspace(0.3, 0.6, 12).tolist(), sensor_of("pulsed", 1000.0)
+    found = identifiability(sensor, scene, stroke)
+    kinds = ["empty", "distance", "distances", "odometry", "motion"]
+    met = set()
+    for row in found.identifiability:
+        assert (row.parameter in found.remedies) == (row.status != "identified")
+        for offer in found.remedies.get(row.parameter, ()):
+            met.add(offer.kind)
+            known: dict[str, Any] = {}
+            ranges, present = list(stroke), [True] * 12
+            if offer.kind == "empty":
+                count = {"three": 3, "ten": 10, "thirty": 30}[offer.words.split()[0]]
+                ranges, present = ranges + [1.0] * count, present + [False] * count
+            elif offer.kind == "odometry":
+                known["displacement_sd_m"] = [1e-3] * 12
+            elif offer.kind.startswith("distance"):
+                ends = {0.3: stroke[0], 0.42: (stroke[0] * stroke[-1]) ** 0.5, 0.6: stroke[-1]}
+                at = [ends[float(text)] for text in re.findall(r"0\.\d+", offer.words)]
+                ranges += [place for place in at for _ in range(5)]
+                present += [True] * 5 * len(at)
+                known["known_range_sd_m"] = [None] * 12 + [1e-3] * 5 * len(at)
+            else:
+                continue
+            of = identifiability(sensor, scene, ranges, present, **known).information
+            if row.parameter != "range_m":  # of which known ranges are a part there
+                bound = of.sd[of.names.index(row.parameter)]
+                assert offer.bound == pytest.approx(bound, rel=1e-6)
+        offered = [kinds.index(offer.kind) for offer in found.remedies.get(row.parameter, ())]
+        assert offered == sorted(offered)
+        bounds = [offer.bound for offer in found.remedies.get(row.parameter, ())]
+        assert bounds == sorted(bounds, reverse=True)
+    assert met >= {"empty", "distance", "distances", "odometry"}
+    assert "known to 1 mm, would lower the bound" in rows(found)["range_m"].reason
+
+
+def test_what_helps_enough_is_named_even_if_more_helps_more() -> None:
+    found = rows(foresee({"crosstalk": UNKNOWN_CROSSTALK}, np.geomspace(0.3, 0.6, 20).tolist()))
+    assert (
+        "5 frames with the object at 0.3 and 0.6 m each, known to 1 mm" in found["object.c1"].reason
+    )
