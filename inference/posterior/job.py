@@ -10,12 +10,15 @@ from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.density.discrepant import with_discrepancy
 from inference.density.representatives import Representatives, standing_for
 from inference.density.static import with_common_range
+from inference.frame.blocks import RANGE
+from inference.frame.known_range import columns_of
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.posterior.checks import check_scene_for_posterior
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.streams import Stream
 from simulator.errors import RefusedError
 from simulator.frames import Frames, check_frames
+from simulator.model_error import ErrorSizes
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor, parse_sensor
 from simulator.validated import parse
@@ -175,8 +178,23 @@ def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSetti
         # of 53 bits, which readers of JSON that know only floats do not round
         seed = int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 11)
         settings = settings.model_copy(update={"seed": seed})
-    job = Job(sensor, scene, frames, settings)
+    job = Job(sensor, _with_error_integrated(scene, frames), frames, settings)
     if not job.usable.any():
         raise RefusedError("every frame is saturated: lower the gain or the exposure")
     check_scene_for_posterior(sensor, scene, frames.select(job.usable))
     return job
+
+
+def _with_error_integrated(scene: Scene, frames: Frames) -> Scene:
+    """Return a scene whose flux's error is integrated out in full where frames know their ranges.
+
+    Linear response starts from the posterior of an exact model. That of readings that outweigh what
+    is known of ranges contradicts it where no model is exact, and lies too far from the truth to be
+    put right to first order (docs/model.md, model-response).
+    """
+    error = scene.model_error
+    few = len(frames) <= MOST_SAMPLED and scene.motion == "radial"
+    if not (few and error.flux > 0) or error.integrated or columns_of(frames).shape[1] <= RANGE:
+        return scene
+    sizes = ErrorSizes(flux=error.flux, range_m=error.range_m)
+    return scene.model_copy(update={"discrepancy": sizes})
