@@ -1,11 +1,15 @@
 """What holds for every test."""
 
 import os
+import shutil
+import tempfile
 
 # before numpy is loaded: with threads of its own the last bits of a product differ from run to run
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # servers of tests make the machine code that they need, and no other
 os.environ.setdefault("HYBRIDTOF_WARM", "off")
+# jobs and streams of the user are not the tests': a fixture that lives longer than a test has this
+os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="hybridtof-tests-")
 
 
 import sys
@@ -15,6 +19,8 @@ from pathlib import Path
 import pytest
 
 from tests.chunk_clock import timed
+
+_STATE = os.environ["XDG_STATE_HOME"]
 
 # folders whose tests compile the same kernels, and the group that they make
 _TOGETHER = {
@@ -43,6 +49,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if item.get_closest_marker("slow") or folder in _TOGETHER:
             slow.add(group)
     items.sort(key=lambda item: next(item.iter_markers("xdist_group")).args[0] not in slow)
+
+
+def pytest_unconfigure() -> None:
+    """Leave nothing of the store of all tests."""
+    shutil.rmtree(_STATE, ignore_errors=True)
 
 
 @pytest.fixture(autouse=True)

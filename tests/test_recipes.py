@@ -47,12 +47,9 @@ def system(tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """A service whose store is nobody else's."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
-        with running_service() as address:
-            yield address
+def address() -> Iterator[str]:
+    with running_service() as address:
+        yield address
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler: install cc")
