@@ -35,8 +35,8 @@ picture: $(READY) report ## Make the README's pictures anew
 	$(BIN)/hybridtof demo --out docs
 	cp out/report.png docs/report.png
 
-notebook: $(READY) ## Run the notebook and store its outputs
-	$(BIN)/jupyter-execute --inplace notebooks/posterior_diagnostics.ipynb
+notebook: $(READY) ## Run all notebooks and store their outputs
+	$(BIN)/jupyter-execute --inplace notebooks/*.ipynb
 
 notebook-data: $(READY) ## Make the notebook's frames anew
 	$(BIN)/hybridtof simulate --scene notebooks/simulated.json --from-m 0.15 --to-m 1.2 --frames 30 --spacing log --seed 7 --output notebooks/frames.csv > /dev/null

@@ -11,6 +11,7 @@ import h5netcdf
 import numpy as np
 import pytest
 
+from inference.posterior.answer.inference_data import inference_data
 from inference.posterior.sampling.diagnostics import split_r_hat
 from service.exports import EXPORTS, export_by
 from service.exports.described import DescribedDraws, describe_draws
@@ -242,3 +243,32 @@ def test_ndjson_has_ranges_in_some_lines_and_nulls_for_a_saturated_frame(
 def test_negotiation(accept: str, suffix: str | None) -> None:
     form = accepted_export(accept)
     assert (None if form is None else form.suffix) == suffix
+
+
+@pytest.mark.filterwarnings("default")  # arviz and what it brings
+def test_draws_in_memory_are_steps_in_time_for_arviz() -> None:
+    try:
+        arviz: Any = pytest.importorskip("arviz", reason="arviz is not installed")
+    except Warning as warning:
+        pytest.skip(f"arviz warns of itself: {warning}")
+    made = draws()
+    data = inference_data(made, "emcee", 3)
+    chains = ENSEMBLES * WALKERS
+    posterior, every = data["posterior"], data["every_step"]
+    assert posterior["range_m"].shape == (chains, THINNED, 4)
+    # the saturated frame has no draws
+    assert posterior["frame"].values.tolist() == [0, 1, 3, 4]
+    assert data["posterior_predictive"]["first"].dims == ("chain", "draw", "frame")
+    at = {"chain": 2 * WALKERS + 1, "draw": 4}
+    assert (int(every["ensemble"][at["chain"]]), int(every["walker"][at["chain"]])) == (2, 1)
+    assert float(every["object.c2"][at]) == made.parameters[2, 1, 4, 1]
+    assert float(every["lp"][at]) == made.log_density[2, 1, 4]
+    step = made.thinned[3]
+    assert int(posterior["draw"][3]) == made.step[step]
+    assert float(posterior["range_m"][at["chain"], 3, 2]) == made.range_m[2, 1, 3, 3]
+    assert float(posterior["object.c0"][at["chain"], 3]) == made.parameters[2, 1, step, 0]
+    # each step keeps half of the one before: over walkers lined up it would not show
+    one = every["object.c0"].values[:, :-1] * every["object.c0"].values[:, 1:]
+    # autocorrelation of 1176 pairs, whose standard error is below 0.04
+    assert one.mean() / every["object.c0"].values.var() == pytest.approx(0.5, abs=0.16)
+    assert np.isfinite(arviz.loo(data).elpd_loo)

@@ -11,6 +11,7 @@ from inference.identifiability.status import Identifiability
 from inference.posterior.answer.draws import Draws
 from inference.posterior.answer.error_parts import ErrorParts, ParameterErrorParts
 from inference.posterior.answer.fit import Fit
+from inference.posterior.answer.inference_data import inference_data
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.selection.selection import SelectionSummary
 
@@ -241,6 +242,25 @@ class Posterior:
     runtime: Runtime
     draws: Draws
     selection: SelectionSummary | None = None
+
+    def to_arviz(self) -> Any:
+        """Return the draws for ArviZ: ``InferenceData``, from ArviZ 1 on an xarray ``DataTree``.
+
+        Returns
+        -------
+        arviz.InferenceData or xarray.DataTree
+            A chain for every walker, with the coordinates ``ensemble`` and ``walker``, so that its
+            draws are steps in time; of weighted draws one chain, resampled by weight. Groups
+            ``posterior`` (parameters, and ``range_m`` along ``frame``), ``sample_stats``,
+            ``posterior_predictive`` (both readings drawn anew), ``log_likelihood``, at the steps
+            that have ranges, and ``every_step`` with the parameters at all steps.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            Without ArviZ.
+        """
+        return inference_data(self.draws, self.method, self.seed)
 
     def to_json(self) -> dict[str, Any]:
         """Return plain JSON data (docs/http.md, posteriors); non-finite values become null."""
