@@ -81,11 +81,15 @@ def _too_deep(raw: bytes) -> bool:
 
 def _count(value: Any) -> int:
     """Count the members of all objects but of those in columns."""
+    count = 0
     if isinstance(value, dict):
-        return len(value) + sum(map(_count, value.values()))
-    if isinstance(value, list) and len(value) <= SHORT:
-        return sum(map(_count, value))
-    return 0
+        count, value = len(value), value.values()
+    elif not isinstance(value, list) or len(value) > SHORT:
+        return 0
+    for inner in value:
+        if isinstance(inner, dict | list):
+            count += _count(inner)
+    return count
 
 
 def _walk(value: Any, pointer: str = "") -> Iterator[tuple[str, Any]]:

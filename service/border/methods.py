@@ -33,7 +33,13 @@ class Methods:
             and (methods := getattr(route, "methods", None))
         ]
 
+        # most requests are for a path without parameters
+        self._fixed = {path: self._found(path) for _, path, _ in self._routes if "{" not in path}
+
     def _known(self, path: str) -> tuple[str, frozenset[str]] | None:
+        return self._fixed[path] if path in self._fixed else self._found(path)
+
+    def _found(self, path: str) -> tuple[str, frozenset[str]] | None:
         """Return the template of a path and all its methods; None where no route has it."""
         found: set[str] = set()
         template = None

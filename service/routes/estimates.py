@@ -1,9 +1,11 @@
 """Deterministic estimates, at once."""
 
-from typing import Annotated
+from collections.abc import Callable, Coroutine
+from typing import Annotated, Any, cast, get_args
 
 from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import Response
+from fastapi.routing import APIRoute
 
 from inference.estimate import estimate, estimate_planned
 from inference.fits.techniques.registry import FITS
@@ -25,10 +27,32 @@ from simulator.errors import InvalidInputError
 
 __all__ = ["answer", "quick_answer", "router"]
 
-router = APIRouter(prefix="/v1/estimates", tags=["estimates"])
+_READ = BodyOf(EstimateRequest)
+
+
+class _DirectRoute(APIRoute):
+    """A route that FastAPI describes, and whose parameters it does not look for.
+
+    That would take longer than the estimate of a frame.
+    """
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Return what answers a request."""
+
+        async def handle(request: Request) -> Response:
+            shape = request.query_params.get("shape", "rows")
+            if shape not in get_args(AnswerShape):
+                message = f"must be {' or '.join(get_args(AnswerShape))}"
+                raise InvalidInputError.at("/query/shape", message)
+            return await create(request, await _READ(request), cast("AnswerShape", shape))
+
+        return handle
+
+
+router = APIRouter(prefix="/v1/estimates", tags=["estimates"], route_class=_DirectRoute)
 _FORMS = ("application/json", *(message.media_type for message in MESSAGES))
 _ANY = frozenset({"", "*/*", _FORMS[0]})
-Body = Annotated[tuple[EstimateRequest, bytes], Depends(BodyOf(EstimateRequest))]
+Body = Annotated[tuple[EstimateRequest, bytes], Depends(_READ)]
 
 
 def answer(request: EstimateRequest, shape: AnswerShape = "rows") -> bytes:
