@@ -12,6 +12,7 @@ baseline: the same checks against the idle server.
 import argparse
 import contextlib
 import json
+import tempfile
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -105,14 +106,18 @@ def main() -> None:
     serve = ("service.cli", "serve", "--port", "0")
     limits = {"HYBRIDTOF_MAX_BODY_BYTES": str(2**28), "HYBRIDTOF_MAX_HELD_BYTES": str(2**30)}
     limits |= {"HYBRIDTOF_REQUEST_S": "600", "HYBRIDTOF_WARM": "off"}
-    with contextlib.ExitStack() as stack:
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
+
+        def kept(name: str) -> dict[str, str]:
+            return limits | {"HYBRIDTOF_DATABASE": f"sqlite:///{folder}/{name}.sqlite"}
+
         servers = {
             "empty": stack.enter_context(served("benchmarks.empty_service")),
-            "service": stack.enter_context(served(*serve, settings=limits)),
+            "service": stack.enter_context(served(*serve, settings=kept("this"))),
         }
         if args.against is not None:
             servers["other checkout"] = stack.enter_context(
-                served(*serve, tree=args.against, settings=limits)
+                served(*serve, tree=args.against, settings=kept("other"))
             )
         for name, address in servers.items():
             if name != "empty":  # machine code is loaded, or made
