@@ -1,6 +1,7 @@
 """The command ``hybridtof report``."""
 
 import argparse
+import itertools
 import json
 import os
 import sys
@@ -42,6 +43,7 @@ def _run(args: argparse.Namespace) -> int:
     os.environ["KERNELS_COMPILE"] = "always"
     args.out.mkdir(parents=True, exist_ok=True)
     from service.report.cells import FULL, QUICK
+    from service.report.light import light_rows
     from service.report.page import markdown_page, page
     from service.report.run import report_of, rows_of
     from service.report.scenes import SCENES
@@ -52,7 +54,8 @@ def _run(args: argparse.Namespace) -> int:
     rows = []
     scene = ""
     effort = QUICK if args.quick else FULL
-    for row in rows_of(scenes, effort, args.seed, kept, lambda text: note(args, text)):
+    measured = rows_of(scenes, effort, args.seed, kept, lambda text: note(args, text))
+    for row in itertools.chain(measured, light_rows(effort)):
         if row.scene != scene:
             scene = row.scene
             sys.stdout.write(heading(scene) + "\n")

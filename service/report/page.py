@@ -5,6 +5,7 @@ import html
 from collections.abc import Mapping, Sequence
 from string import Template
 
+from service.report.light import LIGHT
 from service.report.row import Row
 from service.report.run import Report
 from service.report.table import COLUMNS, LEGEND, cells_of_row, left_out, markdown
@@ -77,10 +78,11 @@ def _class(row: Row) -> str:
 
 
 def _glance(report: Report) -> str:
-    methods = list(dict.fromkeys(row.method for row in report.rows if row.scores is not None))
+    served = [row for row in report.rows if row.scores is not None and row.scene != LIGHT]
+    methods = list(dict.fromkeys(row.method for row in served))
     head = "".join(f"<th>{html.escape(method)}</th>" for method in methods)
     lines = [f"<tr><th>scene</th>{head}</tr>"]
-    for scene in report.scenes:
+    for scene in dict.fromkeys(row.scene for row in served):
         cells = []
         for method in methods:
             row = _best([r for r in report.of(scene) if r.method == method])
@@ -159,7 +161,7 @@ def page(report: Report, pictures: Mapping[str, str], terms: str, snr: str | Non
         )
     short = "".join(f"<li>{html.escape(line)}</li>" for line in _short(report))
     return _PAGE.substitute(
-        count=len(report.scenes),
+        count=len(report.least_errors),
         seed=report.seed,
         machine=html.escape(_machine(report)),
         short=short,

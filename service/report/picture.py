@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from service.report.light import LIGHT
 from service.report.row import Row
 from service.report.run import Report
 from service.report.terms import TermCost
@@ -22,6 +23,7 @@ _COLOURS = {
     "many frames": "#009e73",
     "tracker": "#cc79a7",
     "posterior": "#d55e00",
+    "light": "#333333",
 }
 _GREY = "#777777"
 _SIZE = 8.0  # of labels, in points
@@ -148,6 +150,10 @@ def draw_scene(report: Report, scene: str) -> Figure:
         xlabel="processor time a frame [s]",
         ylabel="median error of the range, relative",
     )
+    if scene == LIGHT:
+        axes.set(
+            xlabel="processor time a distance [s]", ylabel="median error of the light, relative"
+        )
     _panel(axes, report.of(scene), report.least_errors.get(scene), report.division_s)
     return figure
 

@@ -18,6 +18,7 @@ from inference.techniques import ALL_TECHNIQUES
 from service.cli import main
 from service.report.cells import Cell, Effort, cells_of
 from service.report.floors import least_error
+from service.report.light import light_rows
 from service.report.measure import measure
 from service.report.page import markdown_page, page
 from service.report.picture import draw_scene, draw_summary, draw_terms, svg
@@ -88,6 +89,20 @@ def test_least_error_is_the_noise_over_the_slope() -> None:
     ]
     expected = np.median(np.outer(1 / np.array(slopes), sizes))
     assert least_error(scene) == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.slow
+def test_light_errs_less_by_more_work() -> None:
+    errors: dict[str, list[float]] = {}
+    for row in light_rows(TINY):
+        assert row.scores is not None
+        assert row.scores.p95_error is not None
+        errors.setdefault(row.method, []).append(row.scores.p95_error)
+    fixed, facets = errors["fixed rules"], errors["facets"]
+    # 2, 4, 8, 16 points a piece; the facets' sum jumps as their edges cross the plate's
+    assert fixed[0] > 100 * fixed[1] > 1e4 * fixed[2] > 1e5 * fixed[3]
+    assert max(errors["adaptive rules"]) < 1e-12
+    assert facets[0] > 4 * facets[1] > 4 * facets[2]
 
 
 def test_every_method_is_in_the_report() -> None:
@@ -244,6 +259,7 @@ def test_command(
     monkeypatch.setattr("service.report.cells.QUICK", TINY)
     monkeypatch.setattr("service.report.scenes.SCENES", (BY_NAME["Bare object"],))
     monkeypatch.setattr("service.report.run.term_costs", list)
+    monkeypatch.setattr("service.report.light.light_rows", lambda _: [])
     monkeypatch.setattr("service.report.picture.draw_terms", lambda _: Figure())
     monkeypatch.setenv("KERNELS_COMPILE", "never")
     assert main(["report", "--quick", "--out", str(tmp_path)]) == 0
