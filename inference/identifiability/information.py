@@ -148,7 +148,7 @@ class Information:
         return np.asarray(direction / direction[index])
 
     @functools.cached_property
-    def _factors(self) -> tuple[Array, Array]:
+    def factors(self) -> tuple[Array, Array]:
         """F of x, shape (d, k + rank), and of the shared errors, shape (k, k + rank)."""
         columns, _, vectors = self._equilibrated
         k = self.errors.shape[1]
@@ -164,7 +164,7 @@ class Information:
     @property
     def factor(self) -> Array:
         """F with F F^T the bound on the covariance inside the space that the readings tell."""
-        return self._factors[0]
+        return self.factors[0]
 
     def sd_of(self, functionals: Array, of_errors: Array | None = None) -> Array:
         """Return the Cramer-Rao bound on the standard deviation of linear functions of x.
@@ -189,9 +189,9 @@ class Information:
         # rounding turns the null space by its size over the gap
         least = values[self.rank - 1] if self.rank else 1.0
         told = part <= min(1e-12 + 10 * self.resolution / least, 0.1)
-        product = functionals @ self._factors[0]
+        product = functionals @ self.factors[0]
         if of_errors is not None:
-            product = product + of_errors @ self._factors[1]
+            product = product + of_errors @ self.factors[1]
         return np.where(told, np.linalg.norm(product, axis=1), np.inf)
 
     def directions(self) -> list[tuple[float, dict[str, float]]]:

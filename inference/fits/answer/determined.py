@@ -6,7 +6,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from inference.fits.answer.counts import ranges_needed
-from inference.fits.answer.model_error import Response
 from inference.fits.answer.motion_seen import numbers_shown
 from inference.fits.answer.ranges import DECIDED, WITHIN
 from inference.fits.answer.report import describe
@@ -169,9 +168,10 @@ def refuse_if_noise_was_followed(
 def refuse_if_open(
     problem: FitProblem,
     top: Maximum,
-    at: Response,
+    facts: Information,
     wider: float,
     others: Sequence[tuple[float, Maximum]] = (),
+    whole: Information | None = None,
 ) -> None:
     """Refuse what the frames determine too badly.
 
@@ -181,12 +181,14 @@ def refuse_if_open(
         The problem.
     top : Maximum
         Its best optimum.
-    at : Response
+    facts : Information
         There.
     wider : float
         Factor on all standard deviations (`inflation`).
     others : sequence of (float, Maximum)
         Optima that are nearly as good, with their deviance above the best.
+    whole : Information, optional
+        What is told if the errors of the model are unknown; left out: it has none.
 
     Raises
     ------
@@ -194,15 +196,17 @@ def refuse_if_open(
         Where the ranges share a relative standard deviation above `LIMIT`, there or at another
         optimum as far as the intervals of 95 % reach.
     """
-    present, facts = problem.present & np.isfinite(top.positions), at.facts
+    present = problem.present & np.isfinite(top.positions)
     shared = facts.sd_of(facts.response[present])
     of_noise = wider * float(np.median(shared)) if shared.size else math.inf
-    of_model = float(np.median(at.sd_of_log_r(at.of_x)[present])) if shared.size else 0.0
-    typical = math.hypot(of_noise, of_model)
+    typical = of_noise
+    if whole is not None and shared.size:
+        all_errors = whole.sd_of(whole.response[present], whole.error_response[present])
+        typical = max(wider * float(np.median(all_errors)), of_noise)
     if not typical <= LIMIT:
         open_ones = [
             name
-            for name, item in describe(problem, top, facts, wider, of_x=at.of_x).items()
+            for name, item in describe(problem, top, facts, wider, whole=whole).items()
             if item["status"] != "identified"
         ]
         if of_noise <= LIMIT:

@@ -1,8 +1,7 @@
 """From optima of the likelihood of all frames to a result, or to a refusal."""
 
-import dataclasses
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +15,10 @@ from inference.fits.answer.determined import (
     refuse_if_undetermined,
 )
 from inference.fits.answer.inflation import inflation, shift_of
-from inference.fits.answer.model_error import Response, response_of
 from inference.fits.answer.profile_scan import profile_scan
 from inference.fits.answer.ranges import DECIDED, WITHIN, Answer, frame_ranges
 from inference.fits.answer.report import describe, fit_report, spoiled
+from inference.fits.likelihood.erring import erring_maxima, softened
 from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.maximum import Maximum, maximum_from
 from inference.fits.likelihood.problem import FitProblem, fit_problem
@@ -30,6 +29,10 @@ from simulator.errors import RefusedError
 __all__ = ["likelihood_answer", "likelihood_answer_from"]
 
 _WALKS = 3  # that may meet a better optimum than the last
+_NO_LIKELIHOOD = (
+    "no values of the unknowns give the readings a likelihood that can be computed; check gain, "
+    "noise and range_m"
+)
 
 
 def likelihood_answer_from(name: str, task: Task, values: dict[str, float]) -> TechniqueResult:
@@ -55,7 +58,8 @@ def likelihood_answer_from(name: str, task: Task, values: dict[str, float]) -> T
     x = problem.coordinates(np.array([[values[path] for path in problem.names]]))[0]
     if not np.isfinite(x).all():
         raise RefusedError("the best fit is no object: a size or reflectance is not positive")
-    return likelihood_answer(name, problem, [maximum_from(problem, x)], state)
+    climbed = softened(problem) if problem.erring else (problem,)
+    return likelihood_answer(name, problem, [maximum_from(one, x) for one in climbed], state)
 
 
 def likelihood_answer(
@@ -86,10 +90,9 @@ def likelihood_answer(
     """
     optima = [optimum for optimum in found if np.isfinite(optimum.deviance)]
     if not optima:
-        raise RefusedError(
-            "no values of the unknowns give the readings a likelihood that can be computed; check "
-            "gain, noise and range_m"
-        )
+        raise RefusedError(_NO_LIKELIHOOD)
+    if problem.erring:
+        return _erring_answer(name, problem, optima, state)
     scanned: list[Maximum] = []
     walked: list[Maximum] = []
     for walk in range(_WALKS + 1):
@@ -114,18 +117,14 @@ def likelihood_answer(
     for point in points:
         reach = np.sqrt(max(point.deviance - top.deviance, WITHIN))
         wider = max(wider, shift_of(problem, top, facts, point) / reach)
-    at = response_of(problem, top.x, top.positions)
-    others = [(_excess(problem, one, top, at), one) for one in optima[1:]]
-    refuse_if_open(problem, top, at, wider, others)
-    best = Answer(top.x, 0.0, wider * facts.factor, at.of_x)
-    undecided = [Answer(one.x, excess) for excess, one in others if excess <= DECIDED]
-    other = [
-        dataclasses.replace(one, deviance=top.deviance + excess)
-        for excess, one in others
-        if excess <= DECIDED
-    ]
-    report = fit_report(problem, optima, at, wider)
-    parameters = describe(problem, top, facts, wider, [*other, *points], at.of_x)
+    residual, facts = residuals_and_information(problem, top.x, top.positions)
+    others = [(one.deviance - top.deviance, one) for one in optima[1:]]
+    refuse_if_open(problem, top, facts, wider, others)
+    best = Answer(top.x, 0.0, wider * facts.factor)
+    near = [(excess, one) for excess, one in others if excess <= DECIDED]
+    undecided = [Answer(one.x, excess) for excess, one in near]
+    report = fit_report(problem, optima, float(np.square(residual).sum()), facts.rank, wider)
+    parameters = describe(problem, top, facts, wider, [*(one for _, one in near), *points])
     points += [one for one in walked if one.deviance - top.deviance <= DECIDED]
     return frame_ranges(
         name,
@@ -138,11 +137,27 @@ def likelihood_answer(
     )
 
 
-def _excess(problem: FitProblem, other: Maximum, top: Maximum, at: Response) -> float:
-    """Return the deviance of an optimum above the best that errors of the model do not explain."""
-    excess = other.deviance - top.deviance
-    if at.exact:
-        return excess
-    there = response_of(problem, other.x, other.positions)
-    whole = float(np.square(there.residual).sum() - np.square(at.residual).sum())
-    return max(excess - whole + there.chi_square - at.chi_square, 0.0)
+def _erring_answer(
+    name: str, problem: FitProblem, starts: Sequence[Maximum], state: NDArray[np.uint8]
+) -> TechniqueResult:
+    """Build the result where the model errs."""
+    found = erring_maxima(problem, starts)
+    if not found:
+        raise RefusedError(_NO_LIKELIHOOD)
+    top = found[0]
+    _, facts = residuals_and_information(top.clean, top.x, top.positions)
+    refuse_if_undetermined(top.clean, top, facts)
+    wider = math.hypot(1.0, off_the_top(top))
+    refuse_if_open(top.clean, top, top.facts, wider, whole=top.whole)
+    near = [one for one in found[1:] if one.deviance - top.deviance <= DECIDED]
+    report = fit_report(problem, found, top.chi_square, facts.rank, wider)
+    parameters = describe(top.clean, top, top.facts, wider, near, top.whole)
+    return frame_ranges(
+        name,
+        problem,
+        [Answer(top.x, 0.0, erring=top, wider=wider)],
+        state,
+        spoiled(parameters, report) if report["misfit"] else parameters,
+        report,
+        [(one.deviance - top.deviance, one.positions) for one in near],
+    )

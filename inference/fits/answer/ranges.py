@@ -5,6 +5,7 @@ decides between modes and between optima of the fit. What the decision leaves st
 """
 
 import dataclasses
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import SdParts, Status, TechniqueResult
-from inference.fits.answer.model_error import response_of
+from inference.fits.likelihood.erring import Erring, moved_by_errors
 from inference.fits.likelihood.frame_modes import MOST, frame_modes
+from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.problem import FitProblem
 from inference.realtime.net import ABSENT, COMMON_REASONS, SATURATED
 
@@ -51,14 +53,19 @@ class Answer:
     covariance_factor : ndarray, shape (d, m), optional
         F with F F^T the covariance of the coordinates; left out: that of the fit's information.
     of_x : ndarray, shape (d, k), optional
-        Change of the coordinates with errors of the model; left out: that of the likelihood's
-        optimum.
+        Change of the coordinates with errors of the model, where a linear fit follows them.
+    erring : Erring, optional
+        Where the model errs: the maximum, which then stands for the covariance.
+    wider : float
+        Factor on what frames share there.
     """
 
     x: Array
     excess: float
     covariance_factor: Array | None = None
     of_x: Array | None = None
+    erring: Erring | None = None
+    wider: float = 1.0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -91,32 +98,48 @@ def _modes(problem: FitProblem, answers: Sequence[Answer]) -> tuple[_Modes, Arra
     columns: list[tuple[Array, ...]] = []
     chi_square = np.empty(0)
     for answer in answers:
-        u, deviance = frame_modes(problem, answer.x)
-        noise, told, model = np.full((3, *u.shape), np.nan)
-        factor, of_x = answer.covariance_factor, answer.of_x
+        erring, factor = answer.erring, answer.covariance_factor
+        u, deviance = frame_modes(problem if erring is None else erring.clean, answer.x)
+        noise, told, model, squares = np.full((4, *u.shape), np.nan)
         for k in range(MOST):
             if k > 0 and not np.isfinite(u[:, k]).any():
                 break
-            at = response_of(problem, answer.x, u[:, k])
-            # of all frames at once where each has its best range
-            factor = at.facts.factor if factor is None else factor
-            of_x = at.of_x if of_x is None else of_x
-            with np.errstate(invalid="ignore"):
-                shared = np.square(at.facts.response @ factor).sum(axis=1)
-                noise[:, k] = np.sqrt(at.facts.own_variance)
-                told[:, k] = np.sqrt(at.facts.own_variance + shared)
-                model[:, k] = at.sd_of_log_r(of_x)
-            if not at.exact:
-                # another mode is one while all other frames, and so x, stay as they are
-                deviance[:, k] -= at.taken_of_frames(of_x if k == 0 else 0.0 * of_x)
-            if not columns and k == 0:
-                chi_square = at.chi_square_of_frames(of_x)
+            if erring is None:
+                residual, facts = residuals_and_information(problem, answer.x, u[:, k])
+                factor = facts.factor if factor is None else factor
+                noise[:, k], model[:, k] = np.sqrt(facts.own_variance), 0.0
+                shared = np.linalg.norm(facts.response @ factor, axis=1)
+                square = np.square(residual).sum(axis=1)
+                if answer.of_x is not None and answer.of_x.size:
+                    # another mode is one while all other frames, and so x, stay as they are
+                    of_x = answer.of_x if k == 0 else 0.0 * answer.of_x
+                    before = square
+                    model[:, k], square = moved_by_errors(problem, answer.x, u[:, k], of_x)
+                    deviance[:, k] -= before - square
+            else:
+                noise[:, k], shared, whole, square = erring.at_ranges(u[:, k])
+                with np.errstate(invalid="ignore"):
+                    known = np.square(noise[:, k]) + np.square(shared)
+                    model[:, k] = np.sqrt(np.maximum(np.square(whole) - known, 0.0))
+                shared = answer.wider * shared
+                model[:, k] *= answer.wider
+                deviance[:, k] = np.where(np.isfinite(u[:, k]), square, np.inf)
+            told[:, k] = np.hypot(noise[:, k], shared)
+            squares[:, k] = square
+        if erring is not None:  # another mode may be the best once the errors are allowed for
+            order = np.argsort(deviance, axis=1, kind="stable")
+            turn = functools.partial(np.take_along_axis, indices=order, axis=1)
+            u, deviance, noise, told, model, squares = map(
+                turn, (u, deviance, noise, told, model, squares)
+            )
+        if not columns:
+            chi_square = squares[:, 0]
         # the other frames are as they are: a worse mode of this one costs what it costs here
         with np.errstate(invalid="ignore"):
             excess = answer.excess + deviance - deviance[:, :1]
         columns.append((u, noise, told, model, np.where(np.isnan(excess), np.inf, excess)))
-    whole = (np.concatenate(parts, axis=1) for parts in zip(*columns, strict=True))
-    return _Modes(*whole), chi_square
+    joined = (np.concatenate(parts, axis=1) for parts in zip(*columns, strict=True))
+    return _Modes(*joined), chi_square
 
 
 def _merged(u: Array, sd: Array, excess: Array) -> tuple[list[int], bool]:

@@ -8,7 +8,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inference.fits.answer.model_error import Response
 from inference.fits.answer.ranges import WITHIN
 from inference.fits.likelihood.maximum import Maximum
 from inference.fits.likelihood.problem import FitProblem
@@ -29,7 +28,7 @@ def describe(
     facts: Information,
     wider: float = 1.0,
     undecided: Sequence[Maximum] = (),
-    of_x: Array | None = None,
+    whole: Information | None = None,
 ) -> dict[str, Any]:
     """Return value, standard deviation and status of every unknown.
 
@@ -47,8 +46,8 @@ def describe(
         Other values that are not decided against: standard deviations are widened until such
         values lie as far out as their deviance says, or in the interval of 95 % if that reaches
         them.
-    of_x : ndarray, shape (d, k), optional
-        Change of the coordinates with errors of the model; left out: none.
+    whole : Information, optional
+        What is told if the errors of the model are unknown; left out: it has none.
 
     Returns
     -------
@@ -59,8 +58,11 @@ def describe(
     functionals = problem.chain(top.x)[problem.slots] * problem.units[:, None]
     sds = wider * facts.sd_of(functionals)
     values = problem.natural(top.x)
-    model = np.linalg.norm(functionals @ of_x, axis=1) if of_x is not None else np.zeros(len(sds))
-    sds = np.hypot(sds, model)
+    model = np.zeros_like(sds)
+    if whole is not None:
+        all_errors = np.square(wider * whole.sd_of(functionals))
+        model = np.sqrt(np.maximum(all_errors - np.square(sds), 0.0))
+        sds = np.hypot(sds, model)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         ratios = sds / np.abs(values)
         for other in undecided:
@@ -167,7 +169,7 @@ def entries(
 
 
 def fit_report(
-    problem: FitProblem, optima: Sequence[Maximum], at: Response, wider: float
+    problem: FitProblem, optima: Sequence[Maximum], chi_square: float, rank: int, wider: float
 ) -> dict[str, Any]:
     """Return how well a fit explains the frames.
 
@@ -177,8 +179,10 @@ def fit_report(
         The problem.
     optima : sequence of Maximum
         Distinct ones, the best first.
-    at : Response
-        At the best.
+    chi_square : float
+        At the best, less what errors of the model take up.
+    rank : int
+        Directions of the unknowns that the frames tell.
     wider : float
         Factor on all standard deviations (`inflation`).
 
@@ -189,7 +193,6 @@ def fit_report(
         ``p_value``, ``misfit``, ``rank``, ``widening`` and ``optima``, each with its deviance above
         the best and its values.
     """
-    chi_square = at.chi_square
     freedom = 2 * problem.present.size - int(problem.present.sum()) - len(problem)
     p_value = float(scipy.special.chdtrc(freedom, chi_square))
     return {
@@ -198,7 +201,7 @@ def fit_report(
         "degrees_of_freedom": freedom,
         "p_value": p_value,
         "misfit": p_value < FALSE_ALARM,
-        "rank": at.facts.rank,
+        "rank": rank,
         "widening": wider,
         "optima": [
             {

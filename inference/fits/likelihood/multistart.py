@@ -13,7 +13,7 @@ from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.screen import screen
 from inference.identifiability.information import Information
 
-__all__ = ["BREADTH", "find_maxima"]
+__all__ = ["BREADTH", "find_maxima", "find_starts"]
 
 Array = NDArray[np.float64]
 
@@ -61,6 +61,7 @@ _QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)  # values of each unknown that are tried
 _HELD, _RELEASED = 30, 60  # steps of a try while its unknown is held, and after that
 _FOLLOWED = 6  # of them, to the top
 _MOST = 12  # optima that are kept
+_NEAR = 3  # points near optima
 
 
 def _low_discrepancy(n: int, d: int) -> Array:
@@ -161,6 +162,36 @@ def _distinct(problem: FitProblem, optima: list[Maximum], most: int) -> list[Max
     return kept
 
 
+def _climbed(problem: FitProblem) -> tuple[list[Maximum], Array, _Effort]:
+    """Return ends of the best climbs, the best first, the screen, and the effort."""
+    order, empty = _by_light(problem)
+    chosen = np.sort(np.concatenate([_spread(order, _FRAMES), _spread(empty, 6)]))
+    few = problem.select(chosen) if chosen.size < problem.present.size else problem
+    effort = _LITTLE if len(problem) <= _EASY else _MUCH
+    starts = _starts(few, effort.points)
+    first = [approach(few, x, effort.few) for x in starts[: effort.climbs]]
+    first.sort(key=lambda optimum: optimum.deviance)
+    second = [approach(problem, optimum.x, effort.many) for optimum in first[: effort.kept]]
+    second.sort(key=lambda optimum: optimum.deviance)
+    return second, starts, effort
+
+
+def find_starts(*problems: FitProblem) -> tuple[Maximum, ...]:
+    """Find points near optima of a fit, none of them followed to the top.
+
+    Parameters
+    ----------
+    *problems : FitProblem
+        Of the same unknowns, with at least as many frames as these need.
+
+    Returns
+    -------
+    tuple of Maximum
+        Distinct ones of each problem, the best of it first.
+    """
+    return tuple(start for one in problems for start in _distinct(one, _climbed(one)[0], _NEAR))
+
+
 def find_maxima(problem: FitProblem) -> tuple[Maximum, ...]:
     """Find the optima of a fit, the best first.
 
@@ -174,15 +205,7 @@ def find_maxima(problem: FitProblem) -> tuple[Maximum, ...]:
     tuple of Maximum
         Distinct ones; empty where no starting point has any likelihood.
     """
-    order, empty = _by_light(problem)
-    chosen = np.sort(np.concatenate([_spread(order, _FRAMES), _spread(empty, 6)]))
-    few = problem.select(chosen) if chosen.size < problem.present.size else problem
-    effort = _LITTLE if len(problem) <= _EASY else _MUCH
-    starts = _starts(few, effort.points)
-    first = [approach(few, x, effort.few) for x in starts[: effort.climbs]]
-    first.sort(key=lambda optimum: optimum.deviance)
-    second = [approach(problem, optimum.x, effort.many) for optimum in first[: effort.kept]]
-    second.sort(key=lambda optimum: optimum.deviance)
+    second, starts, effort = _climbed(problem)
     last = [followed(problem, optimum) for optimum in second[: effort.polished]]
     last = _distinct(problem, last, _MOST)
     for _ in range(_WAVES if last and len(problem) > _EASY else 0):

@@ -86,6 +86,11 @@ class FitProblem:
         return len(self.names)
 
     @property
+    def erring(self) -> bool:
+        """Whether the model errs, of any object."""
+        return bool(self.present.any()) and (self.error.flux > 0 or self.error.range_m > 0)
+
+    @property
     def logarithms(self) -> NDArray[np.bool_]:
         """Which coordinates are logarithms: all but crosstalk, shape (d,)."""
         return ~np.isin(self.slots, CROSSTALK)

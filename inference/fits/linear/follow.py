@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inference.fits.answer.model_error import errors_of_readings, share_left
+from inference.fits.likelihood.model_error import errors_of_readings, share_left
 from inference.fits.likelihood.problem import fit_problem
 from inference.technique import Task
 from simulator.discrepancy import discrepancy_basis

@@ -8,9 +8,9 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.fits.answer.model_error import unexplained
 from inference.fits.answer.ranges import Answer, frame_ranges
 from inference.fits.answer.report import FALSE_ALARM, entries, with_parts
+from inference.fits.likelihood.model_error import unexplained
 from inference.fits.likelihood.problem import fit_problem
 from inference.fits.linear.follow import Follow
 from inference.fits.linear.least_squares import LinearFit

@@ -16,13 +16,15 @@ __all__ = ["ITERATIVE_BACKGROUND_CANCELLING", "ITERATIVE_DIFFERENTIAL", "JOINT_F
 def _solve_as(name: str, task: Task) -> TechniqueResult:
     # imported where a fit is asked for: plans of single frames go without
     from inference.fits.answer.likelihood_answer import likelihood_answer
-    from inference.fits.likelihood.multistart import find_maxima
+    from inference.fits.likelihood.erring import softened
+    from inference.fits.likelihood.multistart import find_maxima, find_starts
     from inference.fits.likelihood.problem import fit_problem
 
     state = rule_out(task.sensor, task.frames)
     frames = task.frames.select(state != SATURATED)
     problem = fit_problem(task.sensor, task.scene, frames, exact=task.exact)
-    return likelihood_answer(name, problem, find_maxima(problem), state)
+    found = find_starts(*softened(problem)) if problem.erring else find_maxima(problem)
+    return likelihood_answer(name, problem, found, state)
 
 
 def _differential_obstacle(

@@ -1,0 +1,87 @@
+"""What smooth errors of the model do to the readings of a fit (docs/model.md, fit-response)."""
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from inference.fits.likelihood.problem import FitProblem
+from inference.frame.delayed import delayed
+from simulator.discrepancy import NEGLECTED, discrepancy_basis
+
+__all__ = ["errors_of_readings", "share_left", "unexplained"]
+
+Array = NDArray[np.float64]
+
+
+def unexplained(residual: Array, errors: Array, moved: Array, share: float) -> float:
+    """Return the sum of squares that errors of the model do not take up.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (m,)
+        Of unit variance.
+    errors : ndarray, shape (m, k)
+        Its derivatives along independent standard normal errors.
+    moved : ndarray, shape (m, d)
+        Along all that the fit is free to follow with.
+    share : float
+        From `share_left`.
+    """
+    m, count = errors.shape
+    moved = moved / np.maximum(np.linalg.norm(moved, axis=0), np.finfo(float).tiny)
+    prior = np.eye(count, count + moved.shape[1])
+    rows = np.concatenate([np.concatenate([errors, moved], axis=1), prior])
+    target = np.append(residual, np.zeros(count))
+    left = target - rows @ scipy.linalg.lstsq(rows, target)[0]
+    rest = float(left @ left)
+    taken = max(float(residual @ residual) - rest, 0.0) / max(m, 1)
+    return float(rest / (1.0 + share * taken))
+
+
+def errors_of_readings(
+    problem: FitProblem, light: Array, positions: Array, slopes: Array | None = None
+) -> Array:
+    """Return how readings change with errors of the model.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    light : ndarray, shape (n, 2)
+        The object's part of the readings.
+    positions : ndarray, shape (n,)
+        log r; nan without an object.
+    slopes : ndarray, shape (n, 2), optional
+        Derivative of ``light`` along log r: what is asked for is that of the change.
+
+    Returns
+    -------
+    ndarray, shape (n, 2, k)
+        Along independent standard normal errors, in the unit of ``light``.
+    """
+    present = np.isfinite(positions)
+    basis = discrepancy_basis(*problem.parameters.reach_m)
+    at = np.where(present, positions, 0.0)
+    functions = np.where(present[:, None], basis.values(at), 0.0)
+    if slopes is None:
+        return _moved(problem, light, positions, functions)
+    steep = np.where(present[:, None], basis.slopes(at), 0.0)
+    moved = _moved(problem, slopes, positions, functions)
+    return moved + _moved(problem, light, positions, steep)
+
+
+def _moved(problem: FitProblem, light: Array, positions: Array, functions: Array) -> Array:
+    """Return light of which flux and effective distance err by functions, shape (n, 2, k)."""
+    late = delayed(light, positions, problem.instrument.r0, problem.instrument.wave)
+    parts = [problem.error.flux * light, problem.error.range_m * late]
+    return np.concatenate([part[:, :, None] * functions[:, None, :] for part in parts], axis=2)
+
+
+def share_left(problem: FitProblem, positions: Array) -> float:
+    """Return the share of what errors take up of a chi-square that may be left besides.
+
+    They are followed to first order, so that what is left of their size is that size again
+    (relative, at the nearest range), and by functions that leave out a part of them.
+    """
+    nearest = float(np.exp(np.nanmin(positions)))
+    return float(problem.error.flux**2 + (problem.error.range_m / nearest) ** 2 + NEGLECTED)
