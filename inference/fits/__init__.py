@@ -1,1 +1,1 @@
-"""Estimators over many frames: everything unknown fitted at once, ranges eliminated, no priors."""
+"""Estimators over many frames: everything unknown fitted at once, ranges eliminated."""

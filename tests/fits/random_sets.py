@@ -47,7 +47,9 @@ class RandomSet:
     simulation: Simulation
 
 
-def random_set(name: str, kind: str, seed: int, discrepancy: object = 0) -> RandomSet:
+def random_set(
+    name: str, kind: str, seed: int, discrepancy: object = 0, errors: object = 0
+) -> RandomSet:
     """Draw a data set: object, ranges, noise, and what stands before and behind.
 
     Parameters
@@ -61,7 +63,9 @@ def random_set(name: str, kind: str, seed: int, discrepancy: object = 0) -> Rand
     seed : int
         Of all that is random.
     discrepancy : object
-        What the scene says of its model's error; the readings have none.
+        What the scene says of its model's error.
+    errors : object
+        Those of the readings, as a scene states them.
     """
     rng = np.random.default_rng(seed)
     c0 = math.exp(rng.normal(math.log(0.08), 0.8))
@@ -105,7 +109,7 @@ def random_set(name: str, kind: str, seed: int, discrepancy: object = 0) -> Rand
     if name == "everything" and rng.random() < 0.5:
         present[-3:] = False
     trajectory = SampledTrajectory(range_m=ranges.tolist(), object_present=present.tolist())
-    simulation = simulate(sensor, parse_scene(truth), trajectory, seed)
+    simulation = simulate(sensor, parse_scene({**truth, "discrepancy": errors}), trajectory, seed)
     return RandomSet(sensor, parse_scene(scene), truth, simulation)
 
 

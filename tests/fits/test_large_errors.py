@@ -1,6 +1,45 @@
 """Errors of the model that are far larger than the noise."""
 
+import numpy as np
+import pytest
+
 import hybridtof
+from simulator.model_error import ModelError
+from tests.fits.random_sets import random_set
+
+_DEFAULT = ModelError.stated(None)
+
+
+@pytest.mark.parametrize(
+    ("name", "seeds"), [("free shadow", (2, 7, 9, 11, 13, 15)), ("everything", (1, 5, 13))]
+)
+def test_intervals_by_default_hold_the_truth_behind_errors_of_the_default(
+    name: str, seeds: tuple[int, ...]
+) -> None:
+    """Fits of these sets that take their model for exact end up to 6 standard deviations off.
+
+    The frames of a set share their errors: a median of |z| is above 3.3 in 1e-3 of sets, and the
+    mean square of the medians of all is above 3 in 1e-3.
+    """
+    errors = {"flux": _DEFAULT.flux, "range_m": _DEFAULT.range_m}
+    medians = []
+    for seed in seeds:
+        one = random_set(name, "pulsed", seed, "default", errors)
+        answer = hybridtof.estimate(one.sensor, one.scene, one.simulation.frames, ["joint_fit"])
+        (result,) = answer.results
+        assert result.fit is not None
+        assert not result.fit["misfit"]
+        assert result.sd_parts_m is not None
+        squares = sum(part**2 for part in result.sd_parts_m)
+        # other ends of the search widen what frames share
+        np.testing.assert_allclose(squares, result.roots_sd_m**2, rtol=1e-9)
+        misses = np.abs(result.range_m - one.simulation.range_m) / result.sd_m
+        assert np.isfinite(misses).sum() > 10
+        # and no interval is as wide as it was: a fifth of the range and more
+        assert np.nanmedian(result.sd_m / result.range_m) < 0.2
+        medians.append(float(np.nanmedian(misses)))
+    assert max(medians) < 3.3
+    assert np.mean(np.square(medians)) < 3.0
 
 
 def test_a_frame_without_late_light_beside_frames_of_little_noise_is_answered() -> None:

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import SdParts, Status, TechniqueResult
-from inference.fits.likelihood.erring import Erring, moved_by_errors
+from inference.fits.likelihood.erring import Erring
+from inference.fits.likelihood.erring_point import moved_by_errors
 from inference.fits.likelihood.frame_modes import MOST, frame_modes
 from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.problem import FitProblem

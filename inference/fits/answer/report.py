@@ -138,9 +138,10 @@ def entries(
 ) -> dict[str, Any]:
     """Return value, standard deviation and status of unknowns that were fitted.
 
-    The fit uses no prior, but `inference.identifiability.status` tells by how much it would narrow
-    the prior that the scene states, or that is its default: identified where what is left is less
-    than 0.2 of the prior's standard deviation, weak up to 0.7, not_identified beyond.
+    Of an exact model the fit uses no prior, but `inference.identifiability.status` tells by how
+    much it would narrow the prior that the scene states, or that is its default: identified
+    where what is left is less than 0.2 of the prior's standard deviation, weak up to 0.7,
+    not_identified beyond.
 
     Parameters
     ----------

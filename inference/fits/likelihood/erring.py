@@ -11,34 +11,39 @@ frame, which bounds how sharp the likelihood is, whatever the noise.
 import dataclasses
 import math
 from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inference.fits.likelihood.arguments import CROSSTALK, SLOTS
-from inference.fits.likelihood.linearisation import whitened_slopes
+from inference.fits.likelihood.erring_point import (
+    Point,
+    columns_of,
+    left_of_frames,
+    linearised,
+    point_at,
+    slopes_of_priors,
+    standard,
+    whitened_of,
+)
 from inference.fits.likelihood.maximum import Maximum
-from inference.fits.likelihood.model_error import errors_of_readings, share_left
+from inference.fits.likelihood.model_error import errors_of_readings
 from inference.fits.likelihood.problem import FitProblem
-from inference.frame.sensitivity import Value
 from inference.identifiability.elimination import eliminate
 from inference.identifiability.information import Information
 
-__all__ = ["Erring", "erring_maxima", "moved_by_errors", "softened"]
+__all__ = ["Erring", "erring_maxima", "softened"]
 
 Array = NDArray[np.float64]
 
 _RELATIVE = 0.03  # independent error of the signal that stands for a smooth one in a search
 _OF_LIGHT = (1e-2, 1e-3)  # of the light of a middling frame, for an error of its direction
-_STEPS = 60
+_FEW, _STEPS = 6, 60  # steps of every climb, and of the best of them
+_KEPT = 4
 _INWARD = 1.5  # standard deviations of the priors that a second start is held within
-_FARTHEST = 30.0  # of them, beyond which no slope is
 _LONGEST = 0.7  # change of a logarithm in a step
 _TURNS = 2  # in which ranges and errors settle at given unknowns
 _ENOUGH = 1e-3  # of what is gained by a step
-_DIFFERENCE = 1e-4
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -80,45 +85,31 @@ class Erring(Maximum):
             frames leave them.
         """
         problem = self.clean
-        residual, jacobian, along, errors, _ = _linearised(problem, self.x, u)
+        residual, jacobian, along, errors, _ = linearised(problem, self.x, u)
         own = eliminate(problem.names, jacobian, along)
         of_x, of_errors = self.whole.factors
         free = jacobian @ of_x + errors @ of_errors
         parts = np.concatenate([jacobian, along[:, :, None], errors], axis=2)
-        white, d = _whitened(problem, u, errors, parts), self.x.size
+        white, d = whitened_of(problem, u, errors, parts), self.x.size
         seen = eliminate(problem.names, white[:, :, :d], white[:, :, d], white[:, :, d + 1 :])
         shared = np.linalg.norm(seen.response @ of_x + seen.error_response @ of_errors, axis=1)
         return (
             np.sqrt(own.own_variance),
             np.linalg.norm(own.response @ self.facts.factor, axis=1),
             np.sqrt(seen.own_variance + np.square(shared)),
-            _left_of_frames(problem, u, residual, along, errors, free),
+            left_of_frames(problem, u, residual, along, errors, free),
         )
 
 
-class _Point(NamedTuple):
-    """Unknowns, ranges and errors, and the readings linearised there; whitened."""
-
-    x: Array
-    u: Array
-    a: Array
-    z: Array
-    deviance: float
-    residual: Array
-    jacobian: Array
-    along: Array
-    errors: Array
-
-
 def softened(problem: FitProblem) -> tuple[FitProblem, ...]:
-    """Return problems whose optima are where to look for those of a model that errs.
+    """Return problems whose optima are where to look for those of a model that errs, itself too.
 
     Parameters
     ----------
     problem : FitProblem
         The problem.
     """
-    return tuple(_softened(problem, share) for share in _OF_LIGHT)
+    return *(_softened(problem, share) for share in _OF_LIGHT), problem
 
 
 def _softened(problem: FitProblem, share: float) -> FitProblem:
@@ -144,137 +135,34 @@ def erring_maxima(problem: FitProblem, starts: Iterable[Maximum]) -> list[Erring
     Returns
     -------
     list of Erring
-        One for each start, the best first.
+        Ends of the best climbs, the best first.
     """
-    found = []
-    for start in starts:
-        if not np.isfinite(start.deviance):
-            continue
-        for x in (start.x, _held_within_priors(problem, start.x)):
-            best = _climbed(problem, x, start.positions) if np.isfinite(x).all() else None
-            if best is not None:
-                found.append(best)
-    return sorted(found, key=lambda one: one.deviance)
-
-
-def moved_by_errors(problem: FitProblem, x: Array, u: Array, of_x: Array) -> tuple[Array, Array]:
-    """Return what errors of the model do to ranges if the unknowns follow them as is given.
-
-    Parameters
-    ----------
-    problem : FitProblem
-        The problem.
-    x, u : ndarray, shape (d,), (n,)
-        Coordinates, and log r.
-    of_x : ndarray, shape (d, k)
-        Change of the coordinates with every error.
-
-    Returns
-    -------
-    (ndarray, ndarray), shape (n,)
-        Standard deviation of log r, and chi-square of every frame with the errors allowed for.
-    """
-    residual, jacobian, along, errors, _ = _linearised(problem, x, u)
-    seen = eliminate(problem.names, jacobian, along, errors)
-    model = np.linalg.norm(seen.response @ of_x - seen.error_response, axis=1)
-    more = errors - jacobian @ of_x
-    return model, _left_of_frames(problem, u, residual, along, errors, more)
-
-
-def _columns(problem: FitProblem) -> list[int]:
-    return [problem.parameters.names.index(name) for name in problem.names]
-
-
-def _standard(problem: FitProblem, points: Array) -> Array:
-    """Return coordinates as standard normal ones of the priors, shape (m, d)."""
-    columns = _columns(problem)
-    natural = np.empty_like(points)
-    natural[:, columns] = [problem.natural(x) for x in points]
-    with np.errstate(all="ignore"):
-        z = problem.parameters.standard(natural)[:, columns]
-    return np.clip(np.nan_to_num(z, nan=_FARTHEST), -_FARTHEST, _FARTHEST)
+    begun = [
+        _climbed(problem, _begun(problem, x, start.positions), _FEW)
+        for start in starts
+        for x in (start.x, _held_within_priors(problem, start.x))
+        if np.isfinite(x).all() and np.isfinite(start.deviance)
+    ]
+    begun.sort(key=lambda end: end[0].deviance)
+    ends = [_climbed(problem, at, _STEPS) for at, _ in begun[:_KEPT] if math.isfinite(at.deviance)]
+    ends.sort(key=lambda end: end[0].deviance)
+    return [_told(problem, at, remaining) for at, remaining in ends]
 
 
 def _held_within_priors(problem: FitProblem, x: Array) -> Array:
-    columns = _columns(problem)
+    columns = columns_of(problem)
     z = np.zeros((1, len(columns)))
-    z[0, columns] = np.clip(_standard(problem, x[None]), -_INWARD, _INWARD)
+    z[0, columns] = np.clip(standard(problem, x[None]), -_INWARD, _INWARD)
     return np.asarray(problem.coordinates(problem.parameters.natural(z)[:, columns])[0])
 
 
-def _slopes_of_priors(problem: FitProblem, x: Array) -> Array:
-    around = np.vstack([x, x + _DIFFERENCE * np.eye(x.size)])
-    z = _standard(problem, around)
-    return np.asarray((z[1:] - z[0]).T / _DIFFERENCE)
-
-
-def _linearised(problem: FitProblem, x: Array, u: Array) -> tuple[Array, ...]:
-    """Return residuals, derivatives along unknowns, log r and errors, and from readings to noise.
-
-    All but the last in units of the noise.
-    """
-    n, values = u.size, problem.values(x)
-    by_value, along, residual = np.empty((n, 2, SLOTS)), np.empty((n, 2)), np.empty((n, 2))
-    fit = problem.kernel_fit()
-    whitened_slopes(by_value, along, residual, values, np.eye(SLOTS), np.ascontiguousarray(u), fit)
-    # crosstalk moves the readings themselves
-    whitener = by_value[:, :, list(CROSSTALK)]
-    signal = by_value[:, :, Value.C2] * values[Value.C2]
-    light = np.linalg.solve(whitener, signal[:, :, None])[:, :, 0]
-    errors = whitener @ errors_of_readings(problem, light, u)
-    errors = np.where(np.isnan(errors), 0.0, errors)
-    return residual, by_value @ problem.chain(x), along, errors, whitener
-
-
-def _whitened(problem: FitProblem, u: Array, errors: Array, parts: Array) -> Array:
-    """Divide by the noise and what is left of errors."""
-    left = share_left(problem, u) * np.einsum("nik,njk->nij", errors, errors)
-    # beside errors of 1e8 the noise's own 1 would be lost
-    own = 1.0 + 1e-12 * np.trace(left, axis1=1, axis2=2)
-    factor = np.linalg.cholesky(own[:, None, None] * np.eye(2) + left)
-    return np.asarray(np.linalg.solve(factor, parts))
-
-
-def _left_of_frames(
-    problem: FitProblem, u: Array, residual: Array, along: Array, errors: Array, more: Array
-) -> Array:
-    """Return chi-squares of frames across their ranges, shape (n,).
-
-    What is left of errors is allowed for, and what ``more``, shape (n, 2, m), moves.
-    """
-    move = np.where(np.isfinite(along), along, 0.0)
-    length = np.linalg.norm(move, axis=1)
-    unit = move / np.where(length > 0.0, length, 1.0)[:, None]
-    normal = np.where((length > 0.0)[:, None], np.column_stack([-unit[:, 1], unit[:, 0]]), residual)
-    size = np.linalg.norm(normal, axis=1)
-    normal = normal / np.where(size > 0.0, size, 1.0)[:, None]
-
-    def across(part: Array) -> Array:
-        return np.asarray(np.square(np.einsum("ni,nik->nk", normal, part)).sum(axis=1))
-
-    spread = 1.0 + share_left(problem, u) * across(errors) + across(more)
-    return np.asarray(across(residual[:, :, None]) / spread)
-
-
-def _point(problem: FitProblem, x: Array, u: Array, a: Array) -> _Point:
-    residual, jacobian, along, errors, _ = _linearised(problem, x, u)
-    parts = [(residual - errors @ a)[:, :, None], jacobian, along[:, :, None], errors]
-    white = _whitened(problem, u, errors, np.concatenate(parts, axis=2))
-    d = x.size
-    residual, z = white[:, :, 0], _standard(problem, x[None])[0]
-    deviance = float(np.square(residual).sum() + a @ a + z @ z)
-    deviance = deviance if math.isfinite(deviance) else math.inf
-    at = white[:, :, 1 : d + 1], white[:, :, d + 1], white[:, :, d + 2 :]
-    return _Point(x, u, a, z, deviance, residual, *at)
-
-
-def _eliminated(problem: FitProblem, at: _Point) -> Information:
+def _eliminated(problem: FitProblem, at: Point) -> Information:
     """Return rows across the ranges; of the errors, and last of the residuals."""
     errors = np.concatenate([at.errors, at.residual[:, :, None]], axis=2)
     return eliminate(problem.names, at.jacobian, at.along, errors)
 
 
-def _ranges(problem: FitProblem, at: _Point, seen: Information, dx: Array, da: Array) -> Array:
+def _ranges(problem: FitProblem, at: Point, seen: Information, dx: Array, da: Array) -> Array:
     """Return ranges that follow a step."""
     step = seen.response @ dx + seen.error_response @ np.append(da, -1.0)
     with np.errstate(invalid="ignore"):
@@ -283,7 +171,7 @@ def _ranges(problem: FitProblem, at: _Point, seen: Information, dx: Array, da: A
     return np.where(np.isfinite(at.u), np.clip(at.u + step, *np.log(problem.support)), np.nan)
 
 
-def _settled(problem: FitProblem, at: _Point) -> _Point:
+def _settled(problem: FitProblem, at: Point) -> Point:
     """Let ranges and errors follow the unknowns, which stay."""
     k = at.a.size
     for _ in range(_TURNS):
@@ -293,19 +181,23 @@ def _settled(problem: FitProblem, at: _Point) -> _Point:
         rows = np.vstack([seen.errors[:, :-1], np.eye(k)])
         da = np.linalg.lstsq(rows, np.concatenate([seen.errors[:, -1], -at.a]), rcond=None)[0]
         u = _ranges(problem, at, seen, np.zeros(at.x.size), da)
-        at = _point(problem, at.x, u, at.a + da)
+        at = point_at(problem, at.x, u, at.a + da)
     return at
 
 
-def _climbed(problem: FitProblem, x: Array, positions: Array) -> Erring | None:
-    """Climb by Levenberg-Marquardt steps of the unknowns, ranges and errors following."""
+def _begun(problem: FitProblem, x: Array, positions: Array) -> Point:
     u = np.where(problem.present & np.isnan(positions), math.log(problem.support[1]), positions)
     k = errors_of_readings(problem, np.ones((u.size, 2)), u).shape[2]
-    at = _settled(problem, _settled(problem, _point(problem, x, u, np.zeros(k))))
-    damping, remaining = 1e-3, math.inf
-    for _ in range(_STEPS):
-        if not math.isfinite(at.deviance):
-            return None
+    return _settled(problem, _settled(problem, point_at(problem, x, u, np.zeros(k))))
+
+
+def _climbed(problem: FitProblem, at: Point, steps: int) -> tuple[Point, float]:
+    """Climb by Levenberg-Marquardt steps of the unknowns, ranges and errors following.
+
+    Returns also the deviance that a whole step would still gain.
+    """
+    k, damping, remaining = at.a.size, 1e-3, math.inf
+    for _ in range(steps if math.isfinite(at.deviance) else 0):
         seen, bounds = _eliminated(problem, at), problem.bounds(at.x)
         errors, seen_residual = seen.errors[:, :-1], seen.errors[:, -1]
         d = at.x.size
@@ -313,7 +205,7 @@ def _climbed(problem: FitProblem, x: Array, positions: Array) -> Erring | None:
             [
                 [errors, seen.jacobian, seen_residual[:, None]],
                 [np.eye(k), np.zeros((k, d)), -at.a[:, None]],
-                [np.zeros((d, k)), _slopes_of_priors(problem, at.x), -at.z[:, None]],
+                [np.zeros((d, k)), slopes_of_priors(problem, at.x), -at.z[:, None]],
             ]
         )
         triangle = scipy.linalg.qr(rows, mode="r")[0]
@@ -330,7 +222,7 @@ def _climbed(problem: FitProblem, x: Array, positions: Array) -> Erring | None:
             dx = new - at.x
             left = triangle[:k, -1] - triangle[:k, k:-1] @ dx
             da = np.linalg.lstsq(triangle[:k, :k], left, rcond=None)[0]
-            there = _point(problem, new, _ranges(problem, at, seen, dx, da), at.a + da)
+            there = point_at(problem, new, _ranges(problem, at, seen, dx, da), at.a + da)
             there = _settled(problem, there)
             if there.deviance < at.deviance:
                 better = there
@@ -341,7 +233,7 @@ def _climbed(problem: FitProblem, x: Array, positions: Array) -> Erring | None:
         gained, at, damping = at.deviance - better.deviance, better, max(damping / 4.0, 1e-9)
         if gained < _ENOUGH:
             break
-    return _told(problem, at, remaining)
+    return at, remaining
 
 
 def _with_priors(facts: Information, slopes: Array) -> Information:
@@ -354,10 +246,10 @@ def _with_priors(facts: Information, slopes: Array) -> Information:
     )
 
 
-def _told(problem: FitProblem, at: _Point, remaining: float) -> Erring:
+def _told(problem: FitProblem, at: Point, remaining: float) -> Erring:
     """Return what is told at the end of a climb."""
-    _, jacobian, along, errors, whitener = _linearised(problem, at.x, at.u)
-    slopes = _slopes_of_priors(problem, at.x)
+    _, jacobian, along, errors, whitener = linearised(problem, at.x, at.u)
+    slopes = slopes_of_priors(problem, at.x)
     facts = _with_priors(eliminate(problem.names, jacobian, along), slopes)
     whole = _with_priors(eliminate(problem.names, at.jacobian, at.along, at.errors), slopes)
     frames = problem.frames.copy()
