@@ -111,7 +111,9 @@ def linearised(problem: FitProblem, x: Array, u: Array) -> tuple[Array, ...]:
 
 def whitened_of(problem: FitProblem, u: Array, errors: Array, parts: Array) -> Array:
     """Divide by the noise and what is left of errors."""
-    left = share_left(problem, u) * np.einsum("nik,njk->nij", errors, errors)
+    with np.errstate(over="ignore", invalid="ignore"):
+        left = share_left(problem, u) * np.einsum("nik,njk->nij", errors, errors)
+    left = np.where(np.isfinite(left).all(axis=(1, 2), keepdims=True), left, 0.0)
     # beside errors of 1e8 the noise's own 1 would be lost
     own = 1.0 + 1e-12 * np.trace(left, axis1=1, axis2=2)
     factor = np.linalg.cholesky(own[:, None, None] * np.eye(2) + left)
@@ -146,7 +148,9 @@ def point_at(problem: FitProblem, x: Array, u: Array, a: Array) -> Point:
     white = whitened_of(problem, u, errors, np.concatenate(parts, axis=2))
     d = x.size
     residual, z = white[:, :, 0], standard(problem, x[None])[0]
-    deviance = float(np.square(residual).sum() + a @ a + z @ z)
-    deviance = deviance if math.isfinite(deviance) else math.inf
     at = white[:, :, 1 : d + 1], white[:, :, d + 1], white[:, :, d + 2 :]
+    with np.errstate(over="ignore", invalid="ignore"):
+        deviance = float(np.square(residual).sum() + a @ a + z @ z)
+        known = math.isfinite(deviance + float(np.abs(at[0]).sum() + np.abs(at[2]).sum()))
+    deviance = deviance if known else math.inf
     return Point(x, u, a, z, deviance, residual, *at)
