@@ -7,8 +7,10 @@ from typing import Any, TypeVar
 import numba
 from numba import extending, types
 from numba.core import caching
+from numba.core.sigutils import normalize_signature
 
-from simulator.kernel_cache import CacheFolder
+from simulator.compile_lock import turn
+from simulator.kernel_cache import CacheFolder, base_folder
 
 __all__ = ["dispatcher", "is_none", "overload", "unliteral"]
 
@@ -94,4 +96,20 @@ def dispatcher(
     made.targetoptions.update(hidden)
     if folder is not None:
         made._cache = _Cache(function, *folder)
+        if folder.writable:
+            _in_turn(made, f"{folder.path.name}/{function.__qualname__}")
     return made
+
+
+def _in_turn(made: Any, name: str) -> None:
+    """Let a dispatcher wait for the process that compiles the same, and load what that has kept."""
+    compile_now, base = made.compile, base_folder()
+
+    def compile_in_turn(signature: Any) -> Any:
+        types_of, _ = normalize_signature(signature)
+        if base is None or tuple(types_of) in made.overloads:
+            return compile_now(signature)
+        with turn(base.path, f"{name}{types_of}"):
+            return compile_now(signature)
+
+    made.compile = compile_in_turn

@@ -200,7 +200,8 @@ def test_machine_code_is_kept_where_it_can_be_and_used_from_a_copy_that_is_read_
 ) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "first"))
     assert simulator.compiled.compiled(half)(3.0) == 1.5
-    assert {Path(name).suffix for name in kept_in(tmp_path / "first")} == {".nbi", ".nbc"}
+    kinds = {Path(name).suffix for name in kept_in(tmp_path / "first")}
+    assert kinds == {".nbi", ".nbc", ".lock"}
     shutil.copytree(tmp_path / "first", tmp_path / "copy", copy_function=shutil.copyfile)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "copy"))
     # as it is for one who may not write: the superuser may in any case
