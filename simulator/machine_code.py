@@ -6,8 +6,7 @@ from typing import Any, TypeVar
 
 import numba
 from numba import extending, types
-from numba.core import caching
-from numba.core.sigutils import normalize_signature
+from numba.core import caching, sigutils
 
 from simulator.compile_lock import turn
 from simulator.kernel_cache import CacheFolder, base_folder
@@ -20,6 +19,7 @@ _njit: Any = numba.njit
 _FunctionCache: Any = caching.FunctionCache
 _CacheLocator: Any = caching._CacheLocator
 _CacheImpl: Any = caching.CompileResultCacheImpl
+_normalized: Any = sigutils.normalize_signature
 
 _overload: Any = extending.overload
 unliteral: Any = types.unliteral
@@ -106,7 +106,7 @@ def _in_turn(made: Any, name: str) -> None:
     compile_now, base = made.compile, base_folder()
 
     def compile_in_turn(signature: Any) -> Any:
-        types_of, _ = normalize_signature(signature)
+        types_of, _ = _normalized(signature)
         if base is None or tuple(types_of) in made.overloads:
             return compile_now(signature)
         with turn(base.path, f"{name}{types_of}"):
