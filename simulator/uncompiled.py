@@ -16,6 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from simulator.by_arrays import by_arrays
+
 __all__ = ["NotSoError", "free", "kind_of", "reach", "run", "size"]
 
 _Float = np.float64
@@ -196,7 +198,8 @@ def twin(function: Any) -> Callable[..., Any]:
             module.__name__, {"__builtins__": __builtins__, "range": _in_time, "float": _Float}
         )
         defaults = tuple(map(_number, function.__defaults__ or ()))
-        made = FunctionType(_code(function.__code__), names, function.__name__, defaults)
+        plain = FunctionType(_code(function.__code__), names, function.__name__, defaults)
+        made = by_arrays(function, plain)
         _twins[function] = made  # before its names are looked up: kernels may call one another
         for name in _used(function.__code__):
             if name in function.__globals__ and name not in names:

@@ -5,7 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from inference.frame import modes, modes_by_arrays
 from inference.posterior import fold
 from inference.posterior.settings import SamplerSettings
 from service.warm import questions
@@ -53,3 +56,17 @@ def test_densities_and_draws(
         without.setattr(Kernel, "__call__", interpreted)
         assert answers() == machine
     assert len(asked) >= 2
+
+
+@given(
+    st.lists(
+        st.sampled_from([-math.inf, math.inf, math.nan, 0.0, 1.0, 2.0]), min_size=1, max_size=12
+    )
+)
+def test_tops_by_arrays_are_those_of_the_loop(values: list[float]) -> None:
+    loop: Any = modes._tops
+    knots = np.arange(0.0, len(values)) / 7
+    found = np.full((2, len(values) // 2 + 1, modes._COLUMNS), 9.0)
+    count = loop.__wrapped__(found[0], np.array(values), knots)
+    assert modes_by_arrays._tops(found[1], np.array(values), knots) == count
+    assert found[0].tobytes() == found[1].tobytes()
