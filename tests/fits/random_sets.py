@@ -48,7 +48,12 @@ class RandomSet:
 
 
 def random_set(
-    name: str, kind: str, seed: int, discrepancy: object = 0, errors: object = 0
+    name: str,
+    kind: str,
+    seed: int,
+    discrepancy: object = 0,
+    errors: object = 0,
+    decades: tuple[float, float] | None = None,
 ) -> RandomSet:
     """Draw a data set: object, ranges, noise, and what stands before and behind.
 
@@ -66,6 +71,8 @@ def random_set(
         What the scene says of its model's error.
     errors : object
         Those of the readings, as a scene states them.
+    decades : (float, float), optional
+        Between which the signal over the noise lies; left out: what the class is used with.
     """
     rng = np.random.default_rng(seed)
     c0 = math.exp(rng.normal(math.log(0.08), 0.8))
@@ -77,7 +84,7 @@ def random_set(
     ranges = np.exp(rng.uniform(math.log(near), math.log(far), count))
     middle = near * far
     signal = c0 * c2 / middle / (middle + c1 * math.sqrt(middle) + c0)
-    read = signal / 10 ** rng.uniform(*_NOISE.get(name, (2.0, 4.0)))
+    read = signal / 10 ** rng.uniform(*(decades or _NOISE.get(name, (2.0, 4.0))))
     timing = {"pulse_width_s": 1e-7} if kind == "pulsed" else {"frequency_hz": 1e7}
     sensor = parse_sensor({"kind": kind, **timing, "noise": {"read": [read, read]}})
     truth: dict[str, Any] = {"object": {"c0": c0, "c1": c1, "c2": c2}}

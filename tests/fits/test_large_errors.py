@@ -42,6 +42,27 @@ def test_intervals_by_default_hold_the_truth_behind_errors_of_the_default(
     assert np.mean(np.square(medians)) < 3.0
 
 
+@pytest.mark.parametrize(("kind", "decades"), [("pulsed", 6.0), ("sine_wave", 7.0)])
+def test_a_frame_that_errors_turn_into_another_range_bends_no_fit(
+    kind: str, decades: float
+) -> None:
+    """Two frames of this set have other ranges by every start near the truth.
+
+    From there no climb comes back: the best end was 42 % too far, or none was a top. A median of
+    |z| of frames that share their errors is above 3.3 in 1e-3 of sets.
+    """
+    errors = {"flux": _DEFAULT.flux, "range_m": _DEFAULT.range_m}
+    one = random_set("crosstalk", kind, 7, "default", errors, (decades, decades))
+    answer = hybridtof.estimate(one.sensor, one.scene, one.simulation.frames, ["joint_fit"])
+    (result,) = answer.results
+    assert result.fit is not None
+    assert not result.fit["misfit"]
+    misses = np.abs(result.range_m - one.simulation.range_m)
+    assert np.isfinite(misses).all()
+    assert np.median(misses / result.sd_m) < 3.3
+    assert np.median(misses / result.range_m) < 0.02
+
+
 def test_a_frame_without_late_light_beside_frames_of_little_noise_is_answered() -> None:
     """The covariance of the noise, 1, is no part of a double beside squared errors of 1e16."""
     noise = {"read": [1e-6, 1e-6], "derivative": [1e-5, 1e-5]}

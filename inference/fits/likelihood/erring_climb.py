@@ -1,0 +1,185 @@
+"""Climbs over unknowns, ranges and errors of the model (docs/model.md, fit-response)."""
+
+import math
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from inference.fits.likelihood.erring_point import (
+    Point,
+    columns_of,
+    left_of_frames,
+    point_at,
+    slopes_of_priors,
+    standard,
+)
+from inference.fits.likelihood.frame_modes import frame_modes
+from inference.fits.likelihood.model_error import errors_of_readings
+from inference.fits.likelihood.problem import FitProblem
+from inference.identifiability.elimination import eliminate
+from inference.identifiability.information import Information
+
+__all__ = ["FEW", "begun", "climbed", "held_within_priors", "with_other_ranges"]
+
+Array = NDArray[np.float64]
+
+FEW = 6  # steps of every climb
+_INWARD = 1.5  # standard deviations of the priors that a second start is held within
+_LONGEST = 0.7  # change of a logarithm in a step
+_TURNS = 2  # in which ranges and errors settle at given unknowns
+_ENOUGH = 1e-3  # of what is gained by a step
+_FAR = 36.0  # chi-square of a frame whose range may be another one
+_OF_WORST = 1e-2  # of the worst frame's, beside which others may only have followed it
+_ROUNDS = 3
+_REST = 0.75  # of the frames, whose ranges stay
+
+
+def held_within_priors(problem: FitProblem, x: Array) -> Array:
+    """Return coordinates that are nowhere far out in the priors."""
+    columns = columns_of(problem)
+    z = np.zeros((1, len(columns)))
+    z[0, columns] = np.clip(standard(problem, x[None]), -_INWARD, _INWARD)
+    return np.asarray(problem.coordinates(problem.parameters.natural(z)[:, columns])[0])
+
+
+def _eliminated(problem: FitProblem, at: Point) -> Information:
+    """Return rows across the ranges; of the errors, and last of the residuals."""
+    errors = np.concatenate([at.errors, at.residual[:, :, None]], axis=2)
+    return eliminate(problem.names, at.jacobian, at.along, errors)
+
+
+def _ranges(problem: FitProblem, at: Point, seen: Information, dx: Array, da: Array) -> Array:
+    """Return ranges that follow a step."""
+    step = seen.response @ dx + seen.error_response @ np.append(da, -1.0)
+    with np.errstate(invalid="ignore"):
+        step = np.clip(step / (1.0 + seen.own_variance), -0.5, 0.5)
+    step[~np.isfinite(step)] = 0.0
+    return np.where(np.isfinite(at.u), np.clip(at.u + step, *np.log(problem.support)), np.nan)
+
+
+def _settled(problem: FitProblem, at: Point) -> Point:
+    """Let ranges and errors follow the unknowns, which stay."""
+    k = at.a.size
+    for _ in range(_TURNS):
+        if not math.isfinite(at.deviance):
+            break
+        seen = _eliminated(problem, at)
+        rows = np.vstack([seen.errors[:, :-1], np.eye(k)])
+        da = np.linalg.lstsq(rows, np.concatenate([seen.errors[:, -1], -at.a]), rcond=None)[0]
+        u = _ranges(problem, at, seen, np.zeros(at.x.size), da)
+        at = point_at(problem, at.x, u, at.a + da)
+    return at
+
+
+def begun(problem: FitProblem, x: Array, positions: Array) -> Point:
+    """Return a start with errors that follow from it, and ranges that follow these."""
+    u = np.where(problem.present & np.isnan(positions), math.log(problem.support[1]), positions)
+    k = errors_of_readings(problem, np.ones((u.size, 2)), u).shape[2]
+    return _settled(problem, _settled(problem, point_at(problem, x, u, np.zeros(k))))
+
+
+def climbed(problem: FitProblem, at: Point, steps: int) -> tuple[Point, float]:
+    """Climb by Levenberg-Marquardt steps of the unknowns, ranges and errors following.
+
+    Returns also the deviance that a whole step would still gain.
+    """
+    k, damping, remaining = at.a.size, 1e-3, math.inf
+    for _ in range(steps if math.isfinite(at.deviance) else 0):
+        seen, bounds = _eliminated(problem, at), problem.bounds(at.x)
+        errors, seen_residual = seen.errors[:, :-1], seen.errors[:, -1]
+        d = at.x.size
+        rows = np.block(
+            [
+                [errors, seen.jacobian, seen_residual[:, None]],
+                [np.eye(k), np.zeros((k, d)), -at.a[:, None]],
+                [np.zeros((d, k)), slopes_of_priors(problem, at.x), -at.z[:, None]],
+            ]
+        )
+        triangle = scipy.linalg.qr(rows, mode="r")[0]
+        of_x, wanted = triangle[k : k + d, k:-1], triangle[k : k + d, -1]
+        size = np.linalg.norm(of_x, axis=0)
+        size = np.where(size > 0, size, 1.0)
+        remaining = float(wanted @ wanted)
+        better = None
+        for _ in range(8):
+            damped = np.vstack([of_x / size, math.sqrt(damping) * np.eye(d)])
+            step = np.linalg.lstsq(damped, np.append(wanted, np.zeros(d)), rcond=None)[0] / size
+            longest = float(np.abs(step[problem.logarithms]).max(initial=0.0))
+            new = np.clip(at.x + step * min(1.0, _LONGEST / max(longest, 1e-300)), *bounds)
+            dx = new - at.x
+            left = triangle[:k, -1] - triangle[:k, k:-1] @ dx
+            da = np.linalg.lstsq(triangle[:k, :k], left, rcond=None)[0]
+            there = point_at(problem, new, _ranges(problem, at, seen, dx, da), at.a + da)
+            there = _settled(problem, there)
+            if there.deviance < at.deviance:
+                better = there
+                break
+            damping *= 6.0
+        if better is None:
+            break
+        gained, at, damping = at.deviance - better.deviance, better, max(damping / 4.0, 1e-9)
+        if gained < _ENOUGH:
+            break
+    return at, remaining
+
+
+def _left(problem: FitProblem, at: Point) -> Array:
+    """Return chi-squares of frames across their ranges."""
+    none = np.zeros((at.u.size, 2, 1))
+    return np.nan_to_num(left_of_frames(problem, at.u, at.residual, at.along, none, none))
+
+
+def with_other_ranges(problem: FitProblem, at: Point, x: Array, positions: Array) -> Point:
+    """Climb again without frames that are far off, and give them ranges that fit what is found.
+
+    A start has the range of a frame that its unknowns prefer, which errors may turn into another
+    mode, from where no climb comes back: it bends everything else towards that frame instead.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    at : Point
+        The end of a climb.
+    x, positions : ndarray, shape (d,), (n,)
+        Its start.
+
+    Returns
+    -------
+    Point
+        Where the climb of all frames then ends; what is given where no frame is far off, or most.
+    """
+    stay, part = np.ones(at.u.size, dtype=np.bool_), at
+    left = _left(problem, at)
+    for _ in range(_ROUNDS):
+        far = left > max(_FAR, _OF_WORST * float(left.max()))
+        stay[np.flatnonzero(stay)[far]] = False
+        if not far.any() or np.count_nonzero(stay) < _REST * stay.size:
+            break
+        rest = problem.select(np.flatnonzero(stay))
+        part, _ = climbed(rest, begun(rest, x, positions[stay]), FEW)
+        left = _left(rest, part)
+    if stay.all() or np.count_nonzero(stay) < _REST * stay.size or (left > _FAR).any():
+        return at
+    others = problem.select(np.flatnonzero(~stay))
+    best, least = at.u[~stay], np.full(others.present.size, np.inf)
+    for u in frame_modes(others, part.x)[0].T:
+        if not np.isfinite(u).any():
+            break
+        u = np.where(np.isfinite(u), u, best)
+        there = _settled_ranges(others, point_at(others, part.x, u, part.a))
+        cost = np.square(there.residual).sum(axis=1)
+        best, least = np.where(cost < least, there.u, best), np.fmin(cost, least)
+    u = at.u.copy()
+    u[stay], u[~stay] = part.u, best
+    return climbed(problem, _settled(problem, point_at(problem, part.x, u, part.a)), FEW)[0]
+
+
+def _settled_ranges(problem: FitProblem, at: Point) -> Point:
+    """Let ranges follow unknowns and errors, which stay."""
+    for _ in range(_TURNS):
+        seen = _eliminated(problem, at)
+        u = _ranges(problem, at, seen, np.zeros(at.x.size), np.zeros(at.a.size))
+        at = point_at(problem, at.x, u, at.a)
+    return at
