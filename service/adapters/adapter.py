@@ -4,10 +4,15 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
+import numpy as np
+
 from simulator.errors import InvalidInputError, Problem
 from simulator.sensor import Sensor
 
 __all__ = ["Adapter", "Converted", "Settings", "converted"]
+
+# wider than any sensor's, and narrow enough that whatever is made of them is a number
+_LIMITS = {"frequency_hz": (1.0, 1e12), "period_s": (1e-12, 1e6), "read": (1e-30, 1e30)}
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -121,10 +126,11 @@ def converted(adapter: Adapter, raw: bytes, form: str, settings: Settings) -> Co
             continue
         if field.name not in adapter.settings:
             problems.append(Problem(f"/{field.name}", f"says nothing to the {adapter.title}"))
-        elif field.name in ("frequency_hz", "period_s") and not 0 < value < float("inf"):
-            problems.append(Problem(f"/{field.name}", "must be positive and finite"))
-        elif field.name == "read" and not all(0 < sd < float("inf") for sd in value):
-            problems.append(Problem("/read", "must be positive and finite"))
+        elif field.name in _LIMITS:
+            low, high = _LIMITS[field.name]
+            if not all(low <= number <= high for number in np.atleast_1d(value)):
+                message = f"must lie between {low:g} and {high:g}"
+                problems.append(Problem(f"/{field.name}", message))
     if form not in adapter.forms:
         must = ", ".join(adapter.forms)
         problems.append(Problem("/form", f"a dump of the {adapter.title} is {must}, not '{form}'"))

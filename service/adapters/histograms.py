@@ -7,7 +7,9 @@ i + j q = sum n(t) exp(2 pi j f t). Readings are counts of photons.
 """
 
 import dataclasses
+import json
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 import pydantic
@@ -31,18 +33,22 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-Count = int | float
+# photons of a bin, perhaps a mean over several histograms
+Count = Annotated[float, pydantic.Field(ge=0, le=1e15, allow_inf_nan=False)]
+Width = Annotated[float, pydantic.Field(ge=1e-15, le=1e-3)]
+Distance = Annotated[float, pydantic.Field(ge=0, le=1e9, allow_inf_nan=False)]
+_NAMED = 5  # problems of one file; the others are mostly of the same kind
 SPEED_OF_LIGHT: float = speed_of_light  # [m/s]
 
 
-class _Position(pydantic.BaseModel):
-    distance_m: float | None = None
-    zone_histograms: list[list[Count]]
+class _Position(pydantic.BaseModel, strict=True):
+    distance_m: Distance | None = None
+    zone_histograms: Annotated[list[list[Count]], pydantic.Field(min_length=1)]
 
 
-class _File(pydantic.BaseModel):
-    bin_width_s: float
-    positions: list[_Position]
+class _File(pydantic.BaseModel, strict=True):
+    bin_width_s: Width
+    positions: Annotated[list[_Position], pydantic.Field(min_length=1)]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -121,12 +127,14 @@ def read_recording(path: Path) -> Recording:
     ------
     OSError
         Where it cannot be opened.
-    InvalidInputError, MalformedError
-        As `recording_of`, naming the file, and where a position has no distance.
+    MalformedError
+        As `recording_of`, naming the file.
+    InvalidInputError
+        Where a position has no distance.
     """
     try:
         recording = recording_of(path.read_bytes())
-    except MalformedError as error:
+    except InvalidInputError as error:
         raise MalformedError(f"{path}: {error}") from None
     if np.isnan(recording.distance_m).any():
         raise InvalidInputError.at("/positions", "each must have a distance_m")
@@ -149,26 +157,42 @@ def recording_of(raw: bytes) -> Recording:
     Raises
     ------
     InvalidInputError
-        Naming the field that is missing or of the wrong type.
-    MalformedError
-        Where it is not JSON, or histograms are not all of one length.
+        Naming the field that is missing or no such number, or the histogram whose length is not
+        that of the others; where it is not JSON, the place.
     """
     try:
         file = _File.model_validate_json(raw)
     except pydantic.ValidationError as error:
-        raise InvalidInputError(*problems_of(error, None)) from None
-    shapes = {
-        (len(p.zone_histograms), len(zone)) for p in file.positions for zone in p.zone_histograms
-    }
-    if len(shapes) != 1 or next(iter(shapes))[1] < Recording.FLOOR_BINS.stop:
-        least = Recording.FLOOR_BINS.stop
-        raise MalformedError(f"histograms must have one length, {least} bins or more")
+        raise InvalidInputError(*problems_of(error, _plain(raw))[:_NAMED]) from None
+    _check_lengths(file)
     distance = np.array([p.distance_m for p in file.positions], dtype=np.float64)
     counts = np.array([p.zone_histograms for p in file.positions], dtype=np.float64).sum(axis=1)
     order = np.argsort(distance, kind="stable")
     if np.isnan(distance).any():
         order = np.arange(distance.size)
     return Recording(distance[order], counts[order], file.bin_width_s)
+
+
+def _plain(raw: bytes) -> Any:
+    """Return decoded JSON, by which pointers are found; None where it is none."""
+    try:
+        return json.loads(raw)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _check_lengths(file: _File) -> None:
+    zones = file.positions[0].zone_histograms
+    least = Recording.FLOOR_BINS.stop
+    for k, position in enumerate(file.positions):
+        at = f"/positions/{k}/zone_histograms"
+        if len(position.zone_histograms) != len(zones):
+            message = f"has {len(position.zone_histograms)} zones, position 0 has {len(zones)}"
+            raise InvalidInputError.at(at, message)
+        for j, histogram in enumerate(position.zone_histograms):
+            if len(histogram) < least or len(histogram) != len(zones[0]):
+                message = f"has {len(histogram)} bins; all must have as many, {least} or more"
+                raise InvalidInputError.at(f"{at}/{j}", message)
 
 
 def calibrate(range_m: Array, truth_m: Array) -> Calibration:

@@ -131,7 +131,9 @@ def registers_of(raw: bytes, form: str, layout: Layout) -> Registers:
     if form == ".csv":
         return _of_csv(raw, layout)
     data = raw if form == ".bin" else _of_hex(raw, layout.width)
-    if not data or len(data) % layout.width:
+    if not data:
+        raise MalformedError(f"the dump holds no frame: one has {layout.width} bytes")
+    if len(data) % layout.width:
         raise MalformedError(
             f"{len(data)} bytes are no whole number of frames of {layout.width} bytes"
         )

@@ -50,7 +50,7 @@ def dropped(registers: Registers, bad: Mapping[str, Flags]) -> tuple[Registers, 
         if rows.any():
             first = int(np.flatnonzero(rows)[0])
             notes.append(
-                f"left out {np.count_nonzero(rows)} frames, the first is {first}: {reason}"
+                f"left out {np.count_nonzero(rows)} frames, the first is frame {first}: {reason}"
             )
         out |= rows
     if out.all():
@@ -89,7 +89,7 @@ def scatter(readings: Array, step: Pair) -> Pair:
     if len(readings) < _FEWEST:
         raise RefusedError(
             f"the noise of {len(readings)} frames cannot be told from their scatter: state it "
-            f"(read), or convert {_FEWEST} frames or more"
+            f"as read (--read SD SD), or convert {_FEWEST} frames or more"
         )
     second = np.diff(readings, n=2, axis=0)
     sd = _NORMAL_MAD * np.median(np.abs(second), axis=0) / np.sqrt(6.0)

@@ -26,7 +26,7 @@ def _convert(raw: bytes, form: str, settings: Settings) -> Converted:
     if wanted not in _FORMS_OF_READINGS:
         raise InvalidInputError.at("/readings", f"must be {' or '.join(_FORMS_OF_READINGS)}")
     recording = recording_of(raw)
-    dark = np.flatnonzero(~(recording.signal.sum(axis=1) > 0))
+    dark = np.flatnonzero(recording.signal.sum(axis=1) < 1.0)
     if dark.size:
         raise RefusedError(
             f"frame {dark[0]} has no photon above its floor, so that their noise cannot be told"

@@ -124,7 +124,7 @@ def export_c(
     known = known_of(scene)
     reason = obstacle(ALL_TECHNIQUES[technique], sensor, scene, known, None)
     if reason is not None:
-        raise RefusedError(f"{technique} {reason}")
+        raise RefusedError(f"{technique}: {reason}")
     frames = Frames(readings=np.zeros((1, 2)))  # only the scene counts
     error = model_error_of(Task(sensor, scene, frames, known))
     asked = Asked(technique, sensor, scene, known, error, name, tolerance)

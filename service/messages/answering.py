@@ -1,6 +1,7 @@
 """Estimates as messages: the answer to a request that accepts one of their forms."""
 
 import json
+from collections.abc import Sequence
 
 from inference.estimate import estimate
 from inference.estimates import Estimates
@@ -20,7 +21,12 @@ __all__ = ["encode_messages", "message_answer"]
 
 
 def encode_messages(
-    message: Message, sensor: Sensor, scene: Scene, frames: Frames, estimates: Estimates
+    message: Message,
+    sensor: Sensor,
+    scene: Scene,
+    frames: Frames,
+    estimates: Estimates,
+    techniques: Sequence[str] | None = None,
 ) -> bytes:
     """Return the answers of the chosen technique, one message a frame.
 
@@ -32,6 +38,8 @@ def encode_messages(
         As they were asked of.
     estimates : Estimates
         What came of them.
+    techniques : sequence of str, optional
+        Those that were asked for, whose reasons a refusal gives; left out: all.
 
     Returns
     -------
@@ -44,7 +52,11 @@ def encode_messages(
         Where no technique has a result, with the reasons.
     """
     if estimates.chosen is None:
-        reasons = "; ".join(f"{item.name}: {item.reason}" for item in estimates.left_out)
+        reasons = "; ".join(
+            f"{item.name}: {item.reason}"
+            for item in estimates.left_out
+            if not techniques or item.name in techniques
+        )
         raise RefusedError(f"no technique serves this scene: {reasons}")
     (result,) = (r for r in estimates.results if r.technique == estimates.chosen)
     limits = limits_of(ALL_TECHNIQUES[estimates.chosen], sensor, known_of(scene))
@@ -79,4 +91,4 @@ def message_answer(request: EstimateRequest, media_type: str) -> bytes:
     sensor, scene, frames = checked_frames(request.sensor, request.scene, request.frames)
     estimates = estimate(sensor, scene, frames, request.techniques)
     form = {message.media_type: message for message in MESSAGES}[media_type]
-    return encode_messages(form, sensor, scene, frames, estimates)
+    return encode_messages(form, sensor, scene, frames, estimates, request.techniques)

@@ -124,7 +124,7 @@ def test_what_the_sensor_calls_invalid_is_left_out() -> None:
     loud = WRITERS["opt3101"](900.0, 2.0, overload=1)
     result = convert("opt3101", [good, bad, loud, loud], ".csv")
     assert len(result.columns["i"]) == 1
-    assert any("left out 2 frames, the first is 2" in line for line in result.notes)
+    assert any("left out 2 frames, the first is frame 2" in line for line in result.notes)
     pixel = WRITERS["afbr-s50"]
     statuses = {0x01: False, 0x02: False, 0x04: True, 0x08: False, 0x10: False, 0x20: True}
     written = [pixel(50.0, 1.0, status=status) for status in (0, *statuses, 0x40, 0x80)]
@@ -198,11 +198,17 @@ def test_junk_is_refused_by_name(adapter: Adapter, raw: bytes, form: str) -> Non
     assert all(np.isfinite(column).all() for column in result.columns.values())
 
 
+def histograms(*zones: list[float], width: str = "1e-10") -> bytes:
+    """Positions of one zone each."""
+    positions = [{"zone_histograms": [zone]} for zone in zones]
+    return f'{{"bin_width_s": {width}, "positions": {json.dumps(positions)}}}'.encode()
+
+
 @pytest.mark.parametrize(
     ("name", "raw", "form", "settings", "match"),
     [
         ("isl29501", b"\0" * 24, ".bin", GIVEN, "24 bytes are no whole number of frames of 23"),
-        ("isl29501", b"", ".bin", GIVEN, "0 bytes"),
+        ("isl29501", b"", ".bin", GIVEN, "holds no frame"),
         ("isl29501", b"00 11\n", ".hex", GIVEN, "line 1: has 2 bytes where a frame has 23"),
         ("isl29501", b"0g", ".hex", GIVEN, "line 1: must be pairs"),
         ("isl29501", b"i_raw\n1\n", ".csv", GIVEN, "/i_raw_exponent: is missing"),
@@ -215,11 +221,22 @@ def test_junk_is_refused_by_name(adapter: Adapter, raw: bytes, form: str) -> Non
         ("opt3101", b"i\n1\n", ".csv", GIVEN, "/q: is missing"),
         ("opt3101", b"i,q\n1,1\n", ".csv", Settings(readings="w"), "/readings: must be iq or"),
         ("opt3101", b"i,q\n1,1\n", ".csv", Settings(agc="linear"), "/agc: says nothing"),
-        ("opt3101", b"i,q\n1,1\n", ".csv", Settings(read=(0.0, 1.0)), "/read: must be positive"),
+        ("opt3101", b"i,q\n1,1\n", ".csv", Settings(read=(0.0, 1.0)), "/read: must lie between"),
+        ("opt3101", b"i,q\n1,1\n", ".csv", Settings(read=(1e99, 1.0)), "/read: must lie between"),
+        ("opt3101", b"i,q\n1,1\n", ".csv", Settings(frequency_hz=1e99), "/frequency_hz: must lie"),
         ("opt3101", b"i,q\n1,1\n", ".json", GIVEN, "/form: a dump of the TI OPT3101 is .bin"),
         ("afbr-s50", b"phase,amplitude\n1,1\n", ".csv", GIVEN, "/frequency_hz: must be stated"),
         ("tmf882x", b"{", ".json", Settings(), "JSON"),
         ("tmf882x", b"{}", ".json", Settings(), "/bin_width_s"),
+        ("tmf882x", histograms([1], width="-1"), ".json", Settings(), "/bin_width_s: Input"),
+        ("tmf882x", histograms([1], width="0"), ".json", Settings(), "/bin_width_s: Input"),
+        ("tmf882x", histograms([1], width="NaN"), ".json", Settings(), "/bin_width_s: Input"),
+        ("tmf882x", histograms([1], width='"1"'), ".json", Settings(), "/bin_width_s: Input"),
+        ("tmf882x", histograms(), ".json", Settings(), "/positions: "),
+        ("tmf882x", histograms([1] * 9), ".json", Settings(), "/zone_histograms/0: has 9"),
+        ("tmf882x", histograms([1] * 128, [1] * 129), ".json", Settings(), "histograms/0: has 129"),
+        ("tmf882x", histograms([-1] * 128), ".json", Settings(), "histograms/0/0: Input"),
+        ("tmf882x", histograms([math.inf]), ".json", Settings(), "histograms/0/0: Input"),
     ],
 )  # fmt: skip
 def test_bad_input_is_named(

@@ -91,6 +91,13 @@ async def test_estimates_as_messages(
     refused = await client.post("/v1/estimates", json=request_body, headers=headers)
     assert_problem(refused, 422)
     assert "no technique serves this scene" in refused.json()["detail"]
+    request_body["techniques"] = ["conventional"]
+    refused = await client.post("/v1/estimates", json=request_body, headers=headers)
+    assert_problem(refused, 422)
+    # of what was not asked for it says nothing
+    assert refused.json()["detail"].endswith(
+        "scene: conventional: is not immune to crosstalk, and the scene's is unknown"
+    )
 
 
 async def test_conventional_range(client: httpx.AsyncClient, request_body: dict[str, Any]) -> None:
