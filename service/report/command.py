@@ -29,7 +29,7 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
         """,
     )
     parser.add_argument(
-        "--quick", action="store_true", help="eight scenes and small batches: minutes, not an hour"
+        "--quick", action="store_true", help="seven scenes and small batches: minutes, not an hour"
     )
     parser.add_argument("--seed", type=int, default=1, help="of everything random (%(default)s)")
     parser.add_argument(

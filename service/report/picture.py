@@ -1,6 +1,7 @@
 """Pictures of the report: work against precision, and what each term costs."""
 
 import io
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -45,6 +46,14 @@ def _curves(rows: Sequence[Row]) -> dict[tuple[str, str, str], list[Row]]:
     return {key: sorted(curve, key=lambda row: row.order) for key, curve in curves.items()}
 
 
+def _along(x: Sequence[float], y: Sequence[float]) -> list[tuple[float, float]]:
+    """Return points of a curve and on the lines between them, which no label shall cover."""
+    found = list(zip(x, y, strict=True))
+    for (x0, y0), (x1, y1) in itertools.pairwise(found[:]):
+        found += list(zip(np.geomspace(x0, x1, 12), np.geomspace(y0, y1, 12), strict=True))
+    return found
+
+
 def _panel(axes: Axes, rows: Sequence[Row], least: float | None, division: float) -> None:
     labels: list[tuple[float, float, str, str]] = []
     points: list[tuple[float, float]] = []
@@ -55,7 +64,7 @@ def _panel(axes: Axes, rows: Sequence[Row], least: float | None, division: float
         axes.loglog(
             x, y, "-o", color=colour, ms=5, lw=1.2, mfc="white" if told else colour, clip_on=False
         )
-        points += list(zip(x, y, strict=True))
+        points += _along(x, y)
         name = f"{method} (misinformed)" if told else method
         at = int(np.argmin(y))
         labels.append((x[at], y[at], name, colour))
@@ -138,6 +147,7 @@ def _place(
             va="center",
             color=colour,
             fontsize=_SIZE,
+            bbox={"facecolor": "white", "alpha": 0.7, "lw": 0, "pad": 0.3},
             arrowprops={"arrowstyle": "-", "color": colour, "lw": 0.5} if abs(dy) > 10 else None,
         )
 
@@ -190,7 +200,7 @@ def draw_snr(report: Report, ratios: dict[str, float]) -> Figure | None:
         x, y = list(values), list(values.values())
         axes.loglog(x, y, "-o", color=_COLOURS[family], ms=4, lw=1.2)
         labels.append((x[-1], y[-1], method, _COLOURS[family]))
-        points += list(zip(x, y, strict=True))
+        points += _along(x, y)
     least = [report.least_errors.get(name) or np.nan for name in names]
     axes.loglog([ratios[n] for n in names], least, "--", color=_GREY, lw=1)
     axes.set(

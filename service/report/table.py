@@ -2,9 +2,22 @@
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from service.report.row import Row
 
-__all__ = ["COLUMNS", "LEGEND", "cells_of_row", "heading", "left_out", "line", "markdown"]
+__all__ = [
+    "COLUMNS",
+    "LEGEND",
+    "cells_of_row",
+    "heading",
+    "left_out",
+    "line",
+    "markdown",
+    "method_to_take",
+    "percent",
+    "time_of",
+]
 
 COLUMNS = (
     "method",
@@ -52,11 +65,18 @@ def _share(value: float | None) -> str:
     return "-" if value is None else f"{100 * value:.0f} %"
 
 
-def _error(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.2g} %"
+def percent(value: float | None) -> str:
+    """Return a share in percent to two digits, without an exponent."""
+    if value is None:
+        return "-"
+    text = np.format_float_positional(
+        100 * value, precision=2, unique=False, fractional=False, trim="-"
+    )
+    return f"{text} %"
 
 
-def _time(seconds: float | None) -> str:
+def time_of(seconds: float | None) -> str:
+    """Return a time in the unit that fits."""
     if seconds is None:
         return "-"
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
@@ -88,15 +108,15 @@ def cells_of_row(row: Row) -> tuple[str, ...]:
     return (
         method_of(row),
         row.knob,
-        _error(s.median_error),
-        _error(s.p95_error),
+        percent(s.median_error),
+        percent(s.p95_error),
         _share(s.coverage),
-        _error(s.crps),
+        percent(s.crps),
         _share(s.ambiguous),
         _share(s.refused),
-        _time(c.frame_s),
-        _time(c.p50_s),
-        _time(c.p99_s),
+        time_of(c.frame_s),
+        time_of(c.p50_s),
+        time_of(c.p99_s),
         _memory(c.peak_bytes),
         _number(row.likelihood_calls),
         _number(c.draws_per_s),
@@ -120,6 +140,30 @@ def line(row: Row) -> str:
     """Return a row as a line for a terminal."""
     said = " (*told that there is neither crosstalk nor wall)" if row.told else ""
     return _aligned(cells_of_row(row)) + said
+
+
+def method_to_take(rows: Iterable[Row]) -> str:
+    """Say which method costs least of those that come near the least error, and hold the truth.
+
+    Near: within a factor of two. Holding: the truth is in 80 % or more of the 90 % intervals.
+    """
+    groups: dict[str, list[tuple[float, float, str]]] = {"known": [], "unknown": []}
+    for row in rows:
+        s, time_s = row.scores, row.costs.frame_s
+        if s is None or time_s is None or row.told or s.median_error is None or s.single < 0.5:
+            continue
+        if s.coverage is None or s.coverage < 0.8:
+            continue
+        told = row.family in ("single frames", "tracker") or "told the object" in row.remark
+        found = groups["known" if told else "unknown"]
+        found.append((time_s, s.median_error, f"{row.method}, {row.knob}"))
+    said = []
+    for object_is, found in groups.items():
+        if found:
+            least = min(error for _, error, _ in found)
+            time_s, error, name = min(x for x in found if x[1] <= 2 * least)
+            said.append(f"object {object_is}: {name} ({percent(error)}, {time_of(time_s)} a frame)")
+    return "; ".join(said)
 
 
 def left_out(rows: Iterable[Row]) -> dict[str, str]:

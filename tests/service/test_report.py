@@ -23,10 +23,11 @@ from service.report.measure import measure
 from service.report.page import markdown_page, page
 from service.report.picture import draw_scene, draw_summary, draw_terms, svg
 from service.report.readings import readings_of
-from service.report.row import Row, row_from
+from service.report.row import Costs, Row, row_from
 from service.report.run import Report, errors_of, machine, rows_of
 from service.report.scenes import SCENES
-from service.report.scores import crps_of_draws, crps_of_normals, scores_of_roots
+from service.report.scores import Scores, crps_of_draws, crps_of_normals, scores_of_roots
+from service.report.table import method_to_take
 from service.report.terms import TermCost, operations_of
 from simulator.readings import object_readings
 
@@ -206,6 +207,26 @@ def test_a_posterior_is_scored_and_counted() -> None:
     assert row.costs.draws_per_s > 0
 
 
+def test_the_method_to_take_is_cheap_near_the_best_and_honest() -> None:
+    def row(method: str, family: str, error: float, holds: float, frame_s: float, **kw: str) -> Row:
+        scores = Scores(error, error, holds, error, 1.0, 0.0, 0.0)
+        return Row("x", method, family, knob="k", scores=scores, costs=Costs(frame_s), **kw)
+
+    rows = [
+        row("fast", "single frames", 1e-2, 0.9, 1e-8),
+        row("liar", "single frames", 1e-9, 0.5, 1e-9),
+        row("blind", "single frames", 1e-9, 0.9, 1e-9, told="nothing"),
+        row("good", "tracker", 1.9e-4, 0.9, 1e-6),
+        row("best", "many frames", 1e-4, 0.98, 1e-3, remark="told the object"),
+        row("free", "posterior", 5e-7, 0.9, 0.1),
+    ]
+    assert method_to_take(rows) == (
+        "object known: good, k (0.019 %, 1 us a frame); "
+        "object unknown: free, k (0.00005 %, 100 ms a frame)"
+    )
+    assert method_to_take(rows[1:3]) == ""
+
+
 def test_page(tmp_path: Path) -> None:
     rows = measured(tmp_path, ("Unknown crosstalk", "Through the fold"))
     scenes = [BY_NAME[name] for name in dict.fromkeys(row.scene for row in rows)]
@@ -229,6 +250,9 @@ def test_page(tmp_path: Path) -> None:
     for name in ("fit of everything", "tracker", "time of flight alone (misinformed)"):
         assert name in pictures["Unknown crosstalk"]
     assert "time of flight alone, which takes no notice, errs by" in made
+    for text in (made, markdown_page(report)):
+        assert "Unknown crosstalk: object known: " in text
+        assert "e-0" not in text.split("base64", maxsplit=1)[0]
     draw_summary(report, tmp_path / "report.png")
     assert (tmp_path / "report.png").read_bytes().startswith(b"\x89PNG")
 
