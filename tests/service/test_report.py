@@ -208,16 +208,19 @@ def test_a_posterior_is_scored_and_counted() -> None:
 
 
 def test_the_method_to_take_is_cheap_near_the_best_and_honest() -> None:
-    def row(method: str, family: str, error: float, holds: float, frame_s: float, **kw: str) -> Row:
+    def row(
+        method: str, family: str, error: float, holds: float, frame_s: float, remark: str = ""
+    ) -> Row:
         scores = Scores(error, error, holds, error, 1.0, 0.0, 0.0)
-        return Row("x", method, family, knob="k", scores=scores, costs=Costs(frame_s), **kw)
+        costs = Costs(frame_s)
+        return Row("x", method, family, knob="k", scores=scores, costs=costs, remark=remark)
 
     rows = [
         row("fast", "single frames", 1e-2, 0.9, 1e-8),
         row("liar", "single frames", 1e-9, 0.5, 1e-9),
-        row("blind", "single frames", 1e-9, 0.9, 1e-9, told="nothing"),
+        dataclasses.replace(row("blind", "single frames", 1e-9, 0.9, 1e-9), told="nothing"),
         row("good", "tracker", 1.9e-4, 0.9, 1e-6),
-        row("best", "many frames", 1e-4, 0.98, 1e-3, remark="told the object"),
+        row("best", "many frames", 1e-4, 0.98, 1e-3, "told the object"),
         row("free", "posterior", 5e-7, 0.9, 0.1),
     ]
     assert method_to_take(rows) == (
