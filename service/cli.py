@@ -20,7 +20,6 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
-from importlib.metadata import version
 
 from service.commands import COMMANDS
 from service.commands.command import EXIT_CODES
@@ -30,6 +29,16 @@ from simulator.errors import HybridTofError, InvalidInputError, RefusedError
 __all__ = ["main"]
 
 
+class _Version(argparse.Action):
+    """Say which version this is; looking for it is left to who asks."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib.metadata import version
+
+        print(f"{parser.prog} {version('hybridtof')}")
+        parser.exit()
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="hybridtof",
@@ -37,7 +46,9 @@ def _parser() -> argparse.ArgumentParser:
         epilog=f"Each command has examples: hybridtof estimate --help. {EXIT_CODES}",
         allow_abbrev=False,
     )
-    parser.add_argument("--version", action="version", version=f"%(prog)s {version('hybridtof')}")
+    parser.add_argument(
+        "--version", action=_Version, nargs=0, help="show program's version number and exit"
+    )
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="command")
     for add_parser in COMMANDS:
         add_parser(subparsers)

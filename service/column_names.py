@@ -1,6 +1,5 @@
 """Names of columns in files of frames: those that are meant, and those that cannot be."""
 
-import difflib
 import re
 from collections.abc import Sequence
 
@@ -43,7 +42,11 @@ def meant(name: str) -> list[str]:
         return ["time_s"]
     if re.fullmatch(r"d?w\d?(dt)?", plain):
         return [known for known in NAMES if "w" in known and known[0] == plain[0]]
-    return difflib.get_close_matches(plain, NAMES, n=2, cutoff=_ALIKE) if len(plain) > 3 else []
+    if len(plain) <= 3:
+        return []
+    from difflib import get_close_matches  # seldom needed
+
+    return get_close_matches(plain, NAMES, n=2, cutoff=_ALIKE)
 
 
 def check_names(names: Sequence[str]) -> None:

@@ -75,7 +75,8 @@ def _of_noise(sensor: Sensor, frames: Frames) -> Iterator[str]:
 
 def _rounding(values: Array) -> float | None:
     """Return the power of ten to which values are rounded; None for those that are not."""
-    if np.unique(values).size < _FEWEST:
+    # unique imports masked arrays, which takes longer than a few frames do
+    if values.size < _FEWEST or np.unique(values).size < _FEWEST:
         return None
     largest = math.floor(math.log10(values.max()))
     for digits in range(1, _DIGITS - 2):
