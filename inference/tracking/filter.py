@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from inference.estimates import Status
 from inference.tracking.empty_scene import learn_empty
 from inference.tracking.frame_density import TrackedFrame
-from inference.tracking.hypotheses import COUNT, PENDING, RUNNING, TIME, Hypotheses
+from inference.tracking.hypotheses import COUNT, PENDING, ROUGHNESS, RUNNING, TIME, Hypotheses
 from inference.tracking.prediction import predict
 from inference.tracking.report import OUTLIER, STATUS, SURPRISE, report
 from inference.tracking.weighing import Model, room_for, weigh_frame
@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 USABLE, SATURATED, EMPTY, EMPTY_SATURATED = range(4)
 _FIRST, _SECOND, _GAIN = range(3)  # columns of frames
 _SATURATED = int(Status.SATURATED)
+_LATE = 4.0  # frames over which the roughness of the motion is a mean
 
 
 @compiled
@@ -76,6 +77,7 @@ def run_filter(
         if not math.isnan(surprise):
             own = min(surprise, rules.most_surprise) / model.table.channels
             numbers[RUNNING] += (1.0 - rules.memory) * (own - numbers[RUNNING])
+            numbers[ROUGHNESS] += (min(own, 1.0) - numbers[ROUGHNESS]) / _LATE
         report(out, rows, i, of, rules)
         out[i, OUTLIER], out[i, SURPRISE] = outlier, numbers[RUNNING]
         if kinds[i] == SATURATED or kinds[i] == EMPTY_SATURATED:

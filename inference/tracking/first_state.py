@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.tracking.evenness import ROUGH
 from inference.tracking.hypotheses import ANCHOR, CROSSTALK1, Hypotheses
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
@@ -59,7 +60,7 @@ def first_state(
     weight = np.zeros(rows)
     there = settings.visit_s / (settings.visit_s + settings.absence_s)
     weight[0] = 1.0 - there
-    return TrackState(Hypotheses(x, X, weight, np.array([math.nan, there, 1.0, 0.0, 0.0])))
+    return TrackState(Hypotheses(x, X, weight, np.array([math.nan, there, 1.0, 0.0, 0.0, ROUGH])))
 
 
 def _moments(from_normal: Any) -> tuple[float, float]:

@@ -20,6 +20,7 @@ __all__ = [
     "CROSSTALK2",
     "LOST",
     "PENDING",
+    "ROUGHNESS",
     "RUNNING",
     "TIME",
     "Hypotheses",
@@ -38,7 +39,7 @@ Array = NDArray[np.float64]
 # states of a hypothesis: log r, its rate, crosstalk, and the log r at which tangents are taken
 U, V, CROSSTALK1, CROSSTALK2, ANCHOR = range(5)
 # places in `Hypotheses.numbers`
-TIME, PENDING, RUNNING, COUNT, LOST = range(5)
+TIME, PENDING, RUNNING, COUNT, LOST, ROUGHNESS = range(6)
 
 
 class Hypotheses(NamedTuple):
@@ -50,9 +51,9 @@ class Hypotheses(NamedTuple):
     x: Array
     X: Array  # (rows, n, n + p): roots of the covariances
     weight: Array  # (rows,): probabilities
-    # (5,): time of the last frame [s] (nan: none yet), probability of an object of which nothing is
-    # known yet, running surprise, number of hypotheses, and whether an object that was there may be
-    # anywhere by now
+    # (6,): time of the last frame [s] (nan: none yet), probability of an object of which nothing is
+    # known yet, running surprise, number of hypotheses, whether an object that was there may be
+    # anywhere by now, and the surprise of the last frames, each cut at 1
     numbers: Array
 
 

@@ -11,7 +11,7 @@ from simulator.errors import InvalidInputError
 
 __all__ = ["TrackState", "check_state", "state_from_bytes", "state_to_bytes"]
 
-_KIND = "track state 2"
+_KIND = "track state 3"
 # what reading an archive raises where bytes are missing or changed
 _BROKEN = (
     ValueError,

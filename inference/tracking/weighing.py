@@ -22,10 +22,12 @@ from inference.tracking.candidates import (
     take,
 )
 from inference.tracking.empty_scene import expect_empty, learn_empty
+from inference.tracking.evenness import counted_widths, even_out, log_total, take_width
 from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import (
     COUNT,
     PENDING,
+    ROUGHNESS,
     Hypotheses,
     Scratch,
     copy,
@@ -113,10 +115,17 @@ def _of_followed(frame: TrackedFrame, of: Hypotheses, model: Model, room: Room) 
     """List the modes of the frame under every hypothesis; their number."""
     log_usual = math.log1p(-model.rules.outlier)
     table, scan = model.table, model.places.scan
-    found = 0
-    for h in range(1, int(of.numbers[COUNT]) + 1):
-        prior = prior_of(of, h, frame.gain, _log(of.weight[h]) + log_usual, table)
-        found = find_candidates(room.candidates, found, h, frame, prior, table, scan, room.scanned)
+    candidates, followed = room.candidates, int(of.numbers[COUNT])
+    counted = counted_widths(of.numbers[ROUGHNESS])
+    found, log_before = 0, -math.inf
+    for h in range(1, followed + 1):
+        old, log_weight = found, _log(of.weight[h])
+        prior = prior_of(of, h, frame.gain, log_weight + log_usual, table)
+        found = find_candidates(candidates, found, h, frame, prior, table, scan, room.scanned)
+        if followed > 1 and counted < 1.0 and found > old:
+            log_before = np.logaddexp(log_before, log_total(candidates, old, found))
+            take_width(candidates, old, found, counted, frame, prior, table)
+    even_out(candidates, found, log_before)
     return found
 
 

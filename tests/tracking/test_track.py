@@ -110,6 +110,31 @@ def test_weights_of_both_branches_are_those_of_a_grid_filter(noise: float) -> No
     assert np.max(differences) < 0.15
 
 
+@pytest.mark.parametrize("discrepancy", [0, "default"])
+def test_smooth_motion_through_a_fold_is_not_sure_of_a_wrong_branch(
+    discrepancy: float | str,
+) -> None:
+    """Three ranges explain one window of a steady object that passes the turning point at 0.158 m.
+
+    The flatter branch is likelier in every frame by the same few per cent as long as the motion is
+    as rough as stated: of steady motion it was sure, at the wrong range.
+    """
+    sensor = sensor_of(8e-5)
+    folded = {"c0": 0.0769, "c1": -0.535, "c2": 0.0957}
+    scene = scene_of({"object": folded, "discrepancy": discrepancy})
+    model = tracker(sensor, scene, TrackingSettings(observables="w2"))
+    ranges = np.linspace(0.2, 0.1, 151)
+    for seed in range(3):
+        readings = read(sensor, scene, ranges, np.random.default_rng(seed))
+        _, result = step(model, model.first, frames_of(readings))
+        away = np.abs(result.range_m - ranges) / result.sd_m
+        assert not (away > 5.0).any()
+        near = np.abs(result.hypotheses_m - ranges[:, None]) < 5.0 * result.hypotheses_sd_m
+        # no branch is known, and none is lost: neither is below one in twenty but at the fold
+        weight = np.where(near, result.hypotheses_weight, 0.0).sum(axis=1)
+        assert weight[[60, 75]].min() > 0.05
+
+
 def test_presence_and_range_are_those_of_a_grid_filter() -> None:
     """A weak object comes and goes: signal-to-noise 10 at 1 m."""
     settings = TrackingSettings(rate_sd=0.5, outlier=1e-9, visit_s=3.0, absence_s=3.0)
