@@ -42,6 +42,7 @@ _RELATIVE = 0.03  # independent error of the signal that stands for a smooth one
 _OF_LIGHT = (1e-2, 1e-3)  # of the light of a middling frame, for an error of its direction
 _STEPS = 60  # of the best climbs
 _KEPT = 4
+_SAME = 1e-3  # in log r and deviance
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -146,9 +147,18 @@ def erring_maxima(problem: FitProblem, starts: Iterable[Maximum]) -> list[Erring
             if math.isfinite(at.deviance):
                 first.append(with_other_ranges(problem, at, x, start.positions))
     first.sort(key=lambda at: at.deviance)
-    ends = [climbed(problem, at, _STEPS) for at in first[:_KEPT]]
+    ends: list[tuple[Point, float]] = []
+    for at in first[:_KEPT]:
+        if not any(_same(at, end) for end, _ in ends):
+            ends.append(climbed(problem, at, _STEPS))
     ends.sort(key=lambda end: end[0].deviance)
     return [_told(problem, at, remaining) for at, remaining in ends]
+
+
+def _same(at: Point, end: Point) -> bool:
+    """Return whether a climb has come where another has ended."""
+    near = np.allclose(at.u, end.u, rtol=0.0, atol=_SAME, equal_nan=True)
+    return near and abs(at.deviance - end.deviance) < _SAME
 
 
 def _with_priors(facts: Information, slopes: Array) -> Information:

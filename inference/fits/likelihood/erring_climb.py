@@ -68,7 +68,7 @@ def _settled(problem: FitProblem, at: Point) -> Point:
         rows = np.vstack([seen.errors[:, :-1], np.eye(k)])
         da = np.linalg.lstsq(rows, np.concatenate([seen.errors[:, -1], -at.a]), rcond=None)[0]
         u = _ranges(problem, at, seen, np.zeros(at.x.size), da)
-        at = point_at(problem, at.x, u, at.a + da)
+        at = point_at(problem, at.x, u, at.a + da, at.z)
     return at
 
 
@@ -181,5 +181,5 @@ def _settled_ranges(problem: FitProblem, at: Point) -> Point:
     for _ in range(_TURNS):
         seen = _eliminated(problem, at)
         u = _ranges(problem, at, seen, np.zeros(at.x.size), np.zeros(at.a.size))
-        at = point_at(problem, at.x, u, at.a)
+        at = point_at(problem, at.x, u, at.a, at.z)
     return at

@@ -141,13 +141,13 @@ def left_of_frames(
     return np.asarray(across(residual[:, :, None]) / spread)
 
 
-def point_at(problem: FitProblem, x: Array, u: Array, a: Array) -> Point:
-    """Linearise in units of the noise and of what is left of errors."""
+def point_at(problem: FitProblem, x: Array, u: Array, a: Array, z: Array | None = None) -> Point:
+    """Linearise in units of the noise and of what is left of errors; ``z`` is `standard` of x."""
     residual, jacobian, along, errors, _ = linearised(problem, x, u)
     parts = [(residual - errors @ a)[:, :, None], jacobian, along[:, :, None], errors]
     white = whitened_of(problem, u, errors, np.concatenate(parts, axis=2))
     d = x.size
-    residual, z = white[:, :, 0], standard(problem, x[None])[0]
+    residual, z = white[:, :, 0], standard(problem, x[None])[0] if z is None else z
     at = white[:, :, 1 : d + 1], white[:, :, d + 1], white[:, :, d + 2 :]
     with np.errstate(over="ignore", invalid="ignore"):
         deviance = float(np.square(residual).sum() + a @ a + z @ z)
