@@ -47,6 +47,13 @@ def test_profiles() -> None:
     assert all("ports" not in one for name, one in services.items() if name != "hybridtof")
 
 
+def test_no_volume_hides_the_machine_code_of_the_image() -> None:
+    cache = re.search(r"NUMBA_CACHE_DIR=(\S+)", (ROOT / "Dockerfile").read_text())
+    assert cache is not None
+    for one in compose()["services"].values():
+        assert all(volume.split(":")[1] != cache[1] for volume in one.get("volumes", ()))
+
+
 def test_commands_of_the_cluster_are_those_that_are_tested() -> None:
     services = compose(**cluster_env())["services"]
     address = cluster_env()["HYBRIDTOF_EXECUTOR"]
