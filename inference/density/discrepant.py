@@ -95,7 +95,7 @@ class DiscrepantDensity(CollapsedDensity):
             self.basis.values(np.where(np.isfinite(u), u, self.basis.first)) @ a
             for u, a in zip(log_r, coefficients, strict=True)
         ]
-        return np.where(np.isfinite(log_r), np.array(rows), np.nan)
+        return np.where(np.isfinite(log_r), np.reshape(rows, log_r.shape), np.nan)
 
     def flux_basis(self, z: Array, log_r: Array) -> FluxBasis:
         """Return what the error is made of at given ranges (`FluxBasis`)."""

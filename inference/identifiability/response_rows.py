@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from inference.frame.delayed import delayed
 from inference.frame.sensitivity import whiteners
 from inference.identifiability.expected_posterior import rows_of, without_ranges
 from inference.identifiability.experiment import Experiment
+from simulator.discrepancy import discrepancy_basis
+from simulator.sensor import instrument
 
 __all__ = ["FluxStep", "Rows", "flux_step"]
 
@@ -19,13 +22,23 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Rows:
-    """What readings and priors tell at one point, its ranges eliminated on demand."""
+    """What readings and priors tell at one point, its ranges eliminated on demand.
+
+    Attributes
+    ----------
+    experiment : Experiment
+        The point.
+    range_error : float
+        Where positive, the errors are those of the effective distance, of this standard deviation
+        [m], and the flux's, if there are any, are unknowns behind z.
+    """
 
     experiment: Experiment
+    range_error: float = 0.0
 
     @functools.cached_property
     def _all(self) -> tuple[Array, Array, Array, Array]:
-        """Derivatives along z, the flux's errors and log r, and rows of z's prior."""
+        """Derivatives along the unknowns, the errors and log r, and rows of the priors."""
         e = self.experiment
         jacobian, along, extra = rows_of(e)
         d = len(e.parameters)
@@ -39,17 +52,30 @@ class Rows:
             if e.common_range:
                 wide &= np.cumsum(present) == 1
             along[wide, 2] = limit
+        if self.range_error > 0:
+            return jacobian, self._by_range_error(along.shape[1]), along, np.concatenate(extra)
         prior = np.concatenate([np.eye(d), *(rows[:, :d] for rows in extra[1:])])
         return jacobian[:, :, :d], jacobian[:, :, d:], along, prior
 
+    def _by_range_error(self, m: int) -> Array:
+        """Return whitened derivatives along errors of the distance that an object seems to have."""
+        e = self.experiment
+        basis, present = discrepancy_basis(*e.parameters.reach_m), np.isfinite(e.log_r)
+        at = np.where(present, e.log_r, basis.first)
+        late = delayed(e.readings.signal, at, *instrument(e.sensor)) * present[:, None]
+        late = np.einsum("nij,nj->ni", whiteners(e.sensor, e.readings), late)
+        result = np.zeros((at.size, m, basis.size))
+        result[:, :2] = self.range_error * late[:, :, None] * basis.values(at)[:, None]
+        return result
+
     @property
     def by_error(self) -> Array:
-        """Whitened derivatives along the flux's errors, shape (n, m, k); m as of `rows_of`."""
+        """Whitened derivatives along the errors, shape (n, m, k); m as of `rows_of`."""
         return self._all[1]
 
     @property
     def jacobian(self) -> Array:
-        """Whitened derivatives along z, shape (n, m, d)."""
+        """Whitened derivatives along the unknowns, shape (n, m, d)."""
         return self._all[0]
 
     @property

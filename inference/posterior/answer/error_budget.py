@@ -3,7 +3,8 @@
 A posterior whose scene states no size for the model's error is sampled as if there were none. Then
 every draw is moved by an error of the flux, drawn from what the readings leave of it and followed
 linearly from draws near it (`inference.identifiability.model_response`), and every range by a
-random smooth error of the effective distance. Where sizes are stated, the flux's error is
+random smooth error of the effective distance; where ranges are known, all by it
+(`inference.posterior.answer.where_known`). Where sizes are stated, the flux's error is
 integrated out already; draws are moved by that of the distance, and by what a flux error twice as
 large would move them.
 """
@@ -27,6 +28,7 @@ from inference.identifiability.model_response import (
     model_response,
 )
 from inference.posterior.answer.error_parts import ErrorParts
+from inference.posterior.answer.where_known import where_known
 from inference.posterior.criticism.discrepancy_check import LargerDiscrepancy
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
 from inference.posterior.job import Job
@@ -209,7 +211,12 @@ def error_budget(
     if larger is not None:
         by_z.append(np.broadcast_to(larger.of_z[:, None], (*z[chosen].shape, 1)))
         by_log_r.append(np.broadcast_to(larger.of_log_r[:, None], (*log_r[chosen].shape, 1)))
-    if error.range_m > 0:
+    if error.range_m > 0 and rates is not None:
+        follow = where_known(density, experiments, readings, error.range_m, larger)
+        for by, moved in zip((by_z, by_log_r), follow, strict=True):
+            by[0] = by[0] + moved[:, :, :1]
+            by.append(moved[:, :, 1:])
+    elif error.range_m > 0:
         moved = _range_error(density, log_r[chosen], responses, error.range_m)
         by_z.append(np.zeros((*z[chosen].shape, moved.shape[2])))
         by_log_r.append(moved)

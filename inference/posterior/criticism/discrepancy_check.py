@@ -16,12 +16,12 @@ from inference.density.discrepant import DiscrepantDensity
 from inference.identifiability.status import Identifiability
 from inference.posterior.answer.fit import Fit
 
-__all__ = ["LargerDiscrepancy", "judge_fit", "larger_discrepancy", "with_model_part"]
+__all__ = ["MISFIT", "LargerDiscrepancy", "judge_fit", "larger_discrepancy", "with_model_part"]
 
 Array = NDArray[np.float64]
 
 _FACTOR = 2.0
-_MISFIT = 1e3  # Bayes factor: a false-alarm rate of at most 1e-3
+MISFIT = 1e3  # Bayes factor: a false-alarm rate of at most 1e-3
 _BENT = 0.5  # share of a linear response that the next order adds, above which it is no guide
 _MOST = 0.5  # of the uncertainty, above which that matters
 
@@ -78,7 +78,7 @@ def larger_discrepancy(density: DiscrepantDensity, z: Array, log_r: Array) -> La
 
 def judge_fit(fit: Fit, larger: LargerDiscrepancy) -> Fit:
     """Flag a misfit where the readings demand a larger discrepancy than was stated."""
-    if not larger.bayes_factor > _MISFIT:
+    if not larger.bayes_factor > MISFIT:
         return fit
     reason = (
         "a discrepancy twice as large as stated is more than a thousand times as probable: the "

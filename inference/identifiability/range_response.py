@@ -1,0 +1,52 @@
+"""How a posterior moves with errors of the effective distance where ranges are known."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from inference.identifiability.experiment import Experiment
+from inference.identifiability.model_response import FluxError
+from inference.identifiability.response_rows import Rows, flux_step
+
+__all__ = ["range_response"]
+
+Array = NDArray[np.float64]
+
+
+def range_response(
+    experiment: Experiment, readings: Array, size: float
+) -> tuple[Array, Array, FluxError]:
+    """Return the response of a posterior that takes its clock for exact.
+
+    A range that is known beside the readings cannot follow an error of the effective distance: all
+    that the readings tell has to. The response is that to an error of the flux
+    (`inference.identifiability.model_response`), with the flux's own as further unknowns.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        A draw with its ranges; its ``discrepancy`` is the size of the flux's error, its ``error``
+        what that is at the draw.
+    readings : ndarray, shape (n, 4)
+        Of the frames, and range and displacement [m] where they are known beside them.
+    size : float
+        Standard deviation of the effective distance's error [m].
+
+    Returns
+    -------
+    (ndarray, ndarray, FluxError)
+        Change of z and of log r, shape (d, 1 + k) and (n, 1 + k): with what the readings tell of
+        the error, and with each of k independent standard normal variates, as far as they leave it
+        open; and what they tell, of its coefficients.
+    """
+    rows = Rows(experiment, size)
+    d, known = experiment.z.size, np.zeros(rows.jacobian.shape[2])
+    known[:d] = experiment.z
+    if experiment.error is not None:
+        known[d:] = experiment.error
+    step = flux_step(rows, rows.residual(readings), -known)
+    k = step.across.shape[1]
+    spread = np.asarray(linalg.solve_triangular(step.triangle, np.eye(k)))
+    told = FluxError(step.coefficients(np.zeros(k)), spread)
+    of = np.column_stack([told.mean, spread])
+    return step.by_error[0][:d] @ of, step.by_error[1] @ of, told
