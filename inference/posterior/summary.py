@@ -24,7 +24,7 @@ from inference.posterior.answer.posterior import (
 from inference.posterior.answer.range_summary import joined, range_summary
 from inference.posterior.answer.whole import Whole, with_model_error
 from inference.posterior.criticism.cross_check import cross_check
-from inference.posterior.criticism.discrepancy_check import judge_fit, with_model_part
+from inference.posterior.criticism.discrepancy_check import MISFIT, judge_fit, with_model_part
 from inference.posterior.criticism.many_frames import bias_of_many_frames
 from inference.posterior.criticism.predictive_check import predictive_check
 from inference.posterior.criticism.prior_conflict import prior_conflicts
@@ -278,6 +278,9 @@ def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
     judged = _judged(job, drawn.own, whole)
     if whole.larger is not None:
         fit = judge_fit(fit, whole.larger)
+        if whole.larger.bayes_factor > MISFIT and rates_of(drawn.own.frames) is not None:
+            # known ranges and readings contradict each other: a widened answer is no certain one
+            judged = weak_at_best(judged, "by errors of the model that are larger than stated")
     conflicts = prior_conflicts(drawn.own, sample.flat, log_r, density)
     fit, judged = contradicted(fit, judged, conflicts)
     reasons = (*reasons, *_unfinished(drawn.own, chosen, job.stream(Stream.INTEGRALS)))

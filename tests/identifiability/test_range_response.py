@@ -31,7 +31,7 @@ def experiment(kind: str, rates: Array) -> Experiment:
     log_r = np.append(np.log(np.geomspace(0.3, 1.5, len(rates) - 1)), np.nan)
     z = np.array([0.2, -0.1, 0.3, 0.1, 0.05, 0.2])
     at = Experiment(sensor, parameters, z, log_r, discrepancy=0.07, rates=rates)
-    error: Array = 0.5 * np.random.default_rng(1).standard_normal(at.by_error.shape[2])
+    error = np.asarray(0.5 * np.random.default_rng(1).standard_normal(at.by_error.shape[2]))
     return dataclasses.replace(at, error=error)
 
 
