@@ -12,21 +12,22 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic
 
 from inference.posterior.pace import Pace
 from inference.posterior.progress import Progress
 from service.errors import GoneError, StoreError
 from service.fold import C, Fold, J, P, Summary, T
+from service.held_job import HeldJob, LostError
 from service.problems import describe
 from service.store.job_store import JobStore
 from service.store.record import Claimed, JobRecord, Status
+from service.workers import Workers
 from simulator.errors import HybridTofError
 from simulator.processor_time import timed
 
-__all__ = ["Runner", "Workers"]
+__all__ = ["Runner"]
 
-R = TypeVar("R")
 _log = logging.getLogger("hybridtof")
 
 _LOOK_S = 0.25  # how often it is looked whether a job is still wanted
@@ -36,35 +37,10 @@ _GRACE_S = 1.0  # what a chunk may still take when its job was cancelled
 _FIRST_LIMIT_S = 900.0
 _LIMIT_S = 60.0
 _TIMES = 20.0
-_LONGEST_PAUSE_S = 5.0
 
 
 class _TurnError(Exception):
     """The job has had its turn, and others wait."""
-
-
-class Workers(Protocol):
-    """Where chunks run."""
-
-    def submit_within(self, limit_s: float, fn: Callable[..., R], /, *args: Any) -> Future[R]:
-        """Run a function within some processor time [s]."""
-        ...
-
-    def compiling(self, future: Future[Any]) -> bool:
-        """Tell whether machine code is being made for a task."""
-        ...
-
-    def abandon(self, future: Future[Any]) -> None:
-        """Give a task up."""
-        ...
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End."""
-        ...
-
-
-class _LostError(Exception):
-    """The job was deleted, or another process is ahead with it: nothing is to be done here."""
 
 
 class _CancelledError(Exception):
@@ -132,17 +108,22 @@ class _Run(Generic[J, C, T, P]):
 
     def __init__(self, runner: Runner[J, C, T, P], claimed: Claimed) -> None:
         self.runner, self.claimed = runner, claimed
-        self.record = claimed.record
+        self.held = HeldJob(runner.store, claimed.record, runner.announce)
         self.cpu_s = claimed.record.cpu_s
         self.pace: Pace | None = None
         self.checkpoint: C | None = None
         self.longest = 0.0  # processor time of a chunk of the present phase [s]
 
+    @property
+    def record(self) -> JobRecord:
+        """The job as it stands."""
+        return self.held.record
+
     async def run(self) -> None:
         try:
             await self._read()
             await self._compute()
-        except _LostError:
+        except LostError:
             return
         except _TurnError:
             await self._let_go()
@@ -157,14 +138,14 @@ class _Run(Generic[J, C, T, P]):
         fold, pieces, store = self.runner.fold, self.claimed.pieces, self.runner.store
         self.began = time.monotonic() - self.record.wall_s
         if self.record.format != self.runner.version:
-            await self._save(store.restart, self.record, self.runner.version)
+            await self.held.save(store.restart, self.record, self.runner.version)
             self.cpu_s, pieces = 0.0, ()
         try:
             self.job = await asyncio.to_thread(fold.Job.from_bytes, self.claimed.job)
             if pieces:
                 self.checkpoint = await asyncio.to_thread(fold.Checkpoint.from_bytes, *pieces)
-                await self._tell(fold.progress(self.job, self.checkpoint).phase)
-        except _LostError:
+                await self.held.tell(fold.progress(self.job, self.checkpoint).phase)
+        except LostError:
             raise
         except Exception as error:
             if self.claimed.record.format == self.runner.version:
@@ -176,7 +157,7 @@ class _Run(Generic[J, C, T, P]):
         fold = self.runner.fold
         try:
             if self.checkpoint is None:
-                await self._tell("starting")
+                await self.held.tell("starting")
                 (first,) = await self._execute((fold.start, self.job))
                 await self._keep(first)
             while self.checkpoint is not None and not self.record.cancel_requested:
@@ -219,7 +200,7 @@ class _Run(Generic[J, C, T, P]):
         """Return the answer of what there is; None where there is nothing."""
         if self.checkpoint is None:
             return None
-        await self._tell("summarising")
+        await self.held.tell("summarising")
         spent = self.record.wall_s, self.cpu_s
         call = _summary, self.runner.fold.summarise, self.job, self.checkpoint, *spent
         try:
@@ -244,10 +225,8 @@ class _Run(Generic[J, C, T, P]):
         result: dict[str, Any] | None,
         problem: dict[str, Any] | None = None,
     ) -> None:
-        try:
-            await self._save(self.runner.store.finish, self.record, status, result, problem)
-        except _LostError:
-            return
+        with contextlib.suppress(LostError):
+            await self.held.save(self.runner.store.finish, self.record, status, result, problem)
 
     async def _keep(self, checkpoint: C) -> None:
         """Store a checkpoint: what it adds to the last one, or all of it."""
@@ -263,31 +242,8 @@ class _Run(Generic[J, C, T, P]):
         data = added if added is not None else await asyncio.to_thread(checkpoint.to_bytes)
         told = _sent(self.pace.foretell(progress, wall_s))
         spent = wall_s, self.cpu_s
-        await self._save(runner.store.advance, self.record, data, added is None, told, *spent)
+        await self.held.save(runner.store.advance, self.record, data, added is None, told, *spent)
         self.checkpoint = checkpoint
-
-    async def _tell(self, phase: str) -> None:
-        """Change the phase that is told; how long it takes is known of no other phase."""
-        if phase != self.record.progress["phase"]:
-            progress = self.record.progress | {"phase": phase, "eta_s": None}
-            await self._save(self.runner.store.report, self.record, progress)
-
-    async def _save(self, write: Callable[..., JobRecord | None], *arguments: Any) -> None:
-        """Write to the store, for as long as it takes: a chunk need not be computed twice."""
-        pause = 0.1
-        while True:
-            try:
-                after = await asyncio.to_thread(write, *arguments)
-            except StoreError as error:
-                _log.warning("posterior %s waits: %s", self.record.id, error)
-                await asyncio.sleep(pause)
-                pause = min(2 * pause, _LONGEST_PAUSE_S)
-                continue
-            if after is None:
-                raise _LostError
-            self.record = after
-            self.runner.announce()
-            return
 
     async def _execute(self, *calls: tuple[Any, ...], wanted: bool = False) -> list[Any]:
         """Run calls side by side in the workers; return their results.
@@ -341,17 +297,6 @@ class _Run(Generic[J, C, T, P]):
             if cancelled:
                 raise _CancelledError
             compiling = any(map(self.runner.workers.compiling, futures))
-            await self._tell("compiling" if compiling else phase)
-            cancelled = await self._look() and not wanted
-        await self._tell(phase)
-
-    async def _look(self) -> bool:
-        """Look at the job in the store; return whether it was cancelled."""
-        try:
-            seen = await asyncio.to_thread(self.runner.store.get, self.record.id)
-        except StoreError:
-            return False
-        if seen is None or seen.number != self.record.number or seen.status != "running":
-            raise _LostError
-        self.record = seen
-        return seen.cancel_requested
+            await self.held.tell("compiling" if compiling else phase)
+            cancelled = await self.held.look() and not wanted
+        await self.held.tell(phase)

@@ -6,22 +6,21 @@ two of them the job is in the store, which other processes may share.
 
 import asyncio
 import contextlib
-import functools
 import logging
 import uuid
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from importlib.metadata import version
 from typing import Generic
 
 from inference.posterior.settings import SamplerSettings
-from service.errors import BusyError, ConflictError, GoneError, NotFoundError, StoreError
-from service.exports.scene import findings_of, write_scene
-from service.exports.writing import write_draws, write_file
+from service.ended import Ended
+from service.errors import BusyError, NotFoundError, StoreError
 from service.fold import C, Fold, J, P, T
-from service.job_runner import Runner, Workers
+from service.job_runner import Runner
 from service.store.holder import holder_name
 from service.store.job_store import JobStore
 from service.store.record import FINISHED, JobRecord, NewJob
+from service.workers import Workers
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
@@ -32,8 +31,6 @@ _log = logging.getLogger("hybridtof")
 
 _RENEW_S = 3.0
 _SWEEP_EVERY = 600  # renewals
-_DRAWS_LIMIT_S = 600.0
-_MOST_DRAWING = 16
 
 
 class Jobs(Generic[J, C, T, P]):
@@ -53,6 +50,11 @@ class Jobs(Generic[J, C, T, P]):
         How often it is looked whether other processes have left or changed something [s].
     slice_s : float
         Processor time after which a job lets others have a turn, where any wait [s].
+
+    Attributes
+    ----------
+    ended : Ended
+        What posteriors that have ended leave.
     """
 
     def __init__(
@@ -74,9 +76,9 @@ class Jobs(Generic[J, C, T, P]):
         self._runner = Runner(
             fold, store, workers, self._version, self._announce, self._holder, slice_s
         )
+        self.ended = Ended(fold, store, workers, self._version, self.get)
         self._tasks: list[asyncio.Task[None]] = []
         self._held: set[str] = set()
-        self._drawing = 0
         self._news = asyncio.Event()
         self._open = False
 
@@ -206,91 +208,6 @@ class Jobs(Generic[J, C, T, P]):
             if record.status in FINISHED:
                 return
             await self._wait(news)
-
-    async def draws(self, job_id: str, media_type: str, client: str = "") -> bytes:
-        """Return the draws of a job that has ended, made anew from its last checkpoint.
-
-        Parameters
-        ----------
-        job_id : str
-            Which job.
-        media_type : str
-            Of one of `service.exports.EXPORTS`.
-        client : str
-            To whom it belongs.
-
-        Returns
-        -------
-        bytes
-            A file.
-
-        Raises
-        ------
-        NotFoundError
-            Where there is none of that name.
-        ConflictError
-            Where the job has not ended, or ended without draws.
-        BusyError
-            Where too many are being made.
-        GoneError
-            Where the draws had to make room for others, or were made by another version.
-        """
-        record = await self._ended(job_id, client)
-        return await self._written(record, functools.partial(write_file, media_type))
-
-    async def scene(self, job_id: str, date: str, client: str = "") -> bytes:
-        """Return a job that has ended as a document of sensor and scene, made from its draws.
-
-        Parameters
-        ----------
-        job_id : str
-            Which job.
-        date : str
-            To be written into it.
-        client : str
-            To whom it belongs.
-
-        Returns
-        -------
-        bytes
-            JSON; for what is raised see `draws`.
-        """
-        record = await self._ended(job_id, client)
-        findings = findings_of(record.result or {}, record.seed, date)
-        return await self._written(record, functools.partial(write_scene, findings))
-
-    async def _ended(self, job_id: str, client: str) -> JobRecord:
-        """Return a job that has draws."""
-        record = await self.get(job_id, client)
-        if record.status not in FINISHED:
-            raise ConflictError("the posterior is not finished: wait for it, or cancel it")
-        if record.result is None or not record.result["drawn"]:
-            raise ConflictError("this posterior ended before anything was drawn")
-        return record
-
-    async def _written(self, record: JobRecord, write: Callable[..., bytes]) -> bytes:
-        """Return what a worker makes of the draws of a job."""
-        kept = await asyncio.to_thread(self._store.drawn, record.id)
-        if kept is None:
-            raise NotFoundError("there is no posterior of this id")
-        if not kept.pieces or record.format != self._version:
-            reason = "made room for those of other posteriors"
-            if kept.pieces:
-                reason = "are in the form of another version of hybridtof"
-            raise GoneError(f"the draws {reason}; ask again with the same seed")
-        if self._drawing >= _MOST_DRAWING:
-            raise BusyError("too many requests for draws wait for their turn")
-        call = write_draws, self._fold.Job.from_bytes, self._fold.Checkpoint.from_bytes
-        future = self._workers.submit_within(
-            _DRAWS_LIMIT_S, *call, self._fold.draw, write, kept.job, kept.pieces
-        )
-        self._drawing += 1
-        try:
-            return await asyncio.wrap_future(future)
-        finally:
-            self._drawing -= 1
-            if not future.done():
-                self._workers.abandon(future)
 
     async def cancel(self, job_id: str, client: str = "") -> JobRecord:
         """End a job after the chunk that runs; one that has ended is left as it is.

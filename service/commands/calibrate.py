@@ -49,7 +49,7 @@ def _run(args: argparse.Namespace) -> int:
     settings = settings_of(args)
     date = datetime.now(UTC).isoformat(timespec="seconds")
     record, document = posterior_of(
-        args, checked_whole(args), settings, lambda jobs, done: jobs.scene(done.id, date)
+        args, checked_whole(args), settings, lambda jobs, done: jobs.ended.scene(done.id, date)
     )
     if document is not None:
         _write(args.output, document + b"\n")

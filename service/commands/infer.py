@@ -81,7 +81,7 @@ def _run(args: argparse.Namespace) -> int:
     form = None if args.draws is None else _format_of(args.draws)
     settings = settings_of(args)
     system = checked_whole(args)
-    make = None if form is None else lambda jobs, record: jobs.draws(record.id, form)
+    make = None if form is None else lambda jobs, record: jobs.ended.draws(record.id, form)
     record, draws = posterior_of(args, system, settings, make)
     if draws is not None:
         args.draws.write_bytes(draws)

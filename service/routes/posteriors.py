@@ -151,7 +151,7 @@ async def draws(request: Request, job_id: str) -> Response:
     if form is None:
         names = " or ".join(form.media_type for form in EXPORTS)
         raise NotAcceptableError(f"draws come as {names}")
-    making = shared_of(request).jobs.draws(job_id, form.media_type, client_of(request))
+    making = shared_of(request).jobs.ended.draws(job_id, form.media_type, client_of(request))
     data = await while_wanted(request, making)
     name = f'attachment; filename="{job_id}{form.suffix}"'
     headers = {"Content-Disposition": name, "Vary": "Accept"}
@@ -166,7 +166,7 @@ async def draws(request: Request, job_id: str) -> Response:
 async def scene(request: Request, job_id: str) -> Response:
     """Return sensor and scene as a finished posterior knows them, for whatever takes a scene."""
     date = datetime.now(UTC).isoformat(timespec="seconds")
-    making = shared_of(request).jobs.scene(job_id, date, client_of(request))
+    making = shared_of(request).jobs.ended.scene(job_id, date, client_of(request))
     return Response(await while_wanted(request, making), media_type="application/json")
 
 
