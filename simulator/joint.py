@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 import pydantic
 
+from simulator.priors import Prior
 from simulator.sensor import PulsedSensor, SineWaveSensor
 from simulator.validated import NonNegative, Number, Positive, Validated
 
@@ -43,7 +44,7 @@ class NormalMode(Validated):
     """
 
     weight: Annotated[Positive, pydantic.Field(le=1)] = 1.0
-    mean: Row
+    mean: Annotated[Row, pydantic.Field(min_length=1)]
     covariance: Annotated[tuple[Row, ...], _LOOSE, pydantic.Field(max_length=_MOST)]
 
     @pydantic.model_validator(mode="after")
@@ -135,11 +136,14 @@ class Learnt(Validated):
     ----------
     unknown : str
         Its scene path.
+    prior : Prior or "default", optional
+        The prior in whose coordinates the `Joint` is. A scene that states another one is refused.
     mean, sd, q05, q95 : float
         In SI units, or in reading units.
     """
 
     unknown: Name
+    prior: Prior | Literal["default"] | None = None
     mean: Number
     sd: NonNegative
     q05: Number

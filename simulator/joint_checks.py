@@ -1,10 +1,12 @@
 """Whether a joint law names unknowns of its scene, and comes from its sensor."""
 
 from simulator.errors import Problem
+from simulator.joint import Calibration
+from simulator.priors import Prior
 from simulator.scene import Quantity, Scene
 from simulator.sensor import Sensor
 
-__all__ = ["check_calibration", "check_joint"]
+__all__ = ["check_calibration", "check_joint", "priors_of"]
 
 # what may be stated better after a calibration, and changes no unknown
 _OF_NOISE = {"noise", "full_scale"}
@@ -14,8 +16,19 @@ _WORDS = {
 }
 
 
-def _unknown(sensor: Sensor, scene: Scene) -> tuple[str, ...]:
-    """Return the scene paths of what is unknown, the law of the ranges apart."""
+def priors_of(sensor: Sensor, scene: Scene) -> dict[str, Prior | None]:
+    """Return the prior of all that is unknown by its scene path, the law of the ranges apart.
+
+    Parameters
+    ----------
+    sensor, scene : Sensor, Scene
+        The scene.
+
+    Returns
+    -------
+    dict
+        None stands for a default.
+    """
     quantities: dict[str, Quantity | None] = {
         f"object.{name}": getattr(scene.object, name) for name in ("c0", "c1", "c2")
     }
@@ -27,14 +40,14 @@ def _unknown(sensor: Sensor, scene: Scene) -> tuple[str, ...]:
         quantities["background.distance_m"] = scene.background.distance_m
         if not scene.shadow_is_object and scene.shadow is not None:
             quantities["background.shadow.c0"], quantities["background.shadow.c1"] = scene.shadow
-    return tuple(path for path, value in quantities.items() if not isinstance(value, float | int))
+    return {path: value for path, value in quantities.items() if not isinstance(value, float | int)}
 
 
 def check_joint(sensor: Sensor, scene: Scene) -> list[Problem]:
     """Check that all that a scene's joint law names is unknown, and certain to be there."""
     if scene.joint is None:
         return []
-    problems, unknown = [], _unknown(sensor, scene)
+    problems, unknown = [], priors_of(sensor, scene)
     for i, name in enumerate(scene.joint.unknowns):
         if name not in unknown:
             of = ", ".join(unknown) or "none"
@@ -65,4 +78,26 @@ def check_calibration(sensor: Sensor, scene: Scene) -> list[Problem]:
         if bad and word not in of.accept:
             message = f"{_WORDS[word]}: calibrate anew, or add {word!r} here to take it"
             problems.append(Problem("/calibration/accept", message))
+    return problems + _check_priors(sensor, scene, of)
+
+
+def _check_priors(sensor: Sensor, scene: Scene, of: Calibration) -> list[Problem]:
+    """Check that the law's coordinates are what they were: in others it has other values."""
+    problems, stated = [], priors_of(sensor, scene)
+    named = () if scene.joint is None else scene.joint.unknowns
+    for i, row in enumerate(of.unknowns):
+        if row.unknown not in named or row.unknown not in stated or row.prior is None:
+            continue
+        here = stated[row.unknown] or "default"
+        if here != row.prior:
+            message = (
+                f"the joint law of {row.unknown} is in coordinates of the prior of its "
+                f"calibration, {_words(row.prior)}, and the scene has {_words(here)}: put that "
+                "back, or calibrate anew"
+            )
+            problems.append(Problem(f"/calibration/unknowns/{i}/prior", message))
     return problems
+
+
+def _words(prior: Prior | str) -> str:
+    return f"the {prior}" if isinstance(prior, str) else prior.model_dump_json()

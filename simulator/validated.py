@@ -29,6 +29,13 @@ def _of_size(value: float) -> float:
     return value
 
 
+# pydantic's words are those of Python where a client writes JSON
+_WORDS = {
+    "dict_type": "Input should be a JSON object",
+    "model_type": "Input should be a JSON object",
+    "model_attributes_type": "Input should be a JSON object",
+    "tuple_type": "Input should be a valid list",
+}
 _SIZE = pydantic.AfterValidator(_of_size)
 
 
@@ -80,12 +87,15 @@ def problems_of(error: pydantic.ValidationError, data: object) -> tuple[Problem,
         The input as plain JSON data, by which union branches are told from fields.
     """
     found: dict[Problem, None] = {}
-    for item in error.errors(include_url=False, include_input=False):
+    for item in error.errors(include_url=False):
+        if item["type"] == "too_short" and len(item["input"]) >= item["ctx"]["min_length"]:
+            continue  # valid items alone were counted, and what is wrong with others is said
         pointer = _pointer(item["loc"], data, item["type"] == "missing")
         if item["type"].startswith("union_tag"):
             pointer += "/" + str(item["ctx"]["discriminator"]).strip("'")
         # pydantic puts the class of a raised ValueError before its text
-        found[Problem(pointer, item["msg"].removeprefix("Value error, "))] = None
+        message = _WORDS.get(item["type"], item["msg"]).removeprefix("Value error, ")
+        found[Problem(pointer, message.replace("Tuple should", "List should"))] = None
     return tuple(found)
 
 

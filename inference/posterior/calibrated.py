@@ -15,7 +15,9 @@ from inference.posterior.selection.models import reduced
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.joint import Joint
+from simulator.joint_checks import priors_of
 from simulator.parameters import Parameters, parameters_of
+from simulator.priors import Prior
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor
 
@@ -109,7 +111,8 @@ def scene_of_draws(
         joint = {"unknowns": names, "modes": modes}
         document["joint"] = joint
         law = Joint.model_validate(joint)
-        calibration["unknowns"] = list(_learnt(names, natural[:, kept]))
+        priors = [priors_of(sensor, prior)[name] for name in names]
+        calibration["unknowns"] = list(_learnt(names, priors, natural[:, kept]))
         calibration["distance"] = _distance(law, z)
     document["calibration"] = calibration
     return parse_scene(document)
@@ -160,12 +163,16 @@ def _numbers(values: Array) -> list[float]:
     return [0.0 if abs(value) < 1e-40 else value for value in values.tolist()]
 
 
-def _learnt(names: list[str], natural: Array) -> Iterable[dict[str, Any]]:
+def _learnt(
+    names: list[str], priors: list[Prior | None], natural: Array
+) -> Iterable[dict[str, Any]]:
     """Describe each unknown for a reader."""
-    for name, column in zip(names, natural.T, strict=True):
+    for name, prior, column in zip(names, priors, natural.T, strict=True):
         low, high = np.quantile(column, [0.05, 0.95])
         values = _numbers(np.array([column.mean(), column.std(), low, high]))
-        yield {"unknown": name, **dict(zip(("mean", "sd", "q05", "q95"), values, strict=True))}
+        stated = "default" if prior is None else prior.model_dump(mode="json")
+        of_draws = dict(zip(("mean", "sd", "q05", "q95"), values, strict=True))
+        yield {"unknown": name, "prior": stated, **of_draws}
 
 
 def _distance(law: Joint, z: Array) -> float:

@@ -27,6 +27,7 @@ def of_coordinates(z: NDArray[np.float64], mode: NDArray[np.intp]) -> dict[str, 
     assert scene.calibration is not None
     assert scene.calibration.frames.count == len(job.frames)
     assert [row.unknown for row in scene.calibration.unknowns] == ["object.c0", "object.c2"]
+    assert all(row.prior is not None for row in scene.calibration.unknowns)
     return scene.joint.model_dump() | {"distance": scene.calibration.distance}
 
 

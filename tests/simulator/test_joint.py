@@ -28,13 +28,26 @@ MODES: list[dict[str, Any]] = [
     },
 ]
 JOINT: dict[str, Any] = {"unknowns": ["object.c0", "object.c1", "crosstalk.w1"], "modes": MODES}
+STATED: dict[str, Any] = {"unknown": "crosstalk.w1", "mean": 0.1, "sd": 0.1, "q05": 0.0, "q95": 0.2}
+STATED["prior"] = PRIOR["crosstalk"][0]
 CALIBRATION: dict[str, Any] = {
     "sensor": SENSOR.model_dump(mode="json"),
     "converged": True,
     "misfit": False,
     "frames": {"count": 3, "sha256": "0" * 64},
     "model_error": [0.072, 0.0008],
-    "unknowns": [{"unknown": "object.c0", "mean": 0.1, "sd": 0.01, "q05": 0.09, "q95": 0.11}],
+    "unknowns": [
+        {"unknown": "object.c0", "mean": 0.1, "sd": 0.01, "q05": 0.09, "q95": 0.11},
+        {
+            "unknown": "object.c1",
+            "prior": "default",
+            "mean": 0.0,
+            "sd": 0.1,
+            "q05": -0.1,
+            "q95": 0.1,
+        },
+        STATED,
+    ],
 }
 
 
@@ -193,6 +206,24 @@ def changed(mode: int, **members: Any) -> dict[str, Any]:
             "another sensor",
         ),
         ({"calibration": CALIBRATION | {"accept": ["all"]}}, "/calibration/accept/0", "misfit"),
+        (
+            {"crosstalk": [{"prior": "halfnormal", "sd": 0.03}, 0.1]},
+            "/calibration/unknowns/2/prior",
+            "put that back",
+        ),
+        (
+            {"object": {"c1": {"prior": "normal", "mean": 0.0, "sd": 0.1}}},
+            "/calibration/unknowns/1/prior",
+            "the default",
+        ),
+        ({"joint": changed(1, weight=-1.0)}, "/joint/modes/1/weight", "greater than 0"),
+        (
+            {"joint": JOINT | {"modes": [{"mean": [], "covariance": []}]}},
+            "/joint/modes/0/mean",
+            "1",
+        ),
+        ({"joint": []}, "/joint", "JSON object"),
+        ({"calibration": CALIBRATION | {"accept": "misfit"}}, "/calibration/accept", "valid list"),
     ],
 )
 def test_bad_documents(changes: dict[str, Any], pointer: str, words: str) -> None:
