@@ -22,6 +22,7 @@ from service.streams.model import model_of
 from service.streams.room import Room
 from service.streams.taking import Place, Taken, take
 from service.streams.writer import Writer
+from simulator.errors import InvalidInputError
 
 __all__ = ["Producer", "lines_of", "place_of"]
 
@@ -40,8 +41,12 @@ def place_of(record: StreamRecord, model: Tracker) -> Place:
     GoneError
         Where the state is of another version of the tracker.
     """
-    state = state_from_bytes(record.state)
-    if state.signature != model.first.signature:
+    try:
+        state = state_from_bytes(record.state)
+        same = state.signature == model.first.signature
+    except InvalidInputError:  # its form is another one
+        same = False
+    if not same:
         raise GoneError("the stream's state is of another version of hybridtof: make a new one")
     return Place(state, record.sequence, last=record.last, **record.counts)
 

@@ -16,14 +16,17 @@ from websockets.exceptions import InvalidStatus
 
 from benchmarks.kills import postgres
 from benchmarks.streams import lines_of, survived, system
+from inference.tracking.state import state_to_bytes
 from service.app import create_app
 from service.border.keys import new_key, write_keys
 from service.cli import main
-from service.errors import BusyError
+from service.errors import BusyError, GoneError
 from service.service_settings import ServiceSettings
 from service.store.stream_record import StreamChange, StreamRecord
 from service.store.stream_store import StreamStore
 from service.store.transactions import Transactions
+from service.streams.model import model_of
+from service.streams.producer import place_of
 from tests.service import fake_fold
 from tests.service.conftest import listening, speaking
 from tests.service.test_store import Clock
@@ -262,6 +265,15 @@ def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[StreamStor
         database = Transactions(found)
         stack.callback(database.close)
         yield StreamStore(database, 4, 10.0, 100.0, 8, Clock())
+
+
+def test_after_an_upgrade_a_stream_is_gone_and_says_so(store: StreamStore) -> None:
+    """The form of the tracker's state changes; nobody has sent a state that could be wrong."""
+    request = json.dumps(system()).encode()
+    model = model_of(request)
+    assert place_of(store.add("a", "k", request, state_to_bytes(model.first)), model).sequence == -1
+    with pytest.raises(GoneError, match="another version"):
+        place_of(store.add("b", "k", request, b"a state in another form"), model)
 
 
 def test_the_store(store: StreamStore) -> None:
