@@ -112,7 +112,8 @@ class Traces:
 
     def tell(self, scope: Scope, told: Told) -> None:
         """Count a request, and write its line."""
-        method = scope["method"] if scope["method"] in _METHODS else "other"
+        method = scope.get("method", "GET")  # a WebSocket begins as one, and has none
+        method = method if method in _METHODS else "other"
         route = scope.get("hybridtof.route", "none")
         status = _GONE if told.status is None else told.status
         kind = (method, route, status)
