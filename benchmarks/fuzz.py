@@ -34,8 +34,8 @@ def checked(examples: int, phases: str) -> int:
         database = {"HYBRIDTOF_DATABASE": f"sqlite:///{folder}/jobs.sqlite"}
         with served("tests.service.fake_server", "{}", str(2**23), settings=database) as address:
             command = (sys.executable, "-m", "schemathesis.cli", "--config-file", str(CONFIG))
-            options = ("--phases", phases, "--max-examples", str(examples))
-            options = (*options, "--exclude-path-regex", test_schemathesis.NO_END)
+            limits = ("--phases", phases, "--max-examples", str(examples))
+            options = (*limits, "--exclude-path-regex", test_schemathesis.NO_END)
             document = f"{address}/openapi.json"
             return subprocess.run(  # noqa: S603
                 (*command, "run", document, *options, "--continue-on-failure"), cwd=folder
