@@ -269,7 +269,8 @@ def test_what_a_scene_lacks_costs_nothing() -> None:
         density = collapsed_density(scene.sensor, scene.free, made.frames)
         z = np.zeros((1, len(density.parameters)))
         evaluate = functools.partial(density.frame_log_likelihoods, z)
-        counts[name] = [operations_of(evaluate) for _ in range(2)]
+        # the first call of all may prepare something
+        counts[name] = [operations_of(evaluate) for _ in range(3)][1:]
     for first, second in counts.values():
         assert first == second > 1000
     assert counts["Known crosstalk"][0] < 1.1 * counts["Bare object"][0]
