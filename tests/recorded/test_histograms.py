@@ -99,7 +99,7 @@ def test_stated_noise_is_that_of_counted_photons(form: object) -> None:
 def test_bad_files(tmp_path: Path, document: object) -> None:
     path = tmp_path / "recording.json"
     path.write_text(json.dumps(document))
-    with pytest.raises(MalformedError, match="recording.json: "):
+    with pytest.raises(MalformedError, match=r"recording\.json: "):
         read_recording(path)
 
 
