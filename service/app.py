@@ -27,8 +27,8 @@ from service.store.database import default_url
 from service.store.retention import Retention
 from service.store.sql_store import SqlJobStore
 from service.store.stream_store import StreamStore
+from service.streams.lines import WINDOW
 from service.streams.streams import Streams
-from service.streams.taking import WINDOW
 from service.warm.warming import Warming
 
 __all__ = ["create_app"]

@@ -87,4 +87,5 @@ def stream_of(record: StreamRecord, status: str) -> dict[str, Any]:
     """Return the body of ``GET /v1/streams/{id}``."""
     sequence = None if record.sequence < 0 else record.sequence
     head = {"id": record.id, "status": status, "sequence": sequence}
-    return head | _NONE_YET | record.counts | {"last": orjson.loads(record.last or b"null")}
+    counts = {name: record.counts.get(name, none) for name, none in _NONE_YET.items()}
+    return head | counts | {"last": orjson.loads(record.last or b"null")}

@@ -41,7 +41,8 @@ def _run(args: argparse.Namespace) -> int:
     from service.requests import TrackedSystem
     from service.streams.forms import Form, form_like
     from service.streams.kept import Kept
-    from service.streams.taking import Line, Place, take
+    from service.streams.lines import Line, Place
+    from service.streams.taking import take
 
     stated = read_document(TrackedSystem, args.scene)
     with naming({"/settings": f"{args.scene}#/tracking", "": str(args.scene)}):

@@ -2,13 +2,13 @@
 
 import orjson
 
-from service.streams.taking import WINDOW, Taken
+from service.streams.lines import WINDOW, Taken
 
 __all__ = ["Kept"]
 
 
 class Kept:
-    """Answers by their numbers; see `service.streams.taking.Earlier`."""
+    """Answers by their numbers; see `service.streams.lines.Earlier`."""
 
     def __init__(self) -> None:
         self._answers: dict[int, bytes] = {}

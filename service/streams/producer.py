@@ -18,15 +18,16 @@ from service.store.stream_record import StreamChange, StreamRecord
 from service.store.stream_store import StreamStore
 from service.streams.cutting import Cutter
 from service.streams.forms import JsonLines
+from service.streams.lines import COUNTS, Place, Taken
 from service.streams.model import model_of
 from service.streams.room import Room
-from service.streams.taking import Place, Taken, take
+from service.streams.taking import take
 from service.streams.writer import Writer
 from simulator.errors import InvalidInputError
 
 __all__ = ["Producer", "lines_of", "place_of"]
 
-_COUNTS = ("answered", "errors", "dropped", "gaps", "surprise", "misfit")
+_KEPT = (*COUNTS, "unnumbered", "surprise", "misfit")
 _BLOCK = 2**16
 _TRIES = 3
 
@@ -163,7 +164,7 @@ class Producer:
         """Answer some lines, once what they change is kept."""
         for _ in range(_TRIES):
             taken, change = await anyio.to_thread.run_sync(self._taken, lines, limiter=self.limiter)
-            if not taken.new or await self.writer.write(change):
+            if not taken.changed or await self.writer.write(change):
                 self._count(taken)
                 return taken
             await asyncio.to_thread(self._reload)
@@ -176,9 +177,9 @@ class Producer:
         change = StreamChange(
             self.record.id,
             self.record.number,
-            state_to_bytes(place.state) if taken.new else b"",
+            state_to_bytes(place.state) if taken.changed else b"",
             place.sequence,
-            {name: getattr(place, name) for name in _COUNTS},
+            {name: getattr(place, name) for name in _KEPT},
             place.last,
             b"".join(line + b"\n" for line in taken.new),
             self.holder,
@@ -202,7 +203,7 @@ class Producer:
 
     def _count(self, taken: Taken) -> None:
         before, self.place = self.place, taken.place
-        if taken.new:
+        if taken.changed:
             self.record = dataclasses.replace(self.record, number=self.record.number + 1)
             self.changed()
         lines = self.traces.lines

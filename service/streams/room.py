@@ -9,7 +9,7 @@ import time
 from collections import deque
 from collections.abc import Iterable
 
-from service.streams.taking import Line
+from service.streams.lines import Line
 
 __all__ = ["STALE_S", "Room"]
 

@@ -7,18 +7,18 @@ However the lines are cut into batches, the answers are the same to the last bit
 import dataclasses
 import time
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 import numpy as np
 
 from inference.tracking.hypotheses import TIME
-from inference.tracking.state import TrackState
 from inference.tracking.track import step
 from inference.tracking.tracker import Tracker
 from service.errors import BodyTooLargeError, ConflictError, GoneError
 from service.streams.answered import answers_of, encoded, error_of
 from service.streams.cutting import LONGEST
 from service.streams.forms import Form
+from service.streams.lines import COUNTS, WINDOW, Earlier, Line, Place, Taken
 from service.streams.shapes import (
     Shape,
     frames_of,
@@ -30,92 +30,9 @@ from service.streams.shapes import (
 from simulator.errors import HybridTofError, InvalidInputError
 from simulator.frames import Frames
 
-__all__ = ["WINDOW", "Earlier", "Line", "Place", "Taken", "take"]
-
-WINDOW = 4096
-"""Numbers behind the last one whose answers are kept."""
+__all__ = ["take"]
 
 _LARGEST = 2**53 - 1
-
-
-class Line(NamedTuple):
-    """A line as it arrived.
-
-    Attributes
-    ----------
-    raw : bytes or None
-        None: it was too long.
-    arrived : float
-        When, by `time.perf_counter`.
-    dropped : int
-        How many lines before it were dropped unread.
-    """
-
-    raw: bytes | None
-    arrived: float
-    dropped: int = 0
-
-
-@dataclasses.dataclass(frozen=True)
-class Place:
-    """Where a stream stands.
-
-    Attributes
-    ----------
-    state : TrackState
-        The tracker's.
-    sequence : int
-        Number of the last line that was answered; -1 before the first.
-    answered, errors, dropped, gaps : int
-        Frames that were tracked, lines that were answered by an error, lines that were dropped
-        unread, numbers that never came.
-    surprise : float or None
-        The tracker's, after the last frame.
-    misfit : bool
-        Whether that is more than chance allows.
-    last : bytes
-        The last answer; empty before the first.
-    """
-
-    state: TrackState
-    sequence: int = -1
-    answered: int = 0
-    errors: int = 0
-    dropped: int = 0
-    gaps: int = 0
-    surprise: float | None = None
-    misfit: bool = False
-    last: bytes = b""
-
-
-class Earlier(Protocol):
-    """Answers that were given before, to the last `WINDOW` numbers at least."""
-
-    def answer(self, sequence: int) -> bytes | None:
-        """Return the answer to a number; None where it has none."""
-        ...
-
-
-class Taken(NamedTuple):
-    """What has become of some lines.
-
-    Attributes
-    ----------
-    place : Place
-        Where the stream stands after them.
-    answers : list of bytes
-        One a line.
-    new : list of bytes
-        Those that were not given before, which are to be kept.
-    repeated : int
-        How many lines had come before.
-    """
-
-    place: Place
-    answers: list[bytes]
-    new: list[bytes]
-    repeated: int
-
 
 # a frame that waits for the tracker, together with others of its shape: where its answer goes, its
 # number, time and arrival, its values, and what else is to be said
@@ -165,7 +82,8 @@ class _Batch:
         self._state = place.state
         self._sequence = place.sequence
         self._time = float(place.state.hypotheses.numbers[TIME])
-        self._counts = dataclasses.asdict(_Counts())
+        self._unnumbered = place.unnumbered
+        self._counts = dict.fromkeys(COUNTS, 0)
         self._surprise, self._misfit = place.surprise, place.misfit
         self._answers: list[bytes] = []
         self._at: dict[int, int] = {}
@@ -186,48 +104,55 @@ class _Batch:
             self._place,
             state=self._state,
             sequence=self._sequence,
+            unnumbered=self._unnumbered,
             surprise=self._surprise,
             misfit=self._misfit,
             last=new[-1] if new else self._place.last,
             **{name: getattr(self._place, name) + n for name, n in self._counts.items()},
         )
-        return Taken(place, self._answers, new, repeated)
+        return Taken(place, self._answers, new, repeated, any(self._counts.values()))
 
     def _take(self, line: Line) -> None:
         """Answer a line, or let it wait for the tracker."""
         at = len(self._answers)
         self._answers.append(b"")
-        after = self._sequence + 1 + line.dropped
-        sequence = max(after, 1) if self._sequence < 0 else after
+        after = max(self._sequence, 0) + 1 + self._unnumbered + line.dropped
         self._counts["dropped"] += line.dropped
         frame: dict[str, Any] = {}
-        problem: HybridTofError | None = None
         try:
             if line.raw is None:
                 raise BodyTooLargeError(f"the line has more than {LONGEST} bytes")
             frame = self._form.frame_in(line.raw)
-            if (own := frame.get("sequence")) is not None:
-                if type(own) is not int or not 0 <= own <= _LARGEST:
-                    message = "must be an integer from 0 to 2^53 - 1"
-                    raise InvalidInputError.at("/sequence", message)
-                sequence = own
+            sequence = _number(frame, after)
         except HybridTofError as error:
-            problem = error
+            # the number is free still: a line that states it may follow
+            self._unnumbered += line.dropped + 1
+            self._refuse(at, after, error, _also(0, line), frame)
+            return
         if sequence <= self._sequence:
             self._repeats.append((at, sequence, self._sequence))
             return
         also = _also(sequence - after if self._sequence >= 0 else 0, line)
         self._counts["gaps"] += also.get("gap", 0)
-        self._sequence = sequence
+        self._sequence, self._unnumbered = sequence, 0
         self._at[sequence] = at
         try:
-            if problem is not None:
-                raise problem
             self._wait(at, sequence, also, line, frame)
         except HybridTofError as error:
-            self._counts["errors"] += 1
-            said = {"sequence": sequence, "error": error_of(error), **also}
-            self._answers[at] = encoded(said | {n: frame[n] for n in frame if passes(n)})
+            self._refuse(at, sequence, error, also, frame)
+
+    def _refuse(
+        self,
+        at: int,
+        sequence: int,
+        error: HybridTofError,
+        also: dict[str, Any],
+        frame: dict[str, Any],
+    ) -> None:
+        """Answer a line by an error."""
+        self._counts["errors"] += 1
+        said = {"sequence": sequence, "error": error_of(error), **also}
+        self._answers[at] = encoded(said | {n: frame[n] for n in frame if passes(n)})
 
     def _wait(
         self, at: int, sequence: int, also: dict[str, Any], line: Line, frame: dict[str, Any]
@@ -294,6 +219,16 @@ class _Batch:
         return encoded({"sequence": sequence, "error": error_of(error)})
 
 
+def _number(frame: dict[str, Any], after: int) -> int:
+    """Return the number that a line states, or else the one that comes next."""
+    own = frame.get("sequence")
+    if own is None:
+        return after
+    if type(own) is not int or not 0 <= own <= _LARGEST:
+        raise InvalidInputError.at("/sequence", "must be an integer from 0 to 2^53 - 1")
+    return own
+
+
 def _also(gap: int, line: Line) -> dict[str, Any]:
     """Return what is missing before a line."""
     also = {}
@@ -302,11 +237,3 @@ def _also(gap: int, line: Line) -> dict[str, Any]:
     if line.dropped:
         also["dropped"] = line.dropped
     return also
-
-
-@dataclasses.dataclass
-class _Counts:
-    answered: int = 0
-    errors: int = 0
-    dropped: int = 0
-    gaps: int = 0

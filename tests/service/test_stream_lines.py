@@ -16,8 +16,9 @@ from service.errors import MalformedError
 from service.streams.cutting import LONGEST, Cutter
 from service.streams.forms import JsonLines
 from service.streams.kept import Kept
+from service.streams.lines import WINDOW, Line, Place
 from service.streams.room import STALE_S, Room
-from service.streams.taking import WINDOW, Line, Place, take
+from service.streams.taking import take
 from service.strict_json import decode
 from simulator.errors import InvalidInputError
 from simulator.scene import parse_scene
@@ -66,7 +67,8 @@ def test_what_is_answered(model: Tracker) -> None:
     assert found[0]["stamp"] == {"sec": 1}
     assert found[7]["gap"] == 12
     assert found[8] == found[7]  # a number that came before is answered as before
-    assert found[9] == found[2]
+    # the third line could not be read, and took no number
+    assert found[9]["error"]["type"].endswith("conflict")
     assert found[10]["error"]["type"].endswith("conflict")
     # bad lines change nothing of what the others are answered
     good = [raw for n, raw in enumerate(LINES) if n not in errors and n != 8]
@@ -84,6 +86,20 @@ def test_cut_anywhere_is_whole(model: Tracker, cuts: set[int]) -> None:
     ends = [0, *sorted(cuts), len(LINES)]
     batches = [LINES[a:b] for a, b in itertools.pairwise(ends)]
     assert answered(model, batches) == answered(model, [LINES])
+
+
+def test_a_line_without_a_readable_number_takes_none(model: Tracker) -> None:
+    """What a microcontroller says as it starts, and a line that was torn in two."""
+    lines: list[bytes | None] = [
+        b"rst:0x1 (POWERON_RESET)", b"entry 0x400805e4", frame(1, sequence=0), frame(2, sequence=1),
+        b'{"time_s": 0.3, "seq', b'uence": 2, "w1": 0.02, "w2": 1.6}', frame(4, sequence=2),
+        frame(5, sequence=3), None, frame(6), frame(7, sequence=6), frame(8, sequence="x"),
+    ]  # fmt: skip
+    found = answered(model, [lines])
+    assert [answer["sequence"] for answer in found] == [1, 2, 0, 1, 2, 3, 2, 3, 4, 5, 6, 7]
+    assert [n for n, answer in enumerate(found) if "error" in answer] == [0, 1, 4, 5, 8, 11]
+    assert not any("gap" in answer for answer in found)
+    assert answered(model, [[line] for line in lines]) == found
 
 
 def test_before_the_window(model: Tracker) -> None:
@@ -185,6 +201,8 @@ def test_rooms() -> None:
 def test_dropped_lines_have_their_numbers(model: Tracker) -> None:
     now = time.perf_counter()
     lines = [Line(frame(1), now), Line(frame(5), now, 3), Line(frame(6, sequence=9), now, 1)]
+    (first,) = take(model, Place(model.first), lines[1:2], JsonLines(), Kept()).answers
+    assert json.loads(first)["sequence"] == 4
     taken = take(model, Place(model.first), lines, JsonLines(), Kept())
     found = [json.loads(answer) for answer in taken.answers]
     assert [(a["sequence"], a.get("dropped"), a.get("gap")) for a in found] == [

@@ -169,6 +169,12 @@ async def test_the_stream_outlives_junk(address: str) -> None:
             await asyncio.sleep(0.01)
         assert json.loads(response.text)["sequence"] == 9
         assert "error" not in json.loads(response.text)
+        # junk by itself is counted, and leaves its number to a line that states it
+        (junk,) = await sent(http, path, b"junk")
+        (good,) = await sent(http, path, LINES[9])
+        assert (junk["sequence"], good["sequence"], "error" in good) == (10, 10, False)
+        stands = (await http.get(path)).json()
+        assert (stands["sequence"], stands["answered"], stands["errors"]) == (10, 6, 5)
 
 
 async def test_streams_belong_to_keys(tmp_path: Path) -> None:

@@ -1,0 +1,99 @@
+"""Lines of a stream, where it stands, and what was answered."""
+
+import dataclasses
+from typing import NamedTuple, Protocol
+
+from inference.tracking.state import TrackState
+
+__all__ = ["COUNTS", "WINDOW", "Earlier", "Line", "Place", "Taken"]
+
+WINDOW = 4096
+"""Numbers behind the last one whose answers are kept."""
+
+COUNTS = ("answered", "errors", "dropped", "gaps")
+"""Of lines, by what became of them: members of `Place`."""
+
+
+class Line(NamedTuple):
+    """A line as it arrived.
+
+    Attributes
+    ----------
+    raw : bytes or None
+        None: it was too long.
+    arrived : float
+        When, by `time.perf_counter`.
+    dropped : int
+        How many lines before it were dropped unread.
+    """
+
+    raw: bytes | None
+    arrived: float
+    dropped: int = 0
+
+
+@dataclasses.dataclass(frozen=True)
+class Place:
+    """Where a stream stands.
+
+    Attributes
+    ----------
+    state : TrackState
+        The tracker's.
+    sequence : int
+        Number of the last line that was answered; -1 before the first.
+    answered, errors, dropped, gaps : int
+        Frames that were tracked, lines that were answered by an error, lines that were dropped
+        unread, numbers that never came.
+    unnumbered : int
+        How far numbers are counted on over lines since then whose own could not be read.
+    surprise : float or None
+        The tracker's, after the last frame.
+    misfit : bool
+        Whether that is more than chance allows.
+    last : bytes
+        The last answer; empty before the first.
+    """
+
+    state: TrackState
+    sequence: int = -1
+    answered: int = 0
+    errors: int = 0
+    dropped: int = 0
+    gaps: int = 0
+    unnumbered: int = 0
+    surprise: float | None = None
+    misfit: bool = False
+    last: bytes = b""
+
+
+class Earlier(Protocol):
+    """Answers that were given before, to the last `WINDOW` numbers at least."""
+
+    def answer(self, sequence: int) -> bytes | None:
+        """Return the answer to a number; None where it has none."""
+        ...
+
+
+class Taken(NamedTuple):
+    """What has become of some lines.
+
+    Attributes
+    ----------
+    place : Place
+        Where the stream stands after them.
+    answers : list of bytes
+        One a line.
+    new : list of bytes
+        Those that were not given before, which are to be kept.
+    repeated : int
+        How many lines had come before.
+    changed : bool
+        Whether the stream stands elsewhere after them.
+    """
+
+    place: Place
+    answers: list[bytes]
+    new: list[bytes]
+    repeated: int
+    changed: bool
