@@ -4,7 +4,7 @@ import hashlib
 import re
 from collections.abc import AsyncIterable, AsyncIterator
 from datetime import UTC, datetime
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.responses import Response
@@ -18,10 +18,10 @@ from service.checked_system import checked_frames
 from service.errors import MalformedError, NotAcceptableError
 from service.exports import EXPORTS
 from service.exports.negotiation import accepted_export
-from service.json_text import encode
 from service.lanes import while_wanted
 from service.problems import problem_responses
 from service.requests import PosteriorRequest, SystemDescription
+from service.routes.resources import Cursor, LastEventId, answered, event_of, place_of
 from service.shared import client_of, shared_of
 from service.store.record import FINISHED, JobRecord
 
@@ -30,19 +30,14 @@ __all__ = ["router"]
 router = APIRouter(prefix="/v1/posteriors", tags=["posteriors"])
 Body = Annotated[tuple[PosteriorRequest, bytes], Depends(BodyOf(PosteriorRequest))]
 
-_KEY = re.compile(r"[\x21-\x7e]{1,255}")
 # by which OpenAPI says what is refused here, with words of its own
-_KEY_PATTERN, _CURSOR_PATTERN = "^[!-~]{1,255}$", "^[0-9]{1,18}$"
+_KEY = "^[!-~]{1,255}$"
 
 
 def _key(header: str | None) -> str | None:
-    if header is not None and not _KEY.fullmatch(header):
+    if header is not None and not re.fullmatch(_KEY, header):
         raise MalformedError("Idempotency-Key must be 1 to 255 visible ASCII characters")
     return header
-
-
-def _answer(body: Any, status: int = 200, headers: dict[str, str] | None = None) -> Response:
-    return Response(encode(body), status, headers, "application/json")
 
 
 @router.post(
@@ -54,9 +49,7 @@ def _answer(body: Any, status: int = 200, headers: dict[str, str] | None = None)
 async def create(
     request: Request,
     body: Body,
-    idempotency_key: Annotated[
-        str | None, Header(json_schema_extra={"pattern": _KEY_PATTERN})
-    ] = None,
+    idempotency_key: Annotated[str | None, Header(json_schema_extra={"pattern": _KEY})] = None,
 ) -> Response:
     """Start a posterior; the same Idempotency-Key with the same body gives the same one."""
     key = _key(idempotency_key)
@@ -70,7 +63,7 @@ async def create(
     record = await shared.jobs.submit(
         *checked, sampler, key=key, digest=digest, client=client_of(request)
     )
-    return _answer(full(record), 202, {"Location": f"/v1/posteriors/{record.id}"})
+    return answered(full(record), 202, {"Location": f"/v1/posteriors/{record.id}"})
 
 
 @router.get(
@@ -80,16 +73,14 @@ async def create(
 )
 async def page(
     request: Request,
-    cursor: Annotated[str | None, Query(json_schema_extra={"pattern": _CURSOR_PATTERN})] = None,
+    cursor: Cursor = None,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
 ) -> Response:
     """List posteriors, the newest first; ``next_cursor`` is null on the last page."""
-    if cursor is not None and not re.fullmatch(_CURSOR_PATTERN, cursor):
-        raise MalformedError("the cursor is not one that this service gave")
-    after = None if cursor is None else int(cursor)
-    records = await shared_of(request).jobs.page(after, limit + 1, client_of(request))
+    after, client = place_of(cursor), client_of(request)
+    records = await shared_of(request).jobs.page(after, limit + 1, client)
     more = str(records[limit - 1].sequence) if len(records) > limit else None
-    return _answer({"items": [brief(r) for r in records[:limit]], "next_cursor": more})
+    return answered({"items": [brief(r) for r in records[:limit]], "next_cursor": more})
 
 
 @router.get(
@@ -99,17 +90,16 @@ async def page(
 )
 async def get(request: Request, job_id: str) -> Response:
     """Return a posterior as it stands."""
-    return _answer(full(await shared_of(request).jobs.get(job_id, client_of(request))))
+    return answered(full(await shared_of(request).jobs.get(job_id, client_of(request))))
 
 
 async def _followed(
     request: Request,
     job_id: str,
-    last_event_id: Annotated[str | None, Header(description="of the last event seen")] = None,
+    last_event_id: LastEventId = None,
 ) -> AsyncIterator[JobRecord]:
     """Refuse before the stream begins, where there is nothing to follow."""
-    known = last_event_id or ""
-    after = int(known) if re.fullmatch(r"[0-9]{1,9}", known) else 0
+    after = event_of(last_event_id)
     jobs = shared_of(request).jobs
     record = await jobs.get(job_id, client_of(request))
     if record.status in FINISHED and record.revision <= after:
@@ -178,7 +168,7 @@ async def scene(request: Request, job_id: str) -> Response:
 )
 async def cancel(request: Request, job_id: str) -> Response:
     """End a posterior after the chunk that runs; it keeps what it has. One that ended stays."""
-    return _answer(full(await shared_of(request).jobs.cancel(job_id, client_of(request))), 202)
+    return answered(full(await shared_of(request).jobs.cancel(job_id, client_of(request))), 202)
 
 
 @router.delete("/{job_id}", status_code=204, response_model=None, responses=problem_responses(404))

@@ -3,9 +3,9 @@
 import asyncio
 import re
 from collections.abc import AsyncIterable, AsyncIterator
-from typing import Annotated, Any
+from typing import Annotated
 
-from fastapi import APIRouter, Depends, Header, Query, Request, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, Depends, Query, Request, WebSocket, WebSocketDisconnect
 from fastapi.responses import Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.exceptions import HTTPException
@@ -13,10 +13,10 @@ from starlette.types import Receive, Scope, Send
 
 from service.answers.streams import StreamLine, StreamPage, StreamResponse, stream_of
 from service.bodies import BodyOf, check_media_type, read_limited
-from service.errors import MalformedError, SlowClientError
-from service.json_text import encode
+from service.errors import SlowClientError
 from service.problems import problem_responses, response_of
 from service.requests import StreamRequest
+from service.routes.resources import Cursor, LastEventId, answered, event_of, place_of
 from service.shared import client_of, shared_of
 from service.store.stream_record import StreamRecord
 from service.streams.answered import encoded, error_of
@@ -33,10 +33,6 @@ _KINDS = re.compile(r"application/(x-ndjson|ndjson|jsonl|json-seq|json|x-jsonlin
 _QUIET_S = 60.0
 
 
-def _answer(body: Any, status: int = 200, headers: dict[str, str] | None = None) -> Response:
-    return Response(encode(body), status, headers, "application/json")
-
-
 @router.post(
     "",
     status_code=201,
@@ -48,7 +44,7 @@ async def create(request: Request, body: Body) -> Response:
     streams = shared_of(request).streams
     record = await streams.create(body[1], client_of(request))
     headers = {"Location": f"/v1/streams/{record.id}"}
-    return _answer(stream_of(record, streams.status(record)), 201, headers)
+    return answered(stream_of(record, streams.status(record)), 201, headers)
 
 
 @router.get(
@@ -58,18 +54,15 @@ async def create(request: Request, body: Body) -> Response:
 )
 async def page(
     request: Request,
-    cursor: str | None = None,
+    cursor: Cursor = None,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
 ) -> Response:
     """List streams, the newest first; ``next_cursor`` is null on the last page."""
-    if cursor is not None and not re.fullmatch(r"[0-9]{1,18}", cursor):
-        raise MalformedError("the cursor is not one that this service gave")
     streams = shared_of(request).streams
-    after = None if cursor is None else int(cursor)
-    records = await streams.page(after, limit + 1, client_of(request))
+    records = await streams.page(place_of(cursor), limit + 1, client_of(request))
     more = str(records[limit - 1].arrival) if len(records) > limit else None
     items = [stream_of(record, streams.status(record)) for record in records[:limit]]
-    return _answer({"items": items, "next_cursor": more})
+    return answered({"items": items, "next_cursor": more})
 
 
 @router.get(
@@ -81,7 +74,7 @@ async def get(request: Request, stream_id: str) -> Response:
     """Return a stream as it stands: counts, health, its last answer."""
     streams = shared_of(request).streams
     record = await streams.get(stream_id, client_of(request))
-    return _answer(stream_of(record, streams.status(record)))
+    return answered(stream_of(record, streams.status(record)))
 
 
 @router.delete(
@@ -96,11 +89,10 @@ async def delete(request: Request, stream_id: str) -> Response:
 async def _followed(
     request: Request,
     stream_id: str,
-    last_event_id: Annotated[str | None, Header(description="of the last event seen")] = None,
+    last_event_id: LastEventId = None,
 ) -> AsyncIterator[tuple[StreamRecord, str]]:
     """Refuse before the events begin, where there is nothing to follow."""
-    known = last_event_id or ""
-    after = int(known) if re.fullmatch(r"[0-9]{1,9}", known) else 0
+    after = event_of(last_event_id)
     streams = shared_of(request).streams
     record = await streams.get(stream_id, client_of(request))
     if streams.status(record) == "expired" and record.number <= after:

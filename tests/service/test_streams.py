@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import logging
 import random
 import socket
 from collections.abc import AsyncIterator, Iterator
@@ -109,6 +110,27 @@ async def test_the_way_of_a_stream(address: str, tmp_path: Path, capsys: Any) ->
     await asyncio.to_thread(main, ["track", str(frames), "--scene", str(scene)])
     out = capsys.readouterr().out.splitlines()
     assert plain([json.loads(line) for line in out]) == plain(answers)
+
+
+async def test_a_websocket_is_told_of(address: str, caplog: pytest.LogCaptureFixture) -> None:
+    """One that was answered and one that was refused: a line and a count of each, and no error."""
+    caplog.set_level(logging.INFO)
+    async with speaking(f"http://{address}") as http:
+        path = await made(http)
+        for name in (path, "/v1/streams/none"):
+            with contextlib.suppress(InvalidStatus):
+                async with websockets.connect(f"ws://{address}{name}/live") as socket_:
+                    await socket_.send(LINES[0].decode())
+                    await socket_.recv()
+        while "hybridtof_requests_open 1.0" not in (await http.get("/metrics")).text:
+            await asyncio.sleep(0.005)
+        counts = (await http.get("/metrics")).text
+    for status in (101, 404):
+        route = "/v1/streams/{stream_id}/live"
+        assert f"GET {route} {status}" in caplog.messages
+        same = f'{{method="GET",route="{route}",status="{status}"}}'
+        assert f"hybridtof_requests_total{same} 1.0" in counts
+    assert "Exception in ASGI application" not in caplog.text
 
 
 async def test_bad_requests(address: str) -> None:
