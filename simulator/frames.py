@@ -9,7 +9,7 @@ import pydantic
 from numpy.typing import ArrayLike, NDArray
 
 from simulator.errors import InvalidInputError, Problem
-from simulator.known_ranges import MAY_BE_NULL, known_range_problems
+from simulator.known_ranges import MAY_BE_NULL, known_range_problems, telling
 from simulator.sensor import Sensor
 from simulator.validated import Validated
 
@@ -185,7 +185,7 @@ def frames_from_columns(
         ),
         gain=arrays.get("gain"),
         object_present=arrays.get("object_present"),
-        **{name: arrays.get(name) for name in MAY_BE_NULL},
+        **telling(arrays),
     )
 
 

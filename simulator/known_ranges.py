@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from simulator.errors import Problem
 
-__all__ = ["MAY_BE_NULL", "known_range_problems"]
+__all__ = ["MAY_BE_NULL", "known_range_problems", "telling"]
 
 Array = NDArray[np.float64]
 
@@ -52,6 +52,16 @@ def known_range_problems(columns: Mapping[str, NDArray[Any]], max_range_m: float
     if _MOVED[0] in columns and not problems:
         problems += _unmoved(columns, max_range_m)
     return problems
+
+
+def telling(columns: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
+    """Return those of the columns that tell anything: one of nulls is as good as none."""
+    return {
+        name: columns[name]
+        for pair in (_KNOWN, _MOVED)
+        if pair[0] in columns and np.isfinite(columns[pair[0]]).any()
+        for name in pair
+    }
 
 
 def _loose(value: Array, sd: Array, name: str) -> list[Problem]:

@@ -14,12 +14,13 @@ from inference.identifiability.expected_posterior import (
 )
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.information import Information
+from inference.identifiability.odometry import with_rates
 from inference.identifiability.reasons import Diagnosis
 from inference.identifiability.remedies import Offer
 from inference.identifiability.status import Identifiability
 from inference.identifiability.statuses import Spread, statuses_of
 from simulator.errors import InvalidInputError, Problem, RefusedError, escape
-from simulator.parameters import Parameters, parameters_of, with_offset
+from simulator.parameters import Parameters, parameters_of
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
@@ -127,7 +128,7 @@ def _rates(
         if bad.size:
             raise InvalidInputError.at(f"/{name}/{bad[0]}", "must be above 0, or null")
         rates[:, k] = np.where(np.isfinite(log_r), 1.0 / sd, 0.0)
-    return None if known is None and moved is None else rates
+    return rates if rates.any() else None
 
 
 def _reference(parameters: Parameters, at: Mapping[str, float] | None) -> Array:
@@ -198,6 +199,16 @@ def _check_ranges(experiment: Experiment, scene: Scene) -> None:
         raise InvalidInputError.at("/ranges_m", message)
 
 
+def _with_rates(experiment: Experiment, rates: Array) -> Experiment:
+    if experiment.common_range and rates[:, 1].any():
+        message = "is given, and the scene states an object that does not move"
+        raise InvalidInputError.at("/displacement_sd_m", message)
+    try:
+        return with_rates(experiment, rates)
+    except InvalidInputError as error:
+        raise InvalidInputError.at("/ranges_m", error.problems[0].message) from None
+
+
 def identifiability(
     sensor: Sensor,
     scene: Scene,
@@ -255,22 +266,18 @@ def identifiability(
         )
     log_r = _log_ranges(ranges_m, object_present)
     rates = _rates(known_range_sd_m, displacement_sd_m, log_r)
-    z = _reference(parameters, at)
-    if rates is not None and (moved := rates[:, 1] > 0).any():
-        least = float(np.exp(log_r[moved].min()))
-        parameters = with_offset(parameters, np.exp(log_r[moved]) - least)
-        z = np.append(z, parameters.unknowns[-1].to_normal(np.array([least]), {}))
     experiment = Experiment(
         sensor,
         parameters,
-        z,
+        _reference(parameters, at),
         log_r,
         None if gain is None else np.asarray(gain, dtype=float),
         discrepancy=scene.stated_flux_error,
         common_range=scene.motion == "static",
-        rates=rates,
     )
     _check_ranges(experiment, scene)
+    if rates is not None:
+        experiment = _with_rates(experiment, rates)
     if not experiment.finite:
         raise RefusedError(
             "a reading, its noise or one of their derivatives is beyond what a number can hold; "

@@ -1,5 +1,6 @@
 """What would help: the bounds of the same scene under changed experiments, computed."""
 
+import contextlib
 import dataclasses
 import math
 
@@ -8,14 +9,15 @@ from numpy.typing import NDArray
 
 from inference.identifiability.experiment import Experiment, information
 from inference.identifiability.information import Information
-from simulator.parameters import OFFSET, with_offset
+from inference.identifiability.odometry import with_rates
+from simulator.errors import InvalidInputError
+from simulator.parameters import OFFSET
 
-__all__ = ["EMPTY_FRAMES", "Offer", "Remedy", "cheap_remedies", "remedies", "span"]
+__all__ = ["Offer", "Remedy", "cheap_remedies", "remedies", "span"]
 
 Array = NDArray[np.float64]
 
-EMPTY_FRAMES = 3
-_MORE_EMPTY = {10: "ten", 30: "thirty"}
+_COUNTS = {3: "three", 10: "ten", 30: "thirty"}  # of frames without the object
 _TARGETS = 5  # frames of an object at a known distance
 _TOLD_M = 1e-3  # to which a ruler or odometry tells a range [m]
 # what is done to the scene, the cheapest first: the object taken away, put at a place, at two
@@ -43,7 +45,7 @@ class Remedy:
     words : str
         The change, as the subject of a sentence: "three frames without the object".
     kind : str
-        "empty", "motion", or the start of the paths of the unknowns that it makes known.
+        As of `Offer`, or the start of the paths of the unknowns that it makes known.
     information : Information
         What its readings would tell.
     frames : int
@@ -132,10 +134,6 @@ def _with_more(experiment: Experiment, log_r: Array, rate: float | None = None) 
     return dataclasses.replace(experiment, log_r=log_r, gain=gain, rates=rates)
 
 
-def _emptied(experiment: Experiment, count: int) -> Experiment:
-    return _with_more(experiment, np.full(count, np.nan))
-
-
 def _room(experiment: Experiment) -> tuple[float, float]:
     """Return the bounds of log r: those of its prior, and before the background."""
     low, high = experiment.range_prior.low, experiment.range_prior.high
@@ -189,11 +187,8 @@ def remedies(experiment: Experiment) -> list[Remedy]:
     list of Remedy
         Three frames without the object, longer and nearer strokes, each group of unknowns known.
     """
-    found = []
+    found = _emptied(experiment, 3)
     names = experiment.names
-    if any(not name.startswith("object.") for name in names):
-        words = "three frames without the object"
-        found.append(_empty(experiment, EMPTY_FRAMES, words))
     strokes = (_moved(experiment), _at_the_bend(experiment))
     found += [Remedy(s[0], "motion", information(s[1])) for s in strokes if s is not None]
     for prefix, words in _GROUPS.items():
@@ -205,8 +200,15 @@ def remedies(experiment: Experiment) -> list[Remedy]:
     return found
 
 
-def _empty(experiment: Experiment, count: int, words: str) -> Remedy:
-    return Remedy(words, "empty", information(_emptied(experiment, count)), count)
+def _emptied(experiment: Experiment, *counts: int) -> list[Remedy]:
+    """Add frames without the object, where anything else is unknown."""
+    if all(name.startswith("object.") for name in experiment.names):
+        return []
+    tried = {count: _with_more(experiment, np.full(count, np.nan)) for count in counts}
+    return [
+        Remedy(f"{_COUNTS[count]} frames without the object", "empty", information(of), count)
+        for count, of in tried.items()
+    ]
 
 
 def cheap_remedies(experiment: Experiment) -> list[Remedy]:
@@ -221,13 +223,9 @@ def cheap_remedies(experiment: Experiment) -> list[Remedy]:
     -------
     list of Remedy
         More frames without the object, the object at one or two distances that a ruler tells to a
-        millimetre, odometry that tells the way of the frames that there are to as much, a wider
-        stroke.
+        millimetre, odometry that tells the way of the frames that there are to as much.
     """
-    found = []
-    if any(not name.startswith("object.") for name in experiment.names):
-        for count, words in _MORE_EMPTY.items():
-            found.append(_empty(experiment, count, f"{words} frames without the object"))
+    found = _emptied(experiment, 10, 30)
     present = experiment.log_r[np.isfinite(experiment.log_r)]
     if present.size == 0 or experiment.common_range:
         return found
@@ -238,7 +236,9 @@ def cheap_remedies(experiment: Experiment) -> list[Remedy]:
         stops.append((low, high))
     found += [_told(experiment, distances) for distances in stops]
     if OFFSET not in experiment.parameters.names and high > low:
-        found.append(_moving(experiment))
+        # of a stroke that fills the prior of the ranges no offset is left to be told
+        with contextlib.suppress(InvalidInputError):
+            found.append(_moving(experiment))
     return found
 
 
@@ -262,13 +262,9 @@ def _moving(experiment: Experiment) -> Remedy:
     """Let odometry tell the way of the frames that there are."""
     present = np.isfinite(experiment.log_r)
     ranges = np.exp(experiment.log_r[present])
-    parameters = with_offset(experiment.parameters, ranges - ranges.min())
-    offset = parameters.unknowns[-1].to_normal(ranges[[ranges.argmin()]], {})
     rates = np.zeros((present.size, 2)) if experiment.rates is None else experiment.rates.copy()
     rates[present, 1] = 1.0 / _TOLD_M
-    changed = dataclasses.replace(
-        experiment, parameters=parameters, z=np.append(experiment.z, offset), rates=rates
-    )
+    changed = with_rates(experiment, rates)
     words = (
         f"odometry to {1e3 * _TOLD_M:g} mm over the stroke from {ranges.min():.2g} to "
         f"{ranges.max():.2g} m"

@@ -8,6 +8,7 @@ import pytest
 
 from inference.identifiability.before_data import Foresight, identifiability
 from inference.identifiability.status import Identifiability, status_of
+from simulator.errors import InvalidInputError
 from simulator.scene import parse_scene
 from tests.posterior.scenes import OBJECT, UNKNOWN_CROSSTALK, sensor_of
 
@@ -219,6 +220,33 @@ def test_remedies_give_what_they_promise() -> None:
         assert bounds == sorted(bounds, reverse=True)
     assert met >= {"empty", "distance", "distances", "odometry"}
     assert "known to 1 mm, would lower the bound" in rows(found)["range_m"].reason
+
+
+@pytest.mark.parametrize("stroke", [[0.2, 1.0, 2.0], [2.2, 3.0, 5.0], [0.2, 1.0, 5.0]])
+def test_a_stroke_may_reach_the_ends_of_its_prior(stroke: list[float]) -> None:
+    """What odometry tells is less than what a ruler does, and no less than nothing."""
+    scene = parse_scene({"range_m": {"prior": "uniform", "low": 0.2, "high": 5.0}})
+    sensor, sds = sensor_of("pulsed", 1000.0), [1e-3] * 3
+    left_out = identifiability(sensor, scene, stroke)
+    nothing = identifiability(sensor, scene, stroke, None, None, None, [None] * 3, [None] * 3)
+    assert nothing.identifiability == left_out.identifiability
+    offered = {offer.kind for offers in left_out.remedies.values() for offer in offers}
+    ruler = identifiability(sensor, scene, stroke, known_range_sd_m=sds)
+    if np.ptp(stroke) > 4.7:  # no offset is left that they could have
+        assert "odometry" not in offered
+        with pytest.raises(InvalidInputError, match=r"/ranges_m: spans 4\.8 m"):
+            identifiability(sensor, scene, stroke, displacement_sd_m=sds)
+        return
+    odometry = identifiability(sensor, scene, stroke, displacement_sd_m=sds)
+    sds_of = [of.posterior.scale_sd for of in (ruler, odometry, left_out)]
+    assert sds_of == sorted(sds_of)
+
+
+def test_odometry_of_an_object_at_rest_is_refused() -> None:
+    """Its offset open, it tells no range: it was once taken for a ruler."""
+    scene = parse_scene({"motion": "static", "discrepancy": 0})
+    with pytest.raises(InvalidInputError, match="/displacement_sd_m: is given, and the scene"):
+        identifiability(sensor_of("pulsed", 1000.0), scene, [1.0], displacement_sd_m=[1e-3])
 
 
 def test_what_helps_enough_is_named_even_if_more_helps_more() -> None:

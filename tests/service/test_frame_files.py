@@ -79,6 +79,8 @@ def test_ranges_that_are_known_or_null(tmp_path: Path, suffix: str) -> None:
         columns.known_range_m,
         columns.known_range_sd_m,
     )
+    nothing = columns.model_copy(update={"known_range_m": [None] * 3})
+    assert list(frames_from_columns(sensor, nothing).to_columns(sensor)) == ["w1", "w2"]
 
 
 @pytest.mark.parametrize("odd", ["", "x", True, [1]])
