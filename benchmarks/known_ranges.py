@@ -1,6 +1,6 @@
 """What little knowledge does for recorded photons behind unknown crosstalk: a table.
 
-    python -m benchmarks.known_ranges [--seconds 60] [--every 2] [--cells 8]
+    python -m benchmarks.known_ranges [--seconds 60] [--every 1] [--cells 8]
 
 Crosstalk of 10 and 30 % of the signal at 0.3 m is added to the photons of a plane at 0.1 to 0.4 m;
 nothing is known of the object. Told is in turn nothing more; five frames without the object; the

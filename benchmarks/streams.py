@@ -29,6 +29,7 @@ import httpx
 import numpy as np
 
 from benchmarks.kills import SERVE, Service
+from benchmarks.manners import memory_mb
 
 NDJSON = {"Content-Type": "application/x-ndjson"}
 SENSOR = {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [8e-5, 8e-5]}}
@@ -55,14 +56,6 @@ def lines_of(count: int, seed: int = 1) -> list[bytes]:
         json.dumps({"sequence": n, "time_s": t, "w1": a, "w2": b}).encode()
         for n, (t, a, b) in enumerate(columns, start=1)
     ]
-
-
-def memory_mb(pid: int) -> float:
-    """Return the resident memory of a process [MB]."""
-    for line in Path(f"/proc/{pid}/status").read_text().splitlines():
-        if line.startswith("VmRSS:"):
-            return float(line.split()[1]) / 1e3
-    return float("nan")
 
 
 def processor_s(pid: int) -> float:

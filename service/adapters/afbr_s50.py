@@ -16,17 +16,9 @@ import numpy as np
 
 from service.adapters.adapter import Adapter, Converted, Settings
 from service.adapters.registers import FORMS, Field, Layout, Registers, registers_of
-from service.adapters.sine_waves import (
-    Pair,
-    dropped,
-    phase_of,
-    scatter,
-    sense_of_q,
-    sine_wave_frames,
-)
+from service.adapters.sine_waves import Pair, dropped, phase_of, sine_wave_frames, turned
 from simulator.constants import SPEED_OF_LIGHT
 from simulator.errors import InvalidInputError
-from simulator.sensor import Noise
 
 __all__ = ["ADAPTER", "LAYOUT"]
 
@@ -78,23 +70,25 @@ def _convert(raw: bytes, form: str, settings: Settings) -> Converted:
     if "status" in registers.values:
         status = registers["status"]
         bad |= {reason: (status & bit) != 0 for bit, reason in _BAD_STATUS.items()}
-    registers, left_out = dropped(registers, bad)
+    registers, notes = dropped(registers, bad)
     phase = phase_of(registers["phase"])
     modulus = _LSB * registers["amplitude"]
     readings = modulus[:, None] * np.column_stack([np.cos(phase), np.sin(phase)])
-    notes = list(left_out)
     if "range" in registers.values:
         wave_number = 4 * np.pi * settings.frequency_hz / SPEED_OF_LIGHT
-        sense, note = sense_of_q(readings, wave_number * np.ldexp(registers["range"], -22))
-        readings[:, 1] *= sense
-        notes += [note] if note else []
-    read = settings.read or _own_noise(registers)
-    if read is None:
-        read = scatter(readings, (_LSB, _LSB))
-        notes.append("noise from the scatter of the frames; what moved unsteadily is part of it")
-    noise = Noise(read=read)
-    frequency = settings.frequency_hz
-    return sine_wave_frames(readings, registers, frequency, noise, settings, notes=tuple(notes))
+        range_m = np.ldexp(registers["range"], -22)
+        readings, said = turned(readings, wave_number * range_m)
+        notes += said
+    own = _own_noise(registers)
+    return sine_wave_frames(
+        readings,
+        registers,
+        settings.frequency_hz,
+        (_LSB, _LSB),
+        settings,
+        own_noise=own,
+        notes=notes,
+    )
 
 
 ADAPTER = Adapter(

@@ -13,9 +13,8 @@ import numpy as np
 
 from service.adapters.adapter import Adapter, Converted, Settings
 from service.adapters.registers import FORMS, Field, Layout, Registers, registers_of
-from service.adapters.sine_waves import Array, phase_of, scatter, sense_of_q, sine_wave_frames
+from service.adapters.sine_waves import Array, phase_of, sine_wave_frames, turned
 from simulator.errors import InvalidInputError
-from simulator.sensor import Noise
 
 __all__ = ["ADAPTER", "LAYOUT"]
 
@@ -74,26 +73,16 @@ def _convert(raw: bytes, form: str, settings: Settings) -> Converted:
             raise InvalidInputError.at(f"/{name}", message)
     mantissas = np.column_stack([registers["i_raw"], registers["q_raw"]])
     readings = np.ldexp(mantissas.astype(np.float64), exponents)
-    notes: list[str] = []
+    notes: tuple[str, ...] = ()
     if "phase" in registers.values:
-        sense, note = sense_of_q(readings, phase_of(registers["phase"]))
-        readings[:, 1] *= sense
-        notes += [note] if note else []
-    also = {
-        name: registers[name].astype(np.float64)
-        for name in ("ambient_light", "die_temperature")
-        if name in registers.values
-    }
-    read = settings.read
+        readings, notes = turned(readings, phase_of(registers["phase"]))
+    also = registers.present("ambient_light", "die_temperature")
     gain = _gain(registers, settings)
     if gain is not None:
         also["gain"] = gain
-    if read is None:
-        step = np.ldexp(1.0, exponents.max(axis=0))
-        read = scatter(readings, (float(step[0]), float(step[1])))
-        notes.append("noise from the scatter of the frames; what moved unsteadily is part of it")
+    first, second = np.ldexp(1.0, exponents.max(axis=0)).tolist()
     return sine_wave_frames(
-        readings, registers, _FREQUENCY_HZ, Noise(read=read), settings, also, tuple(notes)
+        readings, registers, _FREQUENCY_HZ, (first, second), settings, also=also, notes=notes
     )
 
 

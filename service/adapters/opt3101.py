@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from service.adapters.adapter import Adapter, Converted, Settings
 from service.adapters.registers import FORMS, Field, Layout, Registers, registers_of
-from service.adapters.sine_waves import dropped, phase_of, scatter, sense_of_q, sine_wave_frames
+from service.adapters.sine_waves import dropped, phase_of, sine_wave_frames, turned
 from simulator.errors import InvalidInputError
-from simulator.sensor import Noise
 
 __all__ = ["ADAPTER", "LAYOUT"]
 
 _FREQUENCY_HZ = 10e6
+_STEP = (1.0, 1.0)
 _FORMS_OF_READINGS = ("iq", "amplitude_phase")
 
 LAYOUT = Layout(
@@ -85,23 +85,18 @@ def _need(registers: Registers, *names: str) -> None:
             raise InvalidInputError.at(f"/{name}", "is missing")
 
 
-def _readings(
-    registers: Registers, form: str
-) -> tuple[NDArray[np.float64], tuple[float, float], str | None]:
-    """Return i and q, their step, and a note on their sense."""
+def _readings(registers: Registers, form: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Return i and q, and notes on their sense."""
     if form == "amplitude_phase":
         _need(registers, "amp_out", "phase_out")
         amplitude = registers["amp_out"].astype(np.float64)
         phase = phase_of(registers["phase_out"])
-        turned = amplitude[:, None] * np.column_stack([np.cos(phase), np.sin(phase)])
-        return turned, (1.0, 1.0), None
+        return amplitude[:, None] * np.column_stack([np.cos(phase), np.sin(phase)]), ()
     _need(registers, "i", "q")
     readings = np.column_stack([registers["i"], registers["q"]]).astype(np.float64)
     if "phase_out" not in registers.values:
-        return readings, (1.0, 1.0), None
-    sense, note = sense_of_q(readings, phase_of(registers["phase_out"]))
-    readings[:, 1] *= sense
-    return readings, (1.0, 1.0), note
+        return readings, ()
+    return turned(readings, phase_of(registers["phase_out"]))
 
 
 def _convert(raw: bytes, form: str, settings: Settings) -> Converted:
@@ -113,20 +108,16 @@ def _convert(raw: bytes, form: str, settings: Settings) -> Converted:
     bad = {_BAD[name][1]: registers[name] == _BAD[name][0] for name in present}
     registers, left_out = dropped(registers, bad)
     registers = _one_emitter(registers, settings)
-    readings, step, note = _readings(registers, wanted)
-    notes = [*left_out, *([note] if note else [])]
-    read = settings.read
-    if read is None:
-        read = scatter(readings, step)
-        notes.append("noise from the scatter of the frames; what moved unsteadily is part of it")
-    also = {
-        name: registers[name].astype(np.float64)
-        for name in ("amb_data", "tmain")
-        if name in registers.values
-    }
-    frequency = _frequency(registers, settings)
-    noise = Noise(read=read)
-    return sine_wave_frames(readings, registers, frequency, noise, settings, also, tuple(notes))
+    readings, said = _readings(registers, wanted)
+    return sine_wave_frames(
+        readings,
+        registers,
+        _frequency(registers, settings),
+        _STEP,
+        settings,
+        also=registers.present("amb_data", "tmain"),
+        notes=left_out + said,
+    )
 
 
 ADAPTER = Adapter(

@@ -96,6 +96,10 @@ class Registers:
     def __getitem__(self, name: str) -> Integers:
         return self.values[name]
 
+    def present(self, *names: str) -> dict[str, NDArray[np.float64]]:
+        """Return those of some registers that the dump has, as columns of numbers."""
+        return {name: self.values[name].astype(np.float64) for name in names if name in self.values}
+
     def select(self, rows: NDArray[np.bool_]) -> "Registers":
         """Return some of the frames."""
         time_s = None if self.time_s is None else self.time_s[rows]

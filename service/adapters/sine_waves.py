@@ -10,7 +10,7 @@ from service.adapters.registers import Registers
 from simulator.errors import RefusedError
 from simulator.sensor import Noise, SineWaveSensor
 
-__all__ = ["Pair", "dropped", "phase_of", "scatter", "sense_of_q", "sine_wave_frames"]
+__all__ = ["Pair", "dropped", "phase_of", "sine_wave_frames", "turned"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -63,7 +63,7 @@ def phase_of(register: NDArray[np.int64]) -> Array:
     return np.asarray(2 * np.pi / 65536 * register, dtype=np.float64)
 
 
-def scatter(readings: Array, step: Pair) -> Pair:
+def _scatter(readings: Array, step: Pair) -> Pair:
     """Estimate the noise of readings from their second differences.
 
     These are free of a steady motion; whatever else moves from frame to frame adds to the noise,
@@ -97,8 +97,8 @@ def scatter(readings: Array, step: Pair) -> Pair:
     return float(sd[0]), float(sd[1])
 
 
-def sense_of_q(readings: Array, phase_rad: Array) -> tuple[int, str | None]:
-    """Tell from the sensor's own phase, which grows with the range, which way i + j q turns.
+def turned(readings: Array, phase_rad: Array) -> tuple[Array, tuple[str, ...]]:
+    """Turn q by the sensor's own phase, which grows with the range and so tells its sign.
 
     Parameters
     ----------
@@ -109,30 +109,36 @@ def sense_of_q(readings: Array, phase_rad: Array) -> tuple[int, str | None]:
 
     Returns
     -------
-    int
-        -1 where q has the other sign than in i + j q = modulus exp(j phase), else 1.
-    str or None
-        A note where q was turned, or where the phases do not tell.
+    readings : ndarray, shape (n, 2)
+        i and q as in i + j q = modulus exp(j phase).
+    notes : tuple of str
+        Where q was turned, or where the phases do not tell.
     """
     angle = np.arctan2(readings[:, 1], readings[:, 0])
     apart = [1.0 - abs(np.mean(np.exp(1j * (phase_rad - sign * angle)))) for sign in (1, -1)]
     if max(apart) < _MOVED:
-        return 1, "the phase hardly changes: that it grows with q / i is supposed, not seen"
+        note = "the phase hardly changes: that it grows with q / i is supposed, not seen"
+        return readings, (note,)
     if apart[1] < apart[0]:
-        return -1, "q has the other sign than the sensor's phase: it is turned"
-    return 1, None
+        note = "q has the other sign than the sensor's phase: it is turned"
+        return readings * [1.0, -1.0], (note,)
+    return readings, ()
 
 
 def sine_wave_frames(
     readings: Array,
     registers: Registers,
     frequency_hz: float,
-    noise: Noise,
+    step: Pair,
     settings: Settings,
+    *,
+    own_noise: Pair | None = None,
     also: Mapping[str, Array] | None = None,
     notes: tuple[str, ...] = (),
 ) -> Converted:
     """Put frames of a sine-wave sensor together.
+
+    Their noise is what the settings state, else the sensor's own figure, else their scatter.
 
     Parameters
     ----------
@@ -142,15 +148,27 @@ def sine_wave_frames(
         With the times, where the dump has any.
     frequency_hz : float
         Modulation frequency [Hz].
-    noise : Noise
+    step : (float, float)
         Of the readings.
     settings : Settings
-        With the period.
+        With the period, and perhaps the noise.
+    own_noise : (float, float), optional
+        Standard deviations by the sensor's own figure.
     also : mapping of str to ndarray, shape (n,), optional
         Further columns.
     notes : tuple of str
         To hand on.
+
+    Raises
+    ------
+    RefusedError
+        Where nothing states the noise and the frames are too few to tell it.
     """
+    read = settings.read or own_noise
+    if read is None:
+        read = _scatter(readings, step)
+        note = "noise from the scatter of the frames; what moved unsteadily is part of it"
+        notes = (*notes, note)
     columns: dict[str, list[float]] = {}
     if registers.time_s is not None:
         columns["time_s"] = registers.time_s.tolist()
@@ -158,5 +176,5 @@ def sine_wave_frames(
         columns["time_s"] = (settings.period_s * np.arange(len(readings))).tolist()
     columns |= {"i": readings[:, 0].tolist(), "q": readings[:, 1].tolist()}
     columns |= {name: column.tolist() for name, column in (also or {}).items()}
-    sensor = SineWaveSensor(frequency_hz=frequency_hz, noise=noise)
+    sensor = SineWaveSensor(frequency_hz=frequency_hz, noise=Noise(read=read))
     return Converted(sensor, columns, notes)

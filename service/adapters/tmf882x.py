@@ -10,7 +10,8 @@ leaves is an offset that nothing in a dump says.
 import numpy as np
 
 from service.adapters.adapter import Adapter, Converted, Settings
-from service.adapters.histograms import pulsed, recording_of, sine_wave
+from service.adapters.histograms import pulsed, sine_wave
+from service.adapters.recordings import recording_of
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.sensor import Sensor

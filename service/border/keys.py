@@ -14,12 +14,12 @@ import logging
 import os
 import secrets
 import stat
-import tempfile
 from datetime import UTC, datetime
 from pathlib import Path
 
 from service.errors import UnauthorizedError
 from service.service_settings import PREFIX
+from service.whole_files import write_whole
 from simulator.errors import InvalidInputError
 
 __all__ = ["POINTER", "Key", "KeyRing", "new_key", "read_keys", "write_keys"]
@@ -116,14 +116,7 @@ def write_keys(path: Path, keys: tuple[Key, ...]) -> None:
     text = json.dumps({"keys": [dataclasses.asdict(key) for key in keys]}, indent=1) + "\n"
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        # made with mode 0600
-        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name)
-        try:
-            with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-                file.write(text)
-            Path(name).replace(path)
-        finally:
-            Path(name).unlink(missing_ok=True)  # on a full disk a part of it
+        write_whole(path, text.encode(), private=True)
     except OSError as error:
         raise InvalidInputError.at(POINTER, f"{path} cannot be written: {error.strerror}") from None
 

@@ -87,9 +87,7 @@ _FULL_SCALE = """    if (first >= FULL1 || first <= -FULL1 || second >= FULL2 ||
 """
 
 
-def export_c(
-    technique: str, sensor: Sensor, scene: Scene, name: str = "hybridtof", tolerance: float = 1e-4
-) -> Exported:
+def export_c(technique: str, sensor: Sensor, scene: Scene, tolerance: float = 1e-4) -> Exported:
     """Export a technique.
 
     Parameters
@@ -98,8 +96,6 @@ def export_c(
         One of `GENERATORS`.
     sensor, scene : Sensor, Scene
         For which; the scene's numbers become constants.
-    name : str
-        With which the names in C begin.
     tolerance : float
         Largest error of a table, relative to the range.
 
@@ -110,15 +106,13 @@ def export_c(
     Raises
     ------
     InvalidInputError
-        At ``/technique``, ``/name`` or ``/tolerance``.
+        At ``/technique`` or ``/tolerance``.
     RefusedError
         Where the scene does not serve the technique, or there is no export of it, with the reason.
     """
     if technique not in GENERATORS:
         must = ", ".join(GENERATORS)
         raise InvalidInputError.at("/technique", f"{technique!r} is not exported; {must} are")
-    if not re.fullmatch(r"[a-z][a-z0-9_]{0,30}", name):
-        raise InvalidInputError.at("/name", "must be a name in C: small letters, digits and _")
     if not 1e-9 <= tolerance <= 0.1:
         raise InvalidInputError.at("/tolerance", f"must lie from 1e-9 to 0.1, is {tolerance:g}")
     known = known_of(scene)
@@ -127,7 +121,7 @@ def export_c(
         raise RefusedError(f"{technique}: {reason}")
     frames = Frames(readings=np.zeros((1, 2)))  # only the scene counts
     error = model_error_of(Task(sensor, scene, frames, known))
-    asked = Asked(technique, sensor, scene, known, error, name, tolerance)
+    asked = Asked(technique, sensor, scene, known, error, tolerance)
     return GENERATORS[technique](asked)
 
 
@@ -140,14 +134,23 @@ def c_text(
     ----------
     exported : Exported
         As of `export_c`.
-    technique, sensor, scene, name
+    technique, sensor, scene
         Of which.
+    name : str
+        With which the names in C begin.
 
     Returns
     -------
     str
         C99 that needs sqrt and, of a sine wave, atan2.
+
+    Raises
+    ------
+    InvalidInputError
+        At ``/name``.
     """
+    if not re.fullmatch(r"[a-z][a-z0-9_]{0,30}", name):
+        raise InvalidInputError.at("/name", "must be a name in C: small letters, digits and _")
     lines = [_HEAD.replace("@COMMENT", _comment(exported, technique, sensor, scene, name))]
     constants = dict(exported.constants)
     full = ""

@@ -63,7 +63,7 @@ static int answer(real first, real second, @_answer *out)
 
 
 def conventional(asked: Asked) -> Exported:
-    """Write the conventional range; see `service.c_export.export`."""
+    """Write the conventional range; see `service.c_export.export_c`."""
     sensor, (low, high) = asked.sensor, asked.known.support
     assert asked.known.crosstalk is not None  # noqa: S101  # what the plan leaves out
     first, second = asked.known.crosstalk

@@ -126,8 +126,7 @@ def _limits(asked: Asked, kind: int) -> tuple[float, float]:
     low, high = max(prior.low, 0.0), min(prior.high, reach)
     curves = {c.CURVE.kind: c.CURVE for c in (intensity, intensity_w1, cancelling_ratio)}
     parameters = curve_parameters(asked.known, asked.sensor)
-    whole = reach if math.isfinite(reach) else math.inf
-    if monotone_intervals(curves[kind], parameters, 0.0, whole / asked.known.unit).low.size > 1:
+    if monotone_intervals(curves[kind], parameters, 0.0, reach / asked.known.unit).low.size > 1:
         raise RefusedError(
             "the light of this object does not fall everywhere: several ranges can explain a "
             "frame, which this export does not tell apart"
@@ -193,7 +192,7 @@ def _exported(asked: Asked, form: _Form, limits: tuple[float, float], bracket: b
 
 
 def from_light(asked: Asked) -> Exported:
-    """Write `intensity`; see `service.c_export.export`."""
+    """Write `intensity`; see `service.c_export.export_c`."""
     c0, c1 = asked.known.get("object.c0"), asked.known.get("object.c1")
     curve = FluxCurve(_strength(asked), 2, c0, c1)
     shares = [abs(x) / s for x, s in zip(_crosstalk(asked), asked.sensor.noise.read, strict=True)]
@@ -204,7 +203,7 @@ def from_light(asked: Asked) -> Exported:
 
 
 def from_late_light(asked: Asked) -> Exported:
-    """Write `intensity_w1`; see `service.c_export.export`."""
+    """Write `intensity_w1`; see `service.c_export.export_c`."""
     assert isinstance(asked.sensor, PulsedSensor)  # noqa: S101  # the registry's `kinds`
     c0, c1 = asked.known.get("object.c0"), asked.known.get("object.c1")
     curve = FluxCurve(_strength(asked) / asked.sensor.r0, 1, c0, c1)
@@ -214,7 +213,7 @@ def from_late_light(asked: Asked) -> Exported:
 
 
 def background_cancelling(asked: Asked) -> Exported:
-    """Write `background_cancelling` of a pulse; see `service.c_export.export`."""
+    """Write `background_cancelling` of a pulse; see `service.c_export.export_c`."""
     if not isinstance(asked.sensor, PulsedSensor):
         raise RefusedError("background_cancelling is exported for pulsed sensors alone")
     if asked.known.has("background.strength"):

@@ -77,8 +77,6 @@ class Asked:
         The scene's numbers.
     error : ModelError
         How wrong its model may be.
-    name : str
-        With which the names in C begin.
     tolerance : float
         Largest error of a table, relative to the range.
     """
@@ -88,7 +86,6 @@ class Asked:
     scene: Scene
     known: Known
     error: ModelError
-    name: str
     tolerance: float
 
 

@@ -1,8 +1,6 @@
 """``hybridtof calibrate``: a scene file of what the frames in a file tell."""
 
 import argparse
-import os
-import tempfile
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -44,6 +42,7 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
 def _run(args: argparse.Namespace) -> int:
     from service.commands.files import check_folder
     from service.commands.frames import checked_whole
+    from service.whole_files import write_whole
 
     check_folder("--output", args.output)
     settings = settings_of(args)
@@ -52,28 +51,9 @@ def _run(args: argparse.Namespace) -> int:
         args, checked_whole(args), settings, lambda jobs, done: jobs.ended.scene(done.id, date)
     )
     if document is not None:
-        _write(args.output, document + b"\n")
+        write_whole(args.output, document + b"\n", private=False)
     elif record.result is not None:
         note(args, f"{args.output} is not written: nothing was drawn")
     if record.result is not None and record.result["fit"]["misfit"]:
         note(args, f"misfit: {'; '.join(record.result['fit']['reasons'])}")
     return exit_code_of(args, record)
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Write a file as a whole or not at all."""
-    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(data)
-            os.fchmod(descriptor, 0o666 & ~_umask())
-        Path(name).replace(path)
-    finally:
-        Path(name).unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    """Return the permissions that new files do not get; there is no way but to set it and back."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

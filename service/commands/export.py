@@ -50,8 +50,8 @@ def _run(args: argparse.Namespace) -> int:
     sensor, scene = system.sensor, system.scene
     sources = {f"/{name}": f"--{name}" for name in ("technique", "name", "tolerance")}
     with naming(sources):
-        exported = export_c(args.technique, sensor, scene, args.name, args.tolerance)
-    text = c_text(exported, args.technique, sensor, scene, args.name)
+        exported = export_c(args.technique, sensor, scene, args.tolerance)
+        text = c_text(exported, args.technique, sensor, scene, args.name)
     if args.output is not None:
         args.output.write_text(text, encoding="ascii")
     else:

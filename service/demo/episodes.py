@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from service.adapters.histograms import calibrate, pulsed, read_recording
+from service.adapters.histograms import calibrate, pulsed
+from service.adapters.recordings import read_recording
 from service.demo.answers import Answer, Episode, of_estimates, of_posterior
 from service.demo.running import Client
 

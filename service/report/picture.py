@@ -121,10 +121,10 @@ def _place(
         px, py = transform((x, y))
         width, height = 0.56 * _SIZE * len(text) * per_point, 1.15 * _SIZE * per_point
         best = None
-        for (dx, side), dy in ((place[0], place[1]) for place in _PLACES):
+        for (dx, side), dy in _PLACES:
             left = px + dx * per_point - (width if side == "right" else 0)
-            box = (left, py + dy * per_point - height / 2, left + width, 0.0)
-            box = (box[0], box[1], box[2], box[1] + height)
+            low = py + dy * per_point - height / 2
+            box = (left, low, left + width, low + height)
             inside = box[0] > frame.x0 + 14 and box[2] < frame.x1 + 30 * per_point
             hit = sum(
                 box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in taken
@@ -231,9 +231,9 @@ def draw_terms(terms: Sequence[TermCost]) -> Figure:
         axes.xaxis.set_major_locator(MaxNLocator(3))
         axes.set_title(title, fontsize=10, loc="left")
         axes.tick_params(labelsize=_SIZE)
-        axes.invert_yaxis() if axes is panels[0] else None
         for side in ("top", "right"):
             axes.spines[side].set_visible(False)
+    panels[0].invert_yaxis()  # of all, which share it
     return figure
 
 

@@ -17,7 +17,7 @@ from service.report.row import Row, row_from
 from service.report.scenes import ReportScene
 from service.report.terms import TermCost, term_costs
 
-__all__ = ["Report", "errors_of", "machine", "report_of", "rows_of"]
+__all__ = ["Report", "machine", "report_of", "rows_of"]
 
 Told = Callable[[str], None]
 
@@ -88,11 +88,6 @@ def machine() -> dict[str, str]:
         "python": platform.python_version(),
         **{name: version(name) for name in ("hybridtof", "numpy", "scipy", "numba", "emcee")},
     }
-
-
-def errors_of(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return what depends on the seed alone: everything but the costs."""
-    return [{k: v for k, v in row.to_json().items() if k != "costs"} for row in rows]
 
 
 def rows_of(

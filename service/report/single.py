@@ -41,10 +41,6 @@ def _blind(scene: Scene) -> Scene:
     return scene.model_copy(update={"crosstalk": None, "background": None})
 
 
-def _obstacle(reasons: dict[str, str], name: str) -> str:
-    return reasons.get(name, "could not serve this scene")
-
-
 def measure_single(cell: Cell, seed: int) -> Row:
     """Measure a technique; one that cannot serve the scene is told that nothing disturbs it."""
     scene, name = cell.scene, cell.name
@@ -58,17 +54,16 @@ def measure_single(cell: Cell, seed: int) -> Row:
         run = functools.partial(estimate, scene.sensor, scene_told, made.frames, [name])
         found = run()
         reasons = {item.name: item.reason for item in found.left_out}
-        reason = reason or _obstacle(reasons, name)
+        reason = reason or reasons.get(name, "could not serve this scene")
         if not found.results:
             continue
         found, seconds = best(run)
         (result,) = found.results
         middle, tail = alone(_one_by_one(cell, scene_told, made))
-        knob = f"{len(made.frames)} frames a sweep" if len(made.frames) != 1 else ""
         return dataclasses.replace(
             row,
             told=told,
-            knob=knob,
+            knob=f"{len(made.frames)} frames a sweep",
             order=float(cell.frames),
             scores=_scores_of_result(made.range_m, result),
             costs=Costs(

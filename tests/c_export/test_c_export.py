@@ -218,8 +218,9 @@ def test_what_is_not_exported() -> None:
     known = parse_scene({"object": OBJECT})
     with pytest.raises(InvalidInputError, match="/technique"):
         export_c("differential", pulse, known)
+    exported = export_c("conventional", pulse, known)
     with pytest.raises(InvalidInputError, match="/name"):
-        export_c("conventional", pulse, known, "2x")
+        c_text(exported, "conventional", pulse, known, "2x")
     with pytest.raises(InvalidInputError, match="/tolerance"):
         export_c("conventional", pulse, known, tolerance=0.0)
     with pytest.raises(RefusedError, match="object"):

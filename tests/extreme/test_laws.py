@@ -1,4 +1,4 @@
-"""What must hold to the last bit: units, order, batches; and to rounding: lengths."""
+"""What must hold to the last bit: units of readings, order, batches; and nothing is silent."""
 
 import dataclasses
 import itertools

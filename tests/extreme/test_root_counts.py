@@ -14,6 +14,8 @@ def test_counts_are_exact_and_roots_are_sharp(technique: str) -> None:
     assert found.frames > 400
     assert found.roots > 300
     assert found.wrong == []
+    # of objects that drown in the wall's light a tenth lie at a fold to within rounding
+    assert found.excused <= (0.2 * found.frames if technique == "background_intensity" else 0)
     assert found.worst < 1e3, found.where
 
 

@@ -10,14 +10,8 @@ from numpy.typing import NDArray
 from inference.estimate import estimate
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
-from service.adapters.histograms import (
-    Calibration,
-    Recording,
-    calibrate,
-    pulsed,
-    read_recording,
-    sine_wave,
-)
+from service.adapters.histograms import Calibration, calibrate, pulsed, sine_wave
+from service.adapters.recordings import Recording, read_recording
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import Sensor

@@ -7,14 +7,8 @@ import numpy as np
 import pytest
 from scipy.constants import speed_of_light
 
-from service.adapters.histograms import (
-    Calibration,
-    Recording,
-    calibrate,
-    pulsed,
-    read_recording,
-    sine_wave,
-)
+from service.adapters.histograms import Calibration, calibrate, pulsed, sine_wave
+from service.adapters.recordings import Recording, read_recording
 from service.errors import MalformedError
 
 WIDTH_S = 1e-10

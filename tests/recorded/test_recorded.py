@@ -6,7 +6,8 @@ import httpx
 import numpy as np
 import pytest
 
-from service.adapters.histograms import Recording, pulsed, sine_wave
+from service.adapters.histograms import pulsed, sine_wave
+from service.adapters.recordings import Recording
 from service.app import create_app
 from service.service_settings import ServiceSettings
 from tests.recorded.experiment import (
