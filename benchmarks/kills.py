@@ -102,20 +102,33 @@ class Fleet:
     def kill(self, rng: random.Random) -> str:
         """Kill a service or a worker, whichever comes; a service is started anew."""
         index = rng.randrange(len(self.services))
-        service = self.services[index]
-        pids = [service.process.pid, *service.workers()]
-        if (pid := rng.choice(pids)) == service.process.pid:
-            service.kill()
-            self.services[index] = Service(self.command, self.settings)
-            return "service"
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(pid, signal.SIGKILL)
-        return "worker"
+        workers = self.services[index].workers()
+        if (which := rng.randrange(len(workers) + 1)) == 0:
+            return self.kill_service(index)
+        return _killed(workers[which - 1])
+
+    def kill_service(self, index: int = 0) -> str:
+        """Kill a service, and start it anew."""
+        self.services[index].kill()
+        self.services[index] = Service(self.command, self.settings)
+        return "service"
+
+    def kill_worker(self, index: int = 0) -> str:
+        """Kill a worker of a service, as soon as there is one."""
+        while not (workers := self.services[index].workers()):
+            time.sleep(0.02)
+        return _killed(workers[-1])
 
     def steps(self) -> list[int]:
         """Return how far the jobs are, the newest first."""
         page = self.ask("GET", "/v1/posteriors?limit=200").json()
         return [item["progress"]["steps"] for item in page["items"]]
+
+
+def _killed(worker: int) -> str:
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(worker, signal.SIGKILL)
+    return "worker"
 
 
 @contextlib.contextmanager

@@ -203,10 +203,7 @@ class _Run(Generic[J, C, T, P]):
         await self.held.tell("summarising")
         spent = self.record.wall_s, self.cpu_s
         call = _summary, self.runner.fold.summarise, self.job, self.checkpoint, *spent
-        try:
-            (result,) = await self._execute(call, wanted=True)
-        except _CancelledError:
-            raise AssertionError("what is wanted is not given up") from None
+        (result,) = await self._execute(call, wanted=True)
         return dict(result)
 
     async def _fail(self, problem: dict[str, Any]) -> None:

@@ -5,38 +5,19 @@ import time
 from collections.abc import Callable, Collection
 from typing import Any
 
-import orjson
 import sqlalchemy as sa
 
 from service.errors import IdempotencyError
-from service.json_text import encode
 from service.store.holder import has_ended
 from service.store.record import QUEUED, Claimed, JobRecord, NewJob, Status
 from service.store.retention import Retention, drop_draws, forget, make_room
+from service.store.rows import ALL, BRIEF, claimed, one, record_of, text_of
 from service.store.tables import CHECKPOINT, JOB, SERVED
 from service.store.transactions import Transactions
 
 __all__ = ["SqlJobStore"]
 
 _LEASE_S = 15.0
-_BRIEF = tuple(
-    JOB.c[field.name]
-    for field in dataclasses.fields(JobRecord)
-    if field.name not in ("result", "problem")
-)
-_ALL = (*_BRIEF, JOB.c.result, JOB.c.problem)
-
-
-def _text(value: dict[str, Any] | None) -> str | None:
-    return None if value is None else encode(value).decode()
-
-
-def _record(row: sa.Row[Any]) -> JobRecord:
-    fields = dict(row._mapping)
-    for name in ("progress", "result", "problem"):
-        if fields.get(name) is not None:
-            fields[name] = orjson.loads(fields[name])
-    return JobRecord(**fields)
 
 
 class SqlJobStore:
@@ -86,7 +67,7 @@ class SqlJobStore:
                 "cancel_requested": False,
                 "number": 0,
                 "revision": 1,
-                "progress": _text(QUEUED),
+                "progress": text_of(QUEUED),
                 "wall_s": 0.0,
                 "cpu_s": 0.0,
                 "size": 0,
@@ -97,7 +78,7 @@ class SqlJobStore:
                 known = self._of_key(connection, job)
                 if known is not None:
                     return known
-            return self._one(connection, job.id)
+            return one(connection, job.id)
 
     @staticmethod
     def _of_key(connection: sa.Connection, job: NewJob) -> JobRecord | None:
@@ -109,26 +90,22 @@ class SqlJobStore:
             return None
         if row.digest != job.digest:
             raise IdempotencyError("the key came before with another request")
-        return SqlJobStore._one(connection, row.id)
-
-    @staticmethod
-    def _one(connection: sa.Connection, job_id: str) -> JobRecord:
-        return _record(connection.execute(sa.select(*_ALL).where(JOB.c.id == job_id)).one())
+        return one(connection, row.id)
 
     def get(self, job_id: str) -> JobRecord | None:
         """See `JobStore.get`."""
         with self._read() as connection:
-            row = connection.execute(sa.select(*_ALL).where(JOB.c.id == job_id)).one_or_none()
-        return None if row is None else _record(row)
+            row = connection.execute(sa.select(*ALL).where(JOB.c.id == job_id)).one_or_none()
+        return None if row is None else record_of(row)
 
     def page(self, client: str, after: int | None, limit: int) -> list[JobRecord]:
         """See `JobStore.page`."""
-        query = sa.select(*_BRIEF).where(JOB.c.client == client)
+        query = sa.select(*BRIEF).where(JOB.c.client == client)
         if after is not None:
             query = query.where(JOB.c.sequence < after)
         with self._read() as connection:
             rows = connection.execute(query.order_by(JOB.c.sequence.desc()).limit(limit)).all()
-        return [_record(row) for row in rows]
+        return [record_of(row) for row in rows]
 
     def counts(self) -> dict[str, int]:
         """See `JobStore.counts`."""
@@ -166,7 +143,7 @@ class SqlJobStore:
                     revision=JOB.c.revision + 1,
                 )
             )
-            return self._claimed(connection, job_id)
+            return claimed(connection, job_id)
 
     def waits(self) -> bool:
         """See `JobStore.waits`."""
@@ -192,20 +169,6 @@ class SqlJobStore:
             .limit(1)
         )
 
-    @staticmethod
-    def _claimed(connection: sa.Connection, job_id: str) -> Claimed | None:
-        row = connection.execute(sa.select(*_ALL).where(JOB.c.id == job_id)).one_or_none()
-        job = connection.scalar(sa.select(JOB.c.job).where(JOB.c.id == job_id))
-        if row is None or job is None:
-            return None
-        pieces = connection.scalars(
-            sa.select(CHECKPOINT.c.bytes)
-            .where(CHECKPOINT.c.job_id == job_id)
-            .order_by(CHECKPOINT.c.number)
-        ).all()
-        held = tuple(bytes(piece) for piece in pieces)
-        return Claimed(_record(row), bytes(job), held)
-
     def renew(self, holder: str, job_ids: Collection[str]) -> None:
         """See `JobStore.renew`."""
         held = sa.and_(JOB.c.holder == holder, JOB.c.id.in_(list(job_ids)))
@@ -230,7 +193,7 @@ class SqlJobStore:
         changed = connection.execute(
             sa.update(JOB).where(*same).values(revision=JOB.c.revision + 1, **values)
         )
-        return self._one(connection, record.id) if changed.rowcount else None
+        return one(connection, record.id) if changed.rowcount else None
 
     def advance(
         self,
@@ -248,7 +211,7 @@ class SqlJobStore:
                 connection,
                 record,
                 number=number,
-                progress=_text(progress),
+                progress=text_of(progress),
                 wall_s=wall_s,
                 cpu_s=cpu_s,
                 size=len(data) if whole else JOB.c.size + len(data),
@@ -264,7 +227,7 @@ class SqlJobStore:
     def report(self, record: JobRecord, progress: dict[str, Any]) -> JobRecord | None:
         """See `JobStore.report`."""
         with self._write() as connection:
-            return self._follow(connection, record, progress=_text(progress))
+            return self._follow(connection, record, progress=text_of(progress))
 
     def finish(
         self,
@@ -281,9 +244,9 @@ class SqlJobStore:
                 connection,
                 record,
                 status=status,
-                progress=_text(progress),
-                result=_text(result),
-                problem=_text(problem),
+                progress=text_of(progress),
+                result=text_of(result),
+                problem=text_of(problem),
                 ended=self._clock(),
                 holder=None,
                 held_until=0.0,
@@ -310,8 +273,8 @@ class SqlJobStore:
             connection.execute(
                 sa.update(JOB).where(*running, ~JOB.c.cancel_requested).values(**seen)
             )
-            row = connection.execute(sa.select(*_ALL).where(JOB.c.id == job_id)).one_or_none()
-            return None if row is None else _record(row)
+            row = connection.execute(sa.select(*ALL).where(JOB.c.id == job_id)).one_or_none()
+            return None if row is None else record_of(row)
 
     def delete(self, job_id: str) -> bool:
         """See `JobStore.delete`."""
@@ -321,7 +284,7 @@ class SqlJobStore:
     def drawn(self, job_id: str) -> Claimed | None:
         """See `JobStore.drawn`."""
         with self._read() as connection:
-            return self._claimed(connection, job_id)
+            return claimed(connection, job_id)
 
     def sweep(self) -> None:
         """See `JobStore.sweep`."""
