@@ -48,8 +48,9 @@ class JointLaw:
         return np.asarray(z @ self.mixing.T)
 
     def joint(self, t: Array) -> Array:
-        """Inverse of `marginal`."""
-        return np.asarray(scipy.linalg.solve_triangular(self.mixing, t.T, lower=True).T)
+        """Inverse of `marginal`; what is at the end of a support, or beyond, has no finite z."""
+        solved = scipy.linalg.solve_triangular(self.mixing, t.T, lower=True, check_finite=False)
+        return np.asarray(solved.T)
 
     def unknown(self, j: int, of: Unknown) -> Unknown:
         """Return unknown number j as a function of its t: the law is inside its support anyway."""

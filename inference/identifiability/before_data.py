@@ -14,7 +14,7 @@ from inference.identifiability.expected_posterior import (
 )
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.information import Information
-from inference.identifiability.odometry import with_rates
+from inference.identifiability.known_beside import planned_rates, with_rates
 from inference.identifiability.reasons import Diagnosis
 from inference.identifiability.remedies import Offer
 from inference.identifiability.status import Identifiability
@@ -110,25 +110,6 @@ def _log_ranges(ranges_m: Sequence[float], object_present: Sequence[bool] | None
         raise InvalidInputError(*problems)
     log_r = np.log(ranges)
     return log_r if object_present is None else np.where(object_present, log_r, np.nan)
-
-
-def _rates(
-    known: Sequence[float | None] | None, moved: Sequence[float | None] | None, log_r: Array
-) -> Array | None:
-    """Return one over the standard deviations to which ranges are known, as of `Experiment`."""
-    rates = np.zeros((log_r.size, 2))
-    for k, (name, sds) in enumerate((("known_range_sd_m", known), ("displacement_sd_m", moved))):
-        if sds is None:
-            continue
-        sd = np.array([math.inf if value is None else value for value in sds], dtype=float)
-        if sd.size != log_r.size:
-            message = f"has {sd.size} entries where ranges_m has {log_r.size}"
-            raise InvalidInputError.at(f"/{name}", message)
-        bad = np.flatnonzero(~(sd > 0))
-        if bad.size:
-            raise InvalidInputError.at(f"/{name}/{bad[0]}", "must be above 0, or null")
-        rates[:, k] = np.where(np.isfinite(log_r), 1.0 / sd, 0.0)
-    return rates if rates.any() else None
 
 
 def _reference(parameters: Parameters, at: Mapping[str, float] | None) -> Array:
@@ -265,7 +246,7 @@ def identifiability(
             "computed for one amplitude and a range that changes; state radial motion"
         )
     log_r = _log_ranges(ranges_m, object_present)
-    rates = _rates(known_range_sd_m, displacement_sd_m, log_r)
+    rates = planned_rates(known_range_sd_m, displacement_sd_m, log_r)
     experiment = Experiment(
         sensor,
         parameters,

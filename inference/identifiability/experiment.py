@@ -101,11 +101,8 @@ class Experiment:
     @property
     def names(self) -> tuple[str, ...]:
         """Unknowns on which the readings depend: all but those of the ranges' prior."""
-        return tuple(
-            name
-            for name in self.parameters.names
-            if not name.startswith("range_m.") and name not in self.known
-        )
+        names = self.parameters.names
+        return tuple(n for n in names if not n.startswith("range_m.") and n not in self.known)
 
     @functools.cached_property
     def units(self) -> Array:

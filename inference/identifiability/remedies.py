@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from inference.identifiability.experiment import Experiment, information
 from inference.identifiability.information import Information
-from inference.identifiability.odometry import with_rates
+from inference.identifiability.known_beside import with_rates
 from simulator.errors import InvalidInputError
 from simulator.parameters import OFFSET
 

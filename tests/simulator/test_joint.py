@@ -120,6 +120,18 @@ def test_one_mode_is_standard_normal_in_its_coordinates() -> None:
     assert np.allclose(parameters.log_prior(z), -0.5 * np.square(z).sum(axis=1), atol=1e-12)
 
 
+def test_what_lies_beyond_a_prior_has_no_coordinates() -> None:
+    """As without the law; what depends on no such unknown keeps its own."""
+    parameters, plain = both()
+    natural = parameters.natural(np.zeros((3, 4)))
+    natural[:2, 3] = 0.0, -0.01  # of crosstalk.w1, half-normal
+    with np.errstate(all="ignore"):
+        z, alone = parameters.standard(natural), plain.standard(natural)
+    assert np.array_equal(np.isfinite(z), np.isfinite(alone))
+    assert np.array_equal(np.isfinite(z[:, 3]), [False, False, True])
+    assert np.allclose(z[:, :3], 0.0, atol=1e-9)
+
+
 def test_the_order_of_the_unknowns_plays_no_part() -> None:
     order = [2, 0, 1]
     turned = {

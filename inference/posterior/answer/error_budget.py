@@ -28,6 +28,7 @@ from inference.identifiability.model_response import (
     model_response,
 )
 from inference.posterior.answer.error_parts import ErrorParts
+from inference.posterior.answer.error_shares import error_shares
 from inference.posterior.answer.where_known import where_known
 from inference.posterior.criticism.discrepancy_check import LargerDiscrepancy
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
@@ -230,7 +231,7 @@ def error_budget(
         log_r[chosen],
         of_z,
         of_log_r,
-        *_parts(
+        *error_shares(
             z,
             log_r,
             responses,
@@ -273,38 +274,3 @@ def _range_error(
     told = np.array([each.told for each in responses])
     scale = np.where(present, size * told * np.exp(-at), 0.0)
     return np.asarray(scale[:, :, None] * basis.values(at))
-
-
-def _parts(
-    z: Array,
-    log_r: Array,
-    responses: Sequence[ModelResponse],
-    moved: tuple[Array, Array],
-    *,
-    integrated: bool,
-    leaning: bool,
-) -> tuple[ErrorParts, ErrorParts]:
-    """Divide the variance of z and of log r; what rests on the law of the ranges is the scene's."""
-    mean = {
-        name: np.mean(np.square([getattr(each, name) for each in responses]), axis=0)
-        for name in ("own", "alone", "shared", "sd")
-    }
-    last = -1 if leaning else None
-    found = []
-    for values, own, shared, part in (
-        (z, mean["alone"], mean["sd"] - mean["alone"], moved[0]),
-        (log_r, mean["own"], mean["shared"], moved[1]),
-    ):
-        added = np.square(part[:, :, 1:last]).sum(axis=2).mean(axis=0)
-        of_law = np.square(part[:, :, last:]).sum(axis=2).mean(axis=0) if leaning else 0.0
-        variance = values.var(axis=0)
-        first = np.fmin(own, variance)
-        scene = variance - first
-        if integrated:  # the draws have the error: what an exact model would leave is the scene's
-            scene = np.clip(shared, 0.0, scene)
-        model = variance - first - scene + added
-        scene = scene + of_law
-        whole = first + scene + model
-        unit = np.where(whole > 0, whole, 1.0)
-        found.append(ErrorParts(*(np.sqrt(part / unit) for part in (first, scene, model))))
-    return found[0], found[1]
