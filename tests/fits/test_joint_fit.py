@@ -278,6 +278,22 @@ def test_all_frames_decide_between_the_roots_of_one() -> None:
     assert (np.abs(result.range_m - trajectory.range_m) < 6 * result.sd_m).all()
 
 
+def test_little_noise_walls_no_optimum_off() -> None:
+    """Near a turning point of the light the climbs of an exact model end at a chi-square of 1e7."""
+    sensor = parse_sensor(
+        {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [8e-5, 8e-5]}}
+    )
+    folded = {"c0": 0.0769, "c1": -0.535, "c2": 0.0957}
+    result = fitted(sensor, {}, data(sensor, {"object": folded}, path(151, span=(0.1, 0.8))))
+    assert result.fit is not None
+    assert not result.fit["misfit"]
+    assert result.parameters is not None
+    for name, value in folded.items():
+        item = result.parameters[f"object.{name}"]
+        # false alarm 6e-7
+        assert abs(item["value"] - value) < 5 * item["sd"]
+
+
 def test_settings_of_the_joint_fit_give_its_answer() -> None:
     sensor = sensor_of("pulsed", 1e4)
     for name, case in (

@@ -1,7 +1,7 @@
 """From optima of the likelihood of all frames to a result, or to a refusal."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,16 +17,17 @@ from inference.fits.answer.determined import (
 from inference.fits.answer.inflation import inflation, shift_of
 from inference.fits.answer.profile_scan import profile_scan
 from inference.fits.answer.ranges import DECIDED, WITHIN, Answer, frame_ranges
-from inference.fits.answer.report import describe, fit_report, spoiled
+from inference.fits.answer.report import FALSE_ALARM, describe, fit_report, p_value_of, spoiled
 from inference.fits.likelihood.erring import erring_maxima, softened
 from inference.fits.likelihood.information import residuals_and_information
-from inference.fits.likelihood.maximum import Maximum, maximum_from
+from inference.fits.likelihood.maximum import TOP, Maximum, maximum_from
+from inference.fits.likelihood.multistart import find_maxima, find_starts
 from inference.fits.likelihood.problem import FitProblem, fit_problem
 from inference.realtime.net import SATURATED, rule_out
 from inference.technique import Task
 from simulator.errors import RefusedError
 
-__all__ = ["likelihood_answer", "likelihood_answer_from"]
+__all__ = ["likelihood_answer"]
 
 _WALKS = 3  # that may meet a better optimum than the last
 _NO_LIKELIHOOD = (
@@ -35,8 +36,10 @@ _NO_LIKELIHOOD = (
 )
 
 
-def likelihood_answer_from(name: str, task: Task, values: dict[str, float]) -> TechniqueResult:
-    """Climb the likelihood of all frames from values that another fit has found.
+def likelihood_answer(
+    name: str, task: Task, values: dict[str, float] | None = None
+) -> TechniqueResult:
+    """Fit everything unknown by the likelihood of all frames.
 
     Parameters
     ----------
@@ -44,39 +47,9 @@ def likelihood_answer_from(name: str, task: Task, values: dict[str, float]) -> T
         The technique.
     task : Task
         The request.
-    values : dict
-        By scene path, all that is unknown besides the ranges.
-
-    Raises
-    ------
-    RefusedError
-        As `likelihood_answer`; and where the values are no object.
-    """
-    state = rule_out(task.sensor, task.frames)
-    frames = task.frames.select(state != SATURATED)
-    problem = fit_problem(task.sensor, task.scene, frames, exact=task.exact)
-    x = problem.coordinates(np.array([[values[path] for path in problem.names]]))[0]
-    if not np.isfinite(x).all():
-        raise RefusedError("the best fit is no object: a size or reflectance is not positive")
-    climbed = softened(problem) if problem.erring else (problem,)
-    return likelihood_answer(name, problem, [maximum_from(one, x) for one in climbed], state)
-
-
-def likelihood_answer(
-    name: str, problem: FitProblem, found: Iterable[Maximum], state: NDArray[np.uint8]
-) -> TechniqueResult:
-    """Build the result of a fit by likelihood.
-
-    Parameters
-    ----------
-    name : str
-        The technique.
-    problem : FitProblem
-        With the frames that were fitted.
-    found : iterable of Maximum
-        The best first.
-    state : ndarray of uint8, shape (frames of the request,)
-        What rules frames out (`inference.realtime.net.rule_out`).
+    values : dict, optional
+        By scene path, all that is unknown besides the ranges, as another fit has found it: where
+        the climb begins. Left out: optima are looked for everywhere.
 
     Returns
     -------
@@ -86,13 +59,51 @@ def likelihood_answer(
     Raises
     ------
     RefusedError
-        Where the frames do not determine what is unknown.
+        Where the frames do not determine what is unknown; and where the values are no object.
     """
+    state = rule_out(task.sensor, task.frames)
+    frames = task.frames.select(state != SATURATED)
+    problem = fit_problem(task.sensor, task.scene, frames, exact=task.exact)
+    found = _found(problem) if values is None else _found_from(problem, values)
     optima = [optimum for optimum in found if np.isfinite(optimum.deviance)]
     if not optima:
         raise RefusedError(_NO_LIKELIHOOD)
+    answer = _erring_answer if problem.erring else _exact_answer
+    return answer(name, problem, optima, state)
+
+
+def _found(problem: FitProblem) -> Sequence[Maximum]:
+    """Return optima, the best first; points near them where the model errs."""
     if problem.erring:
-        return _erring_answer(name, problem, optima, state)
+        return find_starts(problem, softened(problem))
+    found = find_maxima(problem)
+    if not found or _explains(problem, found[0]):
+        return found
+    # walls between optima grow with the square of the readings over their noise
+    near = find_starts(problem, softened(problem))
+    climbed = [maximum_from(problem, start.x) for start in near]
+    best = min([found[0], *climbed], key=lambda optimum: optimum.deviance)
+    return (best, *found) if best.deviance < found[0].deviance - TOP else found
+
+
+def _explains(problem: FitProblem, top: Maximum) -> bool:
+    residual, _ = residuals_and_information(problem, top.x, top.positions)
+    return p_value_of(problem, float(np.square(residual).sum())) >= FALSE_ALARM
+
+
+def _found_from(problem: FitProblem, values: dict[str, float]) -> list[Maximum]:
+    """Return ends of climbs from given values."""
+    x = problem.coordinates(np.array([[values[path] for path in problem.names]]))[0]
+    if not np.isfinite(x).all():
+        raise RefusedError("the best fit is no object: a size or reflectance is not positive")
+    climbed = (*softened(problem), problem) if problem.erring else (problem,)
+    return [maximum_from(one, x) for one in climbed]
+
+
+def _exact_answer(
+    name: str, problem: FitProblem, optima: list[Maximum], state: NDArray[np.uint8]
+) -> TechniqueResult:
+    """Build the result where the model is exact."""
     scanned: list[Maximum] = []
     walked: list[Maximum] = []
     for walk in range(_WALKS + 1):

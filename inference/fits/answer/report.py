@@ -15,7 +15,15 @@ from inference.identifiability.information import Information
 from inference.identifiability.status import is_positive, spread_of_fit, status_of
 from simulator.parameters import Parameters
 
-__all__ = ["FALSE_ALARM", "describe", "entries", "fit_report", "spoiled", "with_parts"]
+__all__ = [
+    "FALSE_ALARM",
+    "describe",
+    "entries",
+    "fit_report",
+    "p_value_of",
+    "spoiled",
+    "with_parts",
+]
 
 Array = NDArray[np.float64]
 
@@ -169,6 +177,15 @@ def entries(
     return answer
 
 
+def _freedom(problem: FitProblem) -> int:
+    return 2 * problem.present.size - int(problem.present.sum()) - len(problem)
+
+
+def p_value_of(problem: FitProblem, chi_square: float) -> float:
+    """Return how often noise alone makes a chi-square of a fit greater."""
+    return float(scipy.special.chdtrc(_freedom(problem), chi_square))
+
+
 def fit_report(
     problem: FitProblem, optima: Sequence[Maximum], chi_square: float, rank: int, wider: float
 ) -> dict[str, Any]:
@@ -194,12 +211,11 @@ def fit_report(
         ``p_value``, ``misfit``, ``rank``, ``widening`` and ``optima``, each with its deviance above
         the best and its values.
     """
-    freedom = 2 * problem.present.size - int(problem.present.sum()) - len(problem)
-    p_value = float(scipy.special.chdtrc(freedom, chi_square))
+    p_value = p_value_of(problem, chi_square)
     return {
         "chi_square": chi_square,
         "deviance": optima[0].deviance,
-        "degrees_of_freedom": freedom,
+        "degrees_of_freedom": _freedom(problem),
         "p_value": p_value,
         "misfit": p_value < FALSE_ALARM,
         "rank": rank,

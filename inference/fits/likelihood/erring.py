@@ -101,14 +101,14 @@ class Erring(Maximum):
 
 
 def softened(problem: FitProblem) -> tuple[FitProblem, ...]:
-    """Return problems whose optima are where to look for those of a model that errs, itself too.
+    """Return problems of more noise, whose optima too are where to look for those of a problem.
 
     Parameters
     ----------
     problem : FitProblem
         The problem.
     """
-    return *(_softened(problem, share) for share in _OF_LIGHT), problem
+    return tuple(_softened(problem, share) for share in _OF_LIGHT)
 
 
 def _softened(problem: FitProblem, share: float) -> FitProblem:
@@ -129,7 +129,7 @@ def erring_maxima(problem: FitProblem, starts: Iterable[Maximum]) -> list[Erring
     problem : FitProblem
         The problem, whose model errs.
     starts : iterable of Maximum
-        From optima of `softened` problems.
+        From optima of the problem and of `softened` ones.
 
     Returns
     -------

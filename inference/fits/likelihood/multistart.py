@@ -1,6 +1,7 @@
 """Maxima of the likelihood from starting points that need no guess."""
 
 import dataclasses
+from collections.abc import Iterable
 
 import numpy as np
 import scipy
@@ -162,34 +163,45 @@ def _distinct(problem: FitProblem, optima: list[Maximum], most: int) -> list[Max
     return kept
 
 
-def _climbed(problem: FitProblem) -> tuple[list[Maximum], Array, _Effort]:
-    """Return ends of the best climbs, the best first, the screen, and the effort."""
+def _screened(problem: FitProblem) -> tuple[NDArray[np.intp], Array, _Effort]:
+    """Return the frames that are enough to look for optima, the screen, and the effort."""
     order, empty = _by_light(problem)
     chosen = np.sort(np.concatenate([_spread(order, _FRAMES), _spread(empty, 6)]))
-    few = problem.select(chosen) if chosen.size < problem.present.size else problem
     effort = _LITTLE if len(problem) <= _EASY else _MUCH
-    starts = _starts(few, effort.points)
+    return chosen, _starts(problem.select(chosen), effort.points), effort
+
+
+def _climbed(
+    problem: FitProblem, chosen: NDArray[np.intp], starts: Array, effort: _Effort
+) -> list[Maximum]:
+    """Return ends of the best climbs, the best first."""
+    few = problem.select(chosen)
     first = [approach(few, x, effort.few) for x in starts[: effort.climbs]]
     first.sort(key=lambda optimum: optimum.deviance)
     second = [approach(problem, optimum.x, effort.many) for optimum in first[: effort.kept]]
     second.sort(key=lambda optimum: optimum.deviance)
-    return second, starts, effort
+    return second
 
 
-def find_starts(*problems: FitProblem) -> tuple[Maximum, ...]:
+def find_starts(problem: FitProblem, softer: Iterable[FitProblem]) -> tuple[Maximum, ...]:
     """Find points near optima of a fit, none of them followed to the top.
 
     Parameters
     ----------
-    *problems : FitProblem
-        Of the same unknowns, with at least as many frames as these need.
+    problem : FitProblem
+        At least as many frames as the unknowns need.
+    softer : iterable of FitProblem
+        The same frames with more noise, whose optima count too.
 
     Returns
     -------
     tuple of Maximum
         Distinct ones of each problem, the best of it first.
     """
-    return tuple(start for one in problems for start in _distinct(one, _climbed(one)[0], _NEAR))
+    # points are judged so roughly that the noise does not matter
+    screened = _screened(problem)
+    found = (_distinct(one, _climbed(one, *screened), _NEAR) for one in (*softer, problem))
+    return tuple(start for near in found for start in near)
 
 
 def find_maxima(problem: FitProblem) -> tuple[Maximum, ...]:
@@ -205,7 +217,8 @@ def find_maxima(problem: FitProblem) -> tuple[Maximum, ...]:
     tuple of Maximum
         Distinct ones; empty where no starting point has any likelihood.
     """
-    second, starts, effort = _climbed(problem)
+    chosen, starts, effort = _screened(problem)
+    second = _climbed(problem, chosen, starts, effort)
     last = [followed(problem, optimum) for optimum in second[: effort.polished]]
     last = _distinct(problem, last, _MOST)
     for _ in range(_WAVES if last and len(problem) > _EASY else 0):

@@ -177,7 +177,7 @@ def _fitted(task: Task, unknown: tuple[str, ...]) -> tuple[LinearFit, TechniqueR
 
 def _solve(task: Task) -> TechniqueResult:
     # imported where a fit is asked for: plans of single frames go without
-    from inference.fits.answer.likelihood_answer import likelihood_answer_from
+    from inference.fits.answer.likelihood_answer import likelihood_answer
     from inference.fits.linear.follow import Follow
     from inference.fits.linear.linear_answer import linear_answer
 
@@ -193,7 +193,7 @@ def _solve(task: Task) -> TechniqueResult:
     if task.frames.derivatives is None:
         # differences of the readings tell nothing that the readings do not, and their errors are
         # neither small nor independent: they serve to find where the likelihood is climbed from
-        answer = likelihood_answer_from("crosstalk_fit", task, values)
+        answer = likelihood_answer("crosstalk_fit", task, values)
         if answer.fit is not None and answer.fit["misfit"]:
             raise RefusedError(
                 "the ranges by differences in time lead to values that do not explain the "

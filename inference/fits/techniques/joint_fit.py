@@ -4,7 +4,6 @@ from inference.estimates import TechniqueResult
 from inference.fits.answer.counts import joint_obstacle
 from inference.fits.likelihood.unknowns import unknowns_of
 from inference.known import Known
-from inference.realtime.net import SATURATED, rule_out
 from inference.technique import Task, Technique
 from simulator.frames import Frames
 from simulator.scene import Scene
@@ -16,15 +15,8 @@ __all__ = ["ITERATIVE_BACKGROUND_CANCELLING", "ITERATIVE_DIFFERENTIAL", "JOINT_F
 def _solve_as(name: str, task: Task) -> TechniqueResult:
     # imported where a fit is asked for: plans of single frames go without
     from inference.fits.answer.likelihood_answer import likelihood_answer
-    from inference.fits.likelihood.erring import softened
-    from inference.fits.likelihood.multistart import find_maxima, find_starts
-    from inference.fits.likelihood.problem import fit_problem
 
-    state = rule_out(task.sensor, task.frames)
-    frames = task.frames.select(state != SATURATED)
-    problem = fit_problem(task.sensor, task.scene, frames, exact=task.exact)
-    found = find_starts(*softened(problem)) if problem.erring else find_maxima(problem)
-    return likelihood_answer(name, problem, found, state)
+    return likelihood_answer(name, task)
 
 
 def _differential_obstacle(

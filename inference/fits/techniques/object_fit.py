@@ -131,7 +131,7 @@ def _natural(x: Array, factor: Array) -> dict[str, tuple[float, Array]]:
 def _solve(task: Task) -> TechniqueResult:
     technique = CONVENTIONAL if task.scene.background is None else BACKGROUND_INTENSITY
     # imported where a fit is asked for: plans of single frames go without
-    from inference.fits.answer.likelihood_answer import likelihood_answer_from
+    from inference.fits.answer.likelihood_answer import likelihood_answer
     from inference.fits.linear.follow import Follow
     from inference.fits.linear.linear_answer import linear_answer
 
@@ -161,7 +161,7 @@ def _solve(task: Task) -> TechniqueResult:
     if not missing:
         # the ranges that were regressed on are no truth: the likelihood knows their noise
         values = {path: natural[path][0] for path in unknown}
-        return likelihood_answer_from("object_fit", task, values)
+        return likelihood_answer("object_fit", task, values)
     kept = {path: natural[path] for path in unknown if path not in missing}
 
     def again(moved: Task) -> tuple[Array, Array]:

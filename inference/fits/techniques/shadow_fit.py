@@ -94,9 +94,9 @@ def _solve(task: Task) -> TechniqueResult:
 
 def _by_likelihood(task: Task, values: dict[str, float]) -> TechniqueResult:
     # imported where a fit is asked for: plans of single frames go without
-    from inference.fits.answer.likelihood_answer import likelihood_answer_from
+    from inference.fits.answer.likelihood_answer import likelihood_answer
 
-    return likelihood_answer_from("shadow_fit", task, values)
+    return likelihood_answer("shadow_fit", task, values)
 
 
 def _solve_strength(task: Task) -> TechniqueResult:
