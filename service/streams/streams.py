@@ -3,13 +3,14 @@
 import asyncio
 import contextlib
 import uuid
+import weakref
 from collections.abc import AsyncIterator
 
 import anyio
 
 from inference.tracking.state import state_to_bytes
 from service.border.traces import Traces
-from service.errors import ConflictError, GoneError, NotFoundError
+from service.errors import ConflictError, GoneError, NotFoundError, StoreError
 from service.store.holder import has_ended, holder_name
 from service.store.stream_record import StreamRecord
 from service.store.stream_store import StreamStore
@@ -43,7 +44,10 @@ class Streams:
         self._writer = Writer(store)
         self._holder = holder_name()
         self._producing: set[str] = set()
-        self._watched: dict[str, asyncio.Event] = {}
+        # held by those who wait alone
+        self._watched: weakref.WeakValueDictionary[str, asyncio.Event] = (
+            weakref.WeakValueDictionary()
+        )
         self._limiter: anyio.CapacityLimiter | None = None
 
     async def create(self, raw: bytes, client: str) -> StreamRecord:
@@ -181,9 +185,12 @@ class Streams:
                 changed=lambda: self._announce(stream_id),
                 quiet_s=quiet_s,
             )
-            yield producer
-            if lasting:
-                await asyncio.to_thread(self._store.release, stream_id, self._holder)
+            try:
+                yield producer
+            finally:
+                if lasting:
+                    with contextlib.suppress(StoreError):  # the lease runs out by itself
+                        await asyncio.to_thread(self._store.release, stream_id, self._holder)
         finally:
             self._producing.discard(stream_id)
             self._traces.producers.dec()

@@ -1,9 +1,7 @@
 """The manners of the command line: what is hinted at, noted, passed over, and said in good time."""
 
 import importlib.util
-import io
 import json
-import sys
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -12,46 +10,16 @@ import jsonschema
 import numpy as np
 import pytest
 
-from inference.tracking.track import track
-from service.cli import main
 from service.commands import COMMANDS
-from simulator.frames import frames_from_columns
-from simulator.scene import parse_scene
-from simulator.sensor import parse_sensor
 from tests.service.conftest import SCENE, SENSOR
+from tests.service.said import CSV, Said, given, written
 
-CSV = "time_s,w1,w2\n0.0,0.021,1.71\n0.1,0.022,1.63\n0.2,0.023,1.55\n"
 SINE_WAVE = {"kind": "sine_wave", "frequency_hz": 5e6, "noise": {"read": [1e-3, 1e-3]}}
 
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
     return written(tmp_path / "scene.json", {"sensor": SENSOR, "scene": SCENE})
-
-
-def written(path: Path, content: Any) -> Path:
-    path.write_text(content if isinstance(content, str) else json.dumps(content))
-    return path
-
-
-class Said:
-    """What a command said, and how it ended."""
-
-    def __init__(self, capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> None:
-        try:
-            self.code: Any = main([str(argument) for argument in arguments])
-        except SystemExit as end:
-            self.code = end.code
-        self.out, self.err = capsys.readouterr()
-
-    @property
-    def frames(self) -> list[dict[str, Any]]:
-        frames: list[dict[str, Any]] = json.loads(self.out)["results"][0]["frames"]
-        return frames
-
-
-def given(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -385,92 +353,3 @@ def test_a_missing_matplotlib_is_said_before_the_work(
     said = Said(capsys, command, "--out", out)
     assert said.code == 2
     assert said.err.startswith("hybridtof: there will be no picture: it needs matplotlib")
-
-
-# --- track
-
-
-def answers(said: Said) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in said.out.splitlines()]
-
-
-def test_track_is_the_tracker(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path
-) -> None:
-    simulated = tmp_path / "f.csv"
-    Said(capsys, "simulate", "--scene", scene, "--from-m", "0.5", "--to-m", "0.6", "--frames", "12",
-         "--duration-s", "1", "--seed", "1", "--output", simulated)  # fmt: skip
-    said = Said(capsys, "track", simulated, "--scene", scene)
-    assert (said.code, said.err) == (0, "")
-    found = answers(said)
-    header, *rows = (line.split(",") for line in simulated.read_text().splitlines())
-    columns = {name: [float(row[k]) for row in rows] for k, name in enumerate(header)}
-    sensor = parse_sensor(SENSOR)
-    whole = track(sensor, parse_scene(SCENE), frames_from_columns(sensor, columns))
-    assert [line["sequence"] for line in found] == list(range(1, 13))
-    assert [line["time_s"] for line in found] == columns["time_s"]
-    for i, line in enumerate(found):
-        assert line["range_m"] == (None if np.isnan(whole.range_m[i]) else whole.range_m[i])
-        assert line["present"] == whole.present[i]
-        count = int(np.isfinite(whole.hypotheses_m[i]).sum())
-        assert [h["weight"] for h in line["hypotheses"]] == whole.hypotheses_weight[
-            i, :count
-        ].tolist()
-        assert line["latency_s"] > 0
-        assert line.keys() == {
-            "sequence", "time_s", "status", "range_m", "sd_m", "sd_parts_m", "hypotheses",
-            "present", "outlier", "rate_m_s", "misfit", "latency_s",
-        }  # fmt: skip
-    assert found[-1]["status"] == "unique"
-    # as NDJSON and as columns the same
-    as_json = written(tmp_path / "f.json", columns)
-    again = answers(Said(capsys, "track", as_json, "--scene", scene))
-    assert [line | {"latency_s": 0} for line in again] == [
-        line | {"latency_s": 0} for line in found
-    ]
-
-
-def test_a_bad_line_is_answered_and_changes_nothing(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scene: Path
-) -> None:
-    good = [
-        {"time_s": 0.0, "w1": 0.021, "w2": 1.71, "camera": "left", "sequence": 10},
-        {"time_s": 0.1, "w1": 0.022, "w2": 1.63},
-    ]
-    bad = ['{"time_s": 0.05, "w1": "x", "w2": 1.7, "camera": "left"}', "nope", '{"w1": 1, "w2": 2}',
-           '{"time_s": -1, "w1": 0.02, "w2": 1.7}', '{"time_s": 0.05, "W1": 0.02, "w2": 1.7}',
-           '{"time_s": 0.05, "w1": 0.02, "w2": 1.7, "sequence": "x"}']  # fmt: skip
-    given(monkeypatch, "\n".join([json.dumps(good[0]), *bad, json.dumps(good[1])]))
-    found = answers(Said(capsys, "track", "-", "--scene", scene))
-    given(monkeypatch, "\n".join(map(json.dumps, good)))
-    first, last = answers(Said(capsys, "track", "-", "--scene", scene))
-    assert found[0] | {"latency_s": 0} == first | {"latency_s": 0}
-    assert (first["camera"], first["sequence"], last["sequence"]) == ("left", 10, 11)
-    assert found[-1] | {"latency_s": 0} == last | {"latency_s": 0, "sequence": 17}
-    pointers = [line["error"]["pointer"] for line in found[1:-1]]
-    assert pointers == ["/w1", "", "/time_s", "/time_s", "/W1", "/sequence"]
-    assert found[1]["camera"] == "left"
-    assert all(line["error"]["title"] and line["error"]["type"] for line in found[1:-1])
-
-
-def test_a_stream_without_a_frame_is_bad_input(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scene: Path
-) -> None:
-    given(monkeypatch, "time_s,w1,w2\nx,1,2\n")
-    said = Said(capsys, "track", "-", "--scene", scene)
-    assert said.code == 2
-    assert answers(said)[0]["error"]["pointer"] == "/time_s"
-
-
-def test_settings_of_the_tracker(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    frames = written(tmp_path / "f.csv", CSV)
-    system = {"sensor": SENSOR, "scene": SCENE, "tracking": {"hypotheses": 1}}
-    said = Said(capsys, "track", frames, "--scene", written(tmp_path / "s.json", system))
-    assert all(len(line["hypotheses"]) <= 1 for line in answers(said))
-    system["tracking"] = {"hypotheses": 0}
-    said = Said(capsys, "track", frames, "--scene", written(tmp_path / "s.json", system))
-    assert said.code == 2
-    assert "s.json#/tracking/hypotheses: " in said.err
-    system |= {"scene": SCENE | {"motion": "tangential"}, "tracking": {}}
-    said = Said(capsys, "track", frames, "--scene", written(tmp_path / "s.json", system))
-    assert (said.code, said.out) == (3, "")

@@ -13,6 +13,7 @@ from typing import Any
 import httpx
 import pytest
 import websockets
+from starlette.websockets import WebSocketDisconnect
 from websockets.exceptions import InvalidStatus
 
 from benchmarks.kills import postgres
@@ -20,8 +21,9 @@ from benchmarks.streams import lines_of, survived, system
 from inference.tracking.state import state_to_bytes
 from service.app import create_app
 from service.border.keys import new_key, write_keys
+from service.border.traces import Traces
 from service.cli import main
-from service.errors import BusyError, GoneError
+from service.errors import BusyError, ConflictError, GoneError
 from service.service_settings import ServiceSettings
 from service.store.stream_record import StreamChange, StreamRecord
 from service.store.stream_store import StreamStore
@@ -30,7 +32,9 @@ from service.streams.forms import JsonLines
 from service.streams.kept import Kept
 from service.streams.lines import Line, Place
 from service.streams.model import model_of
+from service.streams.producer import lines_of as cut_lines
 from service.streams.producer import place_of
+from service.streams.streams import Streams
 from service.streams.taking import take
 from tests.service import fake_fold
 from tests.service.conftest import listening, speaking
@@ -231,6 +235,27 @@ async def test_streams_belong_to_keys(tmp_path: Path) -> None:
             third = await mine.post("/v1/streams", json=system())
             assert third.status_code == 503
             await made(theirs)
+
+
+async def test_who_breaks_off_leaves_the_stream_to_others(store: StreamStore) -> None:
+    """Whichever process its next connection comes to."""
+    one, other = (Streams(store, Traces(dict), 1) for _ in range(2))
+    made_one = await one.create(json.dumps(system()).encode(), "")
+
+    async def chunks() -> AsyncIterator[bytes]:
+        yield LINES[0] + b"\n"
+
+    async def away(_: list[bytes]) -> None:
+        with pytest.raises(ConflictError):
+            async with other.producing(made_one.id, ""):
+                pass
+        raise WebSocketDisconnect
+
+    with pytest.raises(WebSocketDisconnect):
+        async with one.producing(made_one.id, "") as producer:
+            await producer.run(cut_lines(chunks()), away)
+    async with other.producing(made_one.id, "") as producer:
+        assert producer.place.sequence == 1
 
 
 async def flood(address: str, path: str, http: httpx.AsyncClient) -> tuple[int, dict[str, Any]]:
