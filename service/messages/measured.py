@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from inference.known import Known
 from inference.technique import Technique
 from simulator.sensor import Sensor
 
-__all__ = ["SIDES", "Limits", "Measured", "limits_of", "measured_line", "measured_of", "total"]
+__all__ = ["SIDES", "Limits", "Measured", "limits_of", "measured_of", "total"]
 
 Side = Literal["near", "far"]
 Limits = tuple[float, float]
@@ -64,29 +64,22 @@ class Measured:
     limits_m: Limits
 
 
-def total(
-    ranges_m: Sequence[float], sds_m: Sequence[float | None], weights: Sequence[float]
-) -> float | None:
-    """Return the variance of a mixture: mean of the variances and variance of the means [m^2].
+def total(ranges_m: Sequence[float], sds_m: Sequence[float]) -> float | None:
+    """Return the variance of ranges of equal weight: the mean of theirs, and that between [m^2].
 
     Parameters
     ----------
-    ranges_m, sds_m, weights : sequence of float
-        Means, standard deviations (None where one is not known) and weights, which need not sum
-        to 1.
+    ranges_m, sds_m : sequence of float
+        The ranges, and their standard deviations, nan where one is not known [m].
 
     Returns
     -------
     float or None
         None without a range, or where a standard deviation is not known.
     """
-    known = [sd for sd in sds_m if sd is not None and math.isfinite(sd)]
-    if not ranges_m or len(known) < len(ranges_m) or not sum(weights) > 0:
+    if not ranges_m or not all(map(math.isfinite, sds_m)):
         return None
-    share = np.asarray(weights, dtype=np.float64) / sum(weights)
-    means = np.asarray(ranges_m, dtype=np.float64)
-    spread = share @ (means - share @ means) ** 2
-    return float(share @ np.square(np.asarray(known, dtype=np.float64)) + spread)
+    return float(np.mean(np.square(sds_m)) + np.var(ranges_m))
 
 
 def limits_of(technique: Technique, sensor: Sensor, known: Known) -> Limits:
@@ -130,7 +123,7 @@ def measured_of(
         count = int(result.root_count[n])
         roots, sds = result.roots_m[n, :count].tolist(), result.roots_sd_m[n, :count].tolist()
         unique = status == Status.UNIQUE
-        variance = total(roots, sds, [1.0] * count)
+        variance = total(roots, sds)
         found.append(
             Measured(
                 status=Status(status).name.lower(),
@@ -143,33 +136,3 @@ def measured_of(
             )
         )
     return found
-
-
-def measured_line(line: Mapping[str, Any], limits_m: Limits) -> Measured:
-    """Return the answer of a line of a stream, as `hybridtof track` writes it.
-
-    Parameters
-    ----------
-    line : mapping
-        With ``status``, ``range_m``, ``hypotheses``, ``misfit`` and perhaps ``time_s``; a line that
-        is an error is a frame without an answer.
-    limits_m : (float, float)
-        Between which the tracker looks for ranges [m].
-    """
-    hypotheses = line.get("hypotheses") or []
-    variance = total(
-        [item["range_m"] for item in hypotheses],
-        [item["sd_m"] for item in hypotheses],
-        [item["weight"] for item in hypotheses],
-    )
-    unique = line.get("status") == "unique" and line.get("range_m") is not None
-    return Measured(
-        status=line.get("status") or "none",
-        range_m=line["range_m"] if unique else None,
-        variance_m2=variance,
-        # a tracker says none where no object is there
-        side="far" if line.get("status") == "none" else None,
-        certain=unique and variance is not None and not line.get("misfit"),
-        time_s=line.get("time_s"),
-        limits_m=limits_m,
-    )

@@ -16,7 +16,7 @@ from inference.fits.techniques.registry import FITS
 from inference.realtime.registry import TECHNIQUES
 from service.messages import MESSAGES
 from service.messages.answering import encode_messages
-from service.messages.measured import SIDES, Measured, measured_line, total
+from service.messages.measured import SIDES, Measured, total
 from simulator.frames import frames_from_columns
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
@@ -144,41 +144,15 @@ def test_two_ranges_are_no_range_and_the_variance_is_that_of_both() -> None:
     assert distance[0].current_distance < distance[0].min_distance
 
 
-def test_a_line_of_a_stream() -> None:
-    line = {
-        "time_s": 0.5, "status": "unique", "range_m": 0.68, "sd_m": 0.002, "misfit": False,
-        "hypotheses": [
-            {"range_m": 0.68, "sd_m": 0.002, "weight": 0.9},
-            {"range_m": 0.78, "sd_m": 0.004, "weight": 0.1},
-        ],
-    }  # fmt: skip
-    one = measured_line(line, (0.02, 15.0))
-    # within 0.9 4e-6 + 0.1 16e-6, between 0.09 0.01
-    assert one.variance_m2 == pytest.approx(5.2e-6 + 9e-4)
-    assert one.certain
-    assert not measured_line({**line, "misfit": True}, (0.02, 15.0)).certain
-    two = measured_line({**line, "status": "ambiguous", "range_m": None}, (0.02, 15.0))
-    assert (two.range_m, two.variance_m2) == (None, one.variance_m2)
-    gone = measured_line({"status": "none", "hypotheses": [], "range_m": None}, (0.02, 15.0))
-    assert ROS.write(gone)["rep117"] == "+inf"
-    bad = measured_line({"sequence": 1, "error": {"title": "not finite"}}, (0.02, 15.0))
-    assert MAVLINK.write(bad)["signal_quality"] == 1
-
-
-@given(
-    st.lists(
-        st.tuples(st.floats(0.1, 10.0), st.floats(1e-4, 1.0), st.floats(0.01, 1.0)), min_size=1
-    )
-)
-def test_total_variance(modes: list[tuple[float, float, float]]) -> None:
+@given(st.lists(st.tuples(st.floats(0.1, 10.0), st.floats(1e-4, 1.0)), min_size=1))
+def test_total_variance(modes: list[tuple[float, float]]) -> None:
     """E[x^2] - E[x]^2 of the mixture, to rounding of the larger of the two."""
-    means, sds, weights = (np.array(column) for column in zip(*modes, strict=True))
-    share = weights / weights.sum()
-    second = share @ (means**2 + sds**2)
-    found = total(means.tolist(), sds.tolist(), weights.tolist())
-    assert found == pytest.approx(second - (share @ means) ** 2, abs=1e-13 * second * len(modes))
-    assert total(means.tolist(), [None, *sds.tolist()[1:]], weights.tolist()) is None
-    assert total([], [], []) is None
+    means, sds = (np.array(column) for column in zip(*modes, strict=True))
+    second = np.mean(means**2 + sds**2)
+    found = total(means.tolist(), sds.tolist())
+    assert found == pytest.approx(second - means.mean() ** 2, abs=1e-13 * second * len(modes))
+    assert total(means.tolist(), [math.nan, *sds.tolist()[1:]]) is None
+    assert total([], []) is None
 
 
 def test_reasons_that_tell_a_side_are_reasons_of_techniques() -> None:
