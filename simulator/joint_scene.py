@@ -1,4 +1,9 @@
-"""A scene with a joint law as scenes of known numbers: at its centre, and around it."""
+"""A scene with a joint law as scenes of known numbers: at its centre, and around it.
+
+Plans, techniques and requests ask for both again and again: those of the last scenes are kept.
+"""
+
+import functools
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,14 +37,17 @@ def centre(sensor: Sensor, scene: Scene) -> Scene:
     RefusedError
         Where a number is beyond what can be computed with.
     """
-    if scene.joint is None:
-        return scene
+    return scene if scene.joint is None else _centre(sensor, scene)
+
+
+@functools.lru_cache(maxsize=16)
+def _centre(sensor: Sensor, scene: Scene) -> Scene:
     parameters = parameters_of(sensor, scene)
-    return _at(
-        sensor, scene, parameters.names, parameters.natural(np.zeros((1, len(parameters))))[0]
-    )
+    origin = np.zeros((1, len(parameters)))
+    return _at(sensor, scene, parameters.names, parameters.natural(origin)[0])
 
 
+@functools.lru_cache(maxsize=16)
 def around(sensor: Sensor, scene: Scene) -> tuple[tuple[Scene, Scene], ...]:
     """Return scenes a standard deviation off the centre on either side, a pair a direction.
 
