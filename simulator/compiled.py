@@ -24,6 +24,7 @@ __all__ = [
     "NotReadyError",
     "compiled",
     "compiled_for_both",
+    "compiling_at_once",
     "given_up_s",
     "hot",
     "ready_only",
@@ -38,6 +39,7 @@ R = TypeVar("R")
 _START_S, _MAKE_S, _LOAD_S = 0.4, 0.1, 0.04
 # more elements than the interpreter gets through in such times
 _MANY = 100_000
+_AT_ONCE = "KERNELS_COMPILE"
 _lock = threading.RLock()
 _waiting: list[Callable[[], None]] = []
 _machine: list[Any] = []
@@ -49,6 +51,20 @@ _this_thread = threading.local()
 
 class NotReadyError(Exception):
     """A kernel has no answer at once, and who asks cannot wait for one."""
+
+
+@contextlib.contextmanager
+def compiling_at_once() -> Iterator[None]:
+    """Compile kernels at their first call, in this process and in those that it starts."""
+    before = os.environ.get(_AT_ONCE)
+    os.environ[_AT_ONCE] = "always"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_AT_ONCE]
+        else:
+            os.environ[_AT_ONCE] = before
 
 
 @contextlib.contextmanager
@@ -221,7 +237,7 @@ class Kernel:
         """Tell whether the interpreter may answer a call."""
         from simulator import uncompiled
 
-        if os.environ.get("KERNELS_COMPILE") == "always" or uncompiled.size(args) > _MANY:
+        if os.environ.get(_AT_ONCE) == "always" or uncompiled.size(args) > _MANY:
             return False
         return self._left_s(uncompiled.kind_of(args)) > 0.0
 

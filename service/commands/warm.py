@@ -26,9 +26,9 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
 
 
 def _run(args: argparse.Namespace) -> int:
-    import os
 
     from service.warm.warming import is_warm, mark_warm
+    from simulator.compiled import compiling_at_once
     from simulator.errors import HybridTofError
     from simulator.kernel_cache import base_folder
 
@@ -38,13 +38,12 @@ def _run(args: argparse.Namespace) -> int:
     if is_warm():
         note(args, f"{folder.path} is warm")
         return 0
-    # read at the first call of a kernel
-    os.environ["KERNELS_COMPILE"] = "always"
     from service.warm.questions import QUESTIONS
 
-    for number, (name, ask) in enumerate(QUESTIONS.items(), start=1):
-        note(args, f"compiling {number} of {len(QUESTIONS)}: {name}")
-        ask()
+    with compiling_at_once():
+        for number, (name, ask) in enumerate(QUESTIONS.items(), start=1):
+            note(args, f"compiling {number} of {len(QUESTIONS)}: {name}")
+            ask()
     mark_warm()
     note(args, f"{folder.path} is warm")
     return 0

@@ -3,7 +3,6 @@
 import argparse
 import itertools
 import json
-import os
 import sys
 from pathlib import Path
 
@@ -38,9 +37,15 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
 
 
 def _run(args: argparse.Namespace) -> int:
+    from simulator.compiled import compiling_at_once
+
     drawing = can_draw(args)
     # else the first of its calls might be timed while the interpreter answers them
-    os.environ["KERNELS_COMPILE"] = "always"
+    with compiling_at_once():
+        return _report(args, drawing)
+
+
+def _report(args: argparse.Namespace, drawing: bool) -> int:
     args.out.mkdir(parents=True, exist_ok=True)
     from service.report.cells import FULL, QUICK
     from service.report.light import light_rows

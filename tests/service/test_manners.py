@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import os
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -342,6 +343,7 @@ def test_a_missing_matplotlib_is_said_before_the_work(
     tmp_path: Path,
     command: str,
 ) -> None:
+    monkeypatch.delenv("KERNELS_COMPILE", raising=False)
     find = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util,
@@ -353,3 +355,5 @@ def test_a_missing_matplotlib_is_said_before_the_work(
     said = Said(capsys, command, "--out", out)
     assert said.code == 2
     assert said.err.startswith("hybridtof: there will be no picture: it needs matplotlib")
+    # the next command in this process compiles no more than it must
+    assert "KERNELS_COMPILE" not in os.environ

@@ -294,7 +294,6 @@ def test_command(
     monkeypatch.setattr("service.report.run.term_costs", list)
     monkeypatch.setattr("service.report.light.light_rows", lambda _: [])
     monkeypatch.setattr("service.report.picture.draw_terms", lambda _: Figure())
-    monkeypatch.setenv("KERNELS_COMPILE", "never")
     assert main(["report", "--quick", "--out", str(tmp_path)]) == 0
     said = capsys.readouterr()
     assert "scene: Bare object" in said.out

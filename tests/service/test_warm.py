@@ -17,7 +17,6 @@ def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Have two questions, an empty cache, and a list of what is asked."""
     said: list[str] = []
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.setenv("KERNELS_COMPILE", "")
     questions = {name: lambda name=name: said.append(name) for name in ("one", "two")}
     monkeypatch.setattr("service.warm.questions.QUESTIONS", questions)
     return said

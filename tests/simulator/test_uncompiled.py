@@ -3,7 +3,6 @@
 import ast
 import itertools
 import math
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -132,8 +131,7 @@ def test_what_python_refuses_is_compiled() -> None:
     assert len(kernel.dispatcher.overloads) == 1
 
 
-def test_an_estimate_of_few_frames_brings_no_compiler(tmp_path: Path) -> None:
-    """On an empty cache: where machine code is kept, a busy machine may load it all the sooner."""
+def test_an_estimate_of_few_frames_brings_no_compiler() -> None:
     code = """
 import sys, hybridtof
 sensor = hybridtof.parse_sensor(
@@ -143,12 +141,9 @@ frames = hybridtof.frames_from_columns(sensor, {"w1": [0.0002], "w2": [0.004]})
 answer = hybridtof.estimate(sensor, scene, frames, ["conventional", "intensity"])
 assert len(answer.results) == 2
 heavy = {"numba", "scipy.linalg", "scipy.special", "scipy.stats", "scipy.constants"}
-assert not heavy & sys.modules.keys()
+assert not heavy & sys.modules.keys(), heavy & sys.modules.keys()
 """
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
-    # a busy machine may take the interpreter for too slow now and then, but not every time
-    command = (sys.executable, "-c", code)
-    assert any(subprocess.run(command, env=environment).returncode == 0 for _ in range(8))
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 @pytest.mark.parametrize("path", KERNELS, ids=lambda path: path.stem)
