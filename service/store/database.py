@@ -16,9 +16,8 @@ from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 from service.service_settings import PREFIX
 from simulator.errors import InvalidInputError
 
-__all__ = ["StoreUrl", "brief", "default_url", "engine_of", "is_sqlite", "ready"]
+__all__ = ["brief", "default_url", "engine_of", "is_sqlite", "ready"]
 
-StoreUrl = sa.URL
 _POINTER = f"/{PREFIX}DATABASE"
 _MIGRATION_LOCK = 5_707_331  # any number that nobody else takes an advisory lock of
 
