@@ -41,12 +41,14 @@ class Nodes(NamedTuple):
 
     aways: Array
     masses: Array
+    windows: Array  # sums of all windows there, against the nearest one
 
 
 @compiled
 def nodes_for() -> Nodes:
     """Return room for both sides of a mode."""
-    return Nodes(np.empty(2 * _INTERVALS + 2), np.empty(2 * _INTERVALS + 2))
+    size = 2 * _INTERVALS + 2
+    return Nodes(np.empty(size), np.empty(size), np.empty(size))
 
 
 @compiled
@@ -83,17 +85,14 @@ def _simpson(
 
 
 @compiled
-def _window_share(x: float, window: int) -> float:
-    """Return what one of the windows takes of a place x standard deviations from the mean."""
+def _window(x: float, window: int) -> float:
+    """Return one of the windows x standard deviations from the mean, against the nearest one.
+
+    Far out all are below what numbers hold.
+    """
     nearest = min(max(round(x / _SPACING), -_WINDOWS), _WINDOWS)
-    # against the nearest one: far out all are below what numbers hold
-    away = x / _SPACING - nearest
-    windows = 0.0
-    for other in range(-_WINDOWS, _WINDOWS + 1):
-        off = x / _SPACING - other
-        windows += math.exp(0.5 * (away * away - off * off))
-    off = x / _SPACING - window
-    return math.exp(0.5 * (away * away - off * off)) / windows
+    away, off = x / _SPACING - nearest, x / _SPACING - window
+    return math.exp(0.5 * (away * away - off * off))
 
 
 @compiled
@@ -109,8 +108,8 @@ def _divide(
 ) -> int:
     """Append one mode that is not near a Gaussian, as at folds and ends of the support.
 
-    Simpson's rule gives its moments. It is then divided by smooth windows, a standard deviation
-    apart, into parts that are near enough to Gaussians.
+    Simpson's rule gives its moments. It is then divided by smooth windows, half a standard
+    deviation apart, into parts that are near enough to Gaussians.
     """
     u = mode.u
     top = log_density(u, frame, prior, table)
@@ -121,11 +120,15 @@ def _divide(
     if not sd > 0.0:
         log_mass = top + math.log(total)
         return add_candidate(to, count, TrackCandidate(log_mass, u + mean, sd, u + mean, parent))
+    for row in range(aways.size):
+        nodes.windows[row] = 0.0
+        for window in range(-_WINDOWS, _WINDOWS + 1):
+            nodes.windows[row] += _window((aways[row] - mean) / sd, window)
     for window in range(-_WINDOWS, _WINDOWS + 1):
         share, shift, square = 0.0, 0.0, 0.0
         for row in range(aways.size):
             x = (aways[row] - mean) / sd
-            part = masses[row] * _window_share(x, window)
+            part = masses[row] * (_window(x, window) / nodes.windows[row])
             share += part
             shift += part * x
             square += part * x * x

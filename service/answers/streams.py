@@ -14,7 +14,7 @@ class StreamResponse(pydantic.BaseModel):
     """Answer of ``GET /v1/streams/{id}``: how a stream stands."""
 
     id: str
-    status: Literal["calibrating", "tracking", "expired"]
+    status: Literal["tracking", "expired"]
     sequence: int | None
     answered: int
     errors: int

@@ -19,7 +19,7 @@ __all__ = ["ANSWERED", "Shape", "frames_of", "of_one_frame", "one_frame", "passe
 ANSWERED = frozenset(
     {
         "sequence", "time_s", "status", "range_m", "sd_m", "sd_parts_m", "hypotheses", "present",
-        "outlier", "rate_m_s", "misfit", "latency_s", "error", "gap", "dropped", "calibrating",
+        "outlier", "rate_m_s", "misfit", "latency_s", "error", "gap", "dropped",
     }
 )  # fmt: skip
 """Members of answers: what comes under these names is not passed through."""
