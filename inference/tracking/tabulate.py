@@ -16,10 +16,10 @@ from inference.frame.arguments import (
 )
 from inference.frame.mean_readings import readings_along, with_surroundings
 from inference.frame.range_prior import integration_bounds, log_range_density
-from inference.frame.table import KNOT_SPACING, TURN
 from inference.tracking.observed import Observed
 from inference.tracking.places import Places, Scan, boxes_of
 from inference.tracking.readings_table import ReadingsTable
+from inference.tracking.scan import places_around_folds, scan_of
 from simulator.compiled import compiled
 from simulator.errors import RefusedError
 from simulator.parameters import Terms
@@ -47,7 +47,6 @@ _FEWEST = 256
 _MOST = 1 << 16
 _ERROR = 0.01  # standard deviations of a reading by which the table may be wrong
 _RELATIVE_ERROR = 1e-11  # or this share of the reading, which no range feels
-_VISIBLE = 0.1  # standard deviations of a reading below which a turn is not seen
 _DIFFERENCE = 3e-5  # of u, for second derivatives
 
 
@@ -195,39 +194,6 @@ def knots_of(
     )
 
 
-def _scan_of(knots: Knots, by_rate: bool, rate_sd: float) -> NDArray[np.int64]:
-    """Choose knots between which a frame's density has at most one maximum.
-
-    They are at most `KNOT_SPACING` apart, and closer where the curve turns visibly; by rate a turn
-    back of its direction counts. Returns their indices, ascending, both ends among them.
-    """
-    last = knots.positions.size - 1
-    stride = max(1, int(KNOT_SPACING / knots.step))
-    chosen = np.unique(np.append(np.arange(0, last, stride), last))
-    while True:
-        values = knots.means[chosen, MEAN]
-        if by_rate:
-            size = np.linalg.norm(values, axis=1) * 3.0 * rate_sd
-            angle = np.unwrap(np.arctan2(values[:, 1], values[:, 0]), period=math.pi)
-            # along the direction nothing is seen, since the rate is free
-            values = np.column_stack([np.zeros(size.size), angle])
-            steps = np.diff(values, axis=0) * np.minimum(size[1:], size[:-1])[:, None]
-        else:
-            steps = np.diff(values, axis=0)
-        length = np.linalg.norm(steps, axis=1)
-        along = np.einsum("ij,ij->i", steps[1:], steps[:-1])
-        turns = along < TURN * length[1:] * length[:-1]
-        turns &= np.maximum(length[1:], length[:-1]) > _VISIBLE
-        split = np.zeros(length.size, dtype=bool)
-        split[:-1] |= turns & (length[:-1] > _VISIBLE)
-        split[1:] |= turns & (length[1:] > _VISIBLE)
-        split &= np.diff(chosen) > 1
-        if not split.any():
-            return chosen.astype(np.int64)
-        middle = (chosen[:-1] + chosen[1:])[split] // 2
-        chosen = np.unique(np.concatenate([chosen, middle]))
-
-
 def table_of(knots: Knots, nuisance: Array, crosstalk: Array, observed: Observed) -> ReadingsTable:
     """Return the kernels' table.
 
@@ -284,7 +250,11 @@ def places_of(knots: Knots, empty: Array, observed: Observed, rate_sd: float) ->
     observed, rate_sd
         As for `knots_of`.
     """
-    scan = _scan_of(knots, observed.by_rate, rate_sd)
-    next_one = np.searchsorted(scan, np.arange(knots.positions.size)).astype(np.int64)
+    scan = scan_of(knots.positions, knots.means[:, MEAN], observed.by_rate, rate_sd)
     boxes, groups = boxes_of(knots.positions, knots.means, knots.log_prior, scan)
-    return Places(Scan(knots.positions[scan], next_one), empty, boxes, groups)
+    positions = knots.positions[scan]
+    if not observed.by_rate:
+        around = places_around_folds(knots.positions, knots.means[:, MEAN], knots.means[:, SLOPE])
+        positions = np.unique(np.concatenate([positions, around]))
+    next_one = np.searchsorted(positions, knots.positions).astype(np.int64)
+    return Places(Scan(positions, next_one), empty, boxes, groups)
