@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report readme api picture notebook notebook-data calibrate coverage kills fuzz stress test check lint format types fast lock clean
+.PHONY: help setup demo report readme api picture notebook notebook-data calibrate coverage kills fuzz stress mutations test check lint format types fast lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -58,6 +58,9 @@ fuzz: $(READY) ## 2,000 requests a route by schemathesis, 10,000 bodies a route 
 
 stress: $(READY) ## Extreme and stiff cases against exact arithmetic, 100,000 frames: the table of docs/stability.md
 	$(BIN)/python -m benchmarks.stability
+
+mutations: $(READY) ## Plant faults in a copy of the source, one at a time: which tests notice; goes on where it stopped
+	$(BIN)/python -m benchmarks.mutations
 
 # two processes on two cores: a library that starts threads of its own only makes them wait
 calibrate coverage stress test fast: export OPENBLAS_NUM_THREADS = 1
