@@ -24,6 +24,7 @@ def first_state(
     crosstalk: Array | None,
     crosstalk_root: Array,
     scale: Array,
+    untold: tuple[bool, bool],
 ) -> TrackState:
     """Return the state before any frame.
 
@@ -40,6 +41,8 @@ def first_state(
         where there is no posterior, and its prior holds.
     scale : ndarray, shape (2,)
         From readings to units of the read noise.
+    untold : (bool, bool)
+        Of which of the two readings nothing but the scene's prior tells the crosstalk.
     """
     rows, n = settings.hypotheses + 1, 2 if crosstalk is None else 4
     x, X = np.zeros((rows, n)), np.zeros((rows, n, n + directions))
@@ -51,10 +54,10 @@ def first_state(
             # of its own, so that it can be learnt: its correlation with other unknowns is left out
             upper = np.asarray(np.linalg.qr(crosstalk_root.T, mode="r"))
             X[0, CROSSTALK1:, CROSSTALK1 : CROSSTALK1 + len(upper)] = upper.T
-        elif values is not None:
+        if values is not None:
             for k, value in enumerate(values):
                 state = CROSSTALK1 + k
-                if not isinstance(value, float | int):
+                if untold[k] and not isinstance(value, float | int):
                     mean, sd = _moments(value.distribution().from_normal)
                     x[0, state], X[0, state, state] = mean * scale[k], sd * scale[k]
     weight = np.zeros(rows)

@@ -157,6 +157,8 @@ def tracker(
     places = places_of(knots, np.column_stack([empty, jacobian.empty]), observed, settings.rate_sd)
     rules = rules_of(settings, observed, scene.motion == "static", jacobian)
     limit = surprise_limit(settings, rules, observed.channels, jacobian)
+    one, other = parameters.crosstalk or ("", "")
+    by_prior = posterior is None and one in untold, posterior is None and other in untold
     first = first_state(
         scene,
         settings,
@@ -164,6 +166,7 @@ def tracker(
         crosstalk if learns else None,
         crosstalk_root(known, observed.scale),
         observed.scale,
+        by_prior,
     )
     first = dataclasses.replace(first, signature=_signature(table, places, rules, first.hypotheses))
     model = Model(table, places, rules)

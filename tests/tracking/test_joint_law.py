@@ -6,6 +6,7 @@ import pytest
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.track import track
 from simulator.errors import RefusedError
+from simulator.frames import frames_from_columns
 from simulator.parameters import parameters_of
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
@@ -60,3 +61,23 @@ def test_what_the_law_does_not_name_is_refused() -> None:
     ).frames
     with pytest.raises(RefusedError, match=r"object\.c1, object\.c2 unknown"):
         track(SENSOR, parse_scene({"joint": joint}), frames)
+
+
+def test_crosstalk_that_the_law_does_not_name_is_learnt_from_its_prior() -> None:
+    known = {"c0": 0.08, "c1": 0.0, "c2": 0.1}
+    law = {
+        "object": known | {"c2": {"prior": "lognormal", "median": 0.1, "sigma": 0.01}},
+        "crosstalk": [{"prior": "normal", "mean": 0.0, "sd": 0.001}] * 2,
+        "joint": {"unknowns": ["object.c2"], "modes": [{"mean": [0.0], "covariance": [[1.0]]}]},
+    }
+    readings = np.array([[0.0006, 0.0007], [0.0005, 0.0006]])
+    empty = np.zeros(2, dtype=bool)
+    columns = {"time_s": np.arange(2.0), "w1": readings[:, 0], "w2": readings[:, 1]}
+    frames = frames_from_columns(SENSOR, columns | {"object_present": empty})
+    found = track(SENSOR, parse_scene(law), frames)
+    # a normal prior of sd 1e-3, two readings of sd 1e-4 each
+    weights = 1e-3**-2, 2 * 1e-4**-2
+    assert found.crosstalk is not None
+    assert found.crosstalk_sd is not None
+    assert np.allclose(found.crosstalk[-1], readings.mean(axis=0) * weights[1] / sum(weights))
+    assert np.allclose(found.crosstalk_sd[-1], sum(weights) ** -0.5)
