@@ -10,12 +10,14 @@ from simulator.compiled import compiled
 
 __all__ = [
     "NEW",
+    "NEW_UNREAD",
     "TrackCandidate",
     "TrackCandidates",
     "add_candidate",
     "candidates_for",
     "heaviest_of",
     "log_mass_of",
+    "row_of",
     "take",
 ]
 
@@ -23,6 +25,8 @@ Array = NDArray[np.float64]
 
 NEW = 0
 """Parent of a candidate that is an object that has just come."""
+NEW_UNREAD = -1_000_000
+"""Parent of one whose range is known, and whose readings have nothing to do with the scene."""
 
 
 class TrackCandidate(NamedTuple):
@@ -33,8 +37,8 @@ class TrackCandidate(NamedTuple):
     mean: float
     sd: float
     mode: float  # where the density is largest, log range
-    # row of the hypothesis, `NEW`, or less than 0: the frame is an outlier and leaves hypothesis
-    # ``-parent`` as it was
+    # row of the hypothesis, `NEW`, or less than 0: the frame's readings are an outlier and leave
+    # hypothesis ``-parent``, or `NEW_UNREAD`, as it was
     parent: int
 
 
@@ -91,6 +95,12 @@ def heaviest_of(of: TrackCandidates, count: int) -> int:
         if of.log_mass[j] > of.log_mass[top]:
             top = j
     return top
+
+
+@compiled
+def row_of(parent: int) -> int:
+    """Return the row of the hypothesis that a candidate comes from; the empty scene's if new."""
+    return 0 if parent == NEW_UNREAD else abs(parent)
 
 
 @compiled

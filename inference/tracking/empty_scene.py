@@ -11,18 +11,37 @@ from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import (
     CROSSTALK1,
     CROSSTALK2,
+    PENDING,
     Hypotheses,
     Scratch,
     learns_crosstalk,
+    log_of,
 )
+from inference.tracking.motion import Rules
+from inference.tracking.outliers import log_outlier
 from inference.tracking.readings_table import FIRST, SECOND, ReadingsTable, noise_root
 from inference.tracking.roots import UNIT, Root, add_factor, solve
 from inference.tracking.square_root import Linear, update
 from simulator.compiled import compiled
 
-__all__ = ["Expected", "expect_empty", "learn_empty"]
+__all__ = ["NEVER", "Empty", "Expected", "expect_empty", "learn_empty", "weigh_empty"]
 
 Array = NDArray[np.float64]
+
+
+NEVER = -1e300
+"""Log mass of what cannot be."""
+
+
+class Empty(NamedTuple):
+    """What the empty scene says of a frame."""
+
+    # log masses of no object: with readings as expected, and with an outlier
+    usual: float
+    odd: float
+    odd_born: float  # log mass of an object that has come, of unknown range, and an outlier
+    strange: float  # log density of the readings as an outlier of it
+    surprise: float  # normalised innovation squared
 
 
 class Expected(NamedTuple):
@@ -104,3 +123,45 @@ def learn_empty(
         e1, e2 = frame.first - expected.mean1, frame.second - expected.mean2
         update(of, 0, Linear(e1, e2, 0.0, 0.0, 0.0, 0.0, expected.noise), scratch)
     return expected.surprise
+
+
+@borrowed
+@compiled
+def weigh_empty(
+    frame: TrackedFrame,
+    of: Hypotheses,
+    table: ReadingsTable,
+    empty: Array,
+    rules: Rules,
+    scratch: Scratch,
+) -> Empty:
+    """Weigh the empty scene, and an object that has come and is not seen.
+
+    Where the range is known there is an object, and its range is not unknown.
+
+    Parameters
+    ----------
+    frame : TrackedFrame
+        The frame.
+    of : Hypotheses
+        As predicted.
+    table, empty
+        As for `expect_empty`.
+    rules : Rules
+        How often frames are outliers.
+    scratch : Scratch
+        Overwritten.
+    """
+    expected = expect_empty(of, frame, table, empty, scratch.nuisance)
+    strange = log_outlier(frame, expected.mean1, expected.mean2, table, rules)
+    if frame.known_rate > 0.0:
+        return Empty(NEVER, NEVER, NEVER, strange, expected.surprise)
+    log_usual, log_odd = math.log1p(-rules.outlier), math.log(rules.outlier)
+    log_empty = log_of(of.weight[0])
+    return Empty(
+        log_empty + log_usual + expected.log_density,
+        log_empty + log_odd + strange,
+        log_of(of.numbers[PENDING]) + log_odd + strange,
+        strange,
+        expected.surprise,
+    )

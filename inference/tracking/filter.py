@@ -15,7 +15,7 @@ from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import COUNT, PENDING, ROUGHNESS, RUNNING, TIME, Hypotheses
 from inference.tracking.prediction import predict
 from inference.tracking.report import OUTLIER, STATUS, SURPRISE, report
-from inference.tracking.weighing import Model, room_for, weigh_frame
+from inference.tracking.weighing import Model, room_for, weigh_frame, weigh_known
 from simulator.compiled import compiled
 
 __all__ = ["EMPTY", "EMPTY_SATURATED", "SATURATED", "USABLE", "run_filter"]
@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 
 # what is known of a frame before it is looked at
 USABLE, SATURATED, EMPTY, EMPTY_SATURATED = range(4)
-_FIRST, _SECOND, _GAIN = range(3)  # columns of frames
+# columns of frames, the last two only where ranges are known
+_FIRST, _SECOND, _GAIN, _KNOWN_M, _KNOWN_RATE = range(5)
 _SATURATED = int(Status.SATURATED)
 _LATE = 4.0  # frames over which the roughness of the motion is a mean
 
@@ -48,8 +49,9 @@ def run_filter(
         Filled, as `report` has it.
     times : ndarray, shape (frames,)
         Times [s], increasing, later than the state's.
-    frames : ndarray, shape (frames, 3)
-        Readings in units of the read noise, and the gain factor.
+    frames : ndarray, shape (frames, 3 or 5)
+        Readings in units of the read noise, the gain factor, and the range that is known beside
+        them [m] with one over its standard deviation [1/m], 0 where none is.
     kinds : ndarray of uint8, shape (frames,)
         `USABLE`, `SATURATED`, `EMPTY` (known to hold no object) or `EMPTY_SATURATED`.
     of : Hypotheses
@@ -66,11 +68,19 @@ def run_filter(
         if math.isfinite(numbers[TIME]):
             predict(times[i] - numbers[TIME], of, rules, room.scratch.work)
         numbers[TIME] = times[i]
-        frame = TrackedFrame(frames[i, _FIRST], frames[i, _SECOND], frames[i, _GAIN])
+        known_m, known_rate = 0.0, 0.0
+        if frames.shape[1] > _KNOWN_M:
+            known_m, known_rate = frames[i, _KNOWN_M], frames[i, _KNOWN_RATE]
+        frame = TrackedFrame(
+            frames[i, _FIRST], frames[i, _SECOND], frames[i, _GAIN], known_m, known_rate
+        )
         outlier, surprise = 0.0, math.nan
         if kinds[i] == USABLE:
             outlier, surprise = weigh_frame(frame, of, model, room, full)
-        elif kinds[i] != SATURATED:
+        elif kinds[i] == SATURATED:
+            if known_rate > 0.0:
+                weigh_known(frame, of, model, room)
+        else:
             if kinds[i] == EMPTY:
                 surprise = learn_empty(of, frame, model.table, model.places.empty, room.scratch)
             of.weight[0], numbers[PENDING], numbers[COUNT] = 1.0, 0.0, 0.0

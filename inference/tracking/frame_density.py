@@ -23,7 +23,16 @@ from inference.tracking.readings_table import (
 from inference.tracking.roots import UNIT, Root, add_factor, add_root
 from simulator.compiled import compiled
 
-__all__ = ["Added", "Position", "Prior", "Rate", "TrackedFrame", "expected_at", "log_density"]
+__all__ = [
+    "Added",
+    "Position",
+    "Prior",
+    "Rate",
+    "TrackedFrame",
+    "expected_at",
+    "log_density",
+    "log_known",
+]
 
 Array = NDArray[np.float64]
 
@@ -36,6 +45,10 @@ class TrackedFrame(NamedTuple):
     first: float
     second: float
     gain: float
+    # the range that is known beside them [m], and one over its standard deviation [1/m], which is 0
+    # where none is: at run time, so that a stream has the same answers however it is cut
+    known_m: float = 0.0
+    known_rate: float = 0.0
 
 
 class Position(NamedTuple):
@@ -81,6 +94,13 @@ class Prior(NamedTuple):
     # part of the variance of u that comes from crosstalk that is not known: along it the curve
     # counts as straight (`inference.tracking.shared_error`)
     share: float
+
+
+@compiled
+def log_known(u: float, frame: TrackedFrame) -> float:
+    """Return the log density of what is known of the range beside the readings, at one u."""
+    off = (math.exp(u) - frame.known_m) * frame.known_rate
+    return -0.5 * off * off
 
 
 @compiled
@@ -166,5 +186,7 @@ def log_density(u: float, frame: TrackedFrame, prior: Prior, table: ReadingsTabl
     z1 = e1 / root.r11
     z2 = (e2 - root.r21 * z1) / root.r22
     value = -0.5 * (z1 * z1 + z2 * z2) + _log_prior(u, position, table)
+    if frame.known_rate > 0.0:
+        value += log_known(u, frame)
     scale = root.r11 * root.r22
     return value if scale == 1.0 else value - math.log(scale)

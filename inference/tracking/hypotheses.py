@@ -6,6 +6,7 @@ standard normal: the first n columns of X are its own, lower triangular; the las
 nuisance parameters, which all frames share.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +31,7 @@ __all__ = [
     "copied",
     "copy",
     "learns_crosstalk",
+    "log_of",
     "scratch_for",
     "variance_of",
 ]
@@ -40,6 +42,7 @@ Array = NDArray[np.float64]
 U, V, CROSSTALK1, CROSSTALK2, ANCHOR = range(5)
 # places in `Hypotheses.numbers`
 TIME, PENDING, RUNNING, COUNT, LOST, ROUGHNESS = range(6)
+_LEAST = -700.0  # log of a weight that underflows
 
 
 class Hypotheses(NamedTuple):
@@ -105,3 +108,9 @@ def variance_of(of: Hypotheses, row: int, state: int) -> float:
     for j in range(of.X.shape[1]):
         variance += of.X[row, state, j] * of.X[row, state, j]
     return variance
+
+
+@compiled
+def log_of(weight: float) -> float:
+    """Return the log of a weight, of none that of one which underflows."""
+    return math.log(weight) if weight > 0.0 else _LEAST

@@ -18,6 +18,7 @@ from inference.tracking.hypotheses import (
     learns_crosstalk,
     variance_of,
 )
+from inference.tracking.known_range import take_known
 from inference.tracking.readings_table import (
     FIRST,
     SECOND,
@@ -33,7 +34,7 @@ from inference.tracking.shared_error import NOT_SHARED, follow, straighten
 from inference.tracking.square_root import Linear, update
 from simulator.compiled import compiled
 
-__all__ = ["learn"]
+__all__ = ["begin", "learn"]
 
 Array = NDArray[np.float64]
 
@@ -53,7 +54,7 @@ class Tangent(NamedTuple):
 
 
 @compiled
-def _begin(of: Hypotheses, row: int, u: float, rate_sd: float) -> None:
+def begin(of: Hypotheses, row: int, u: float, rate_sd: float) -> None:
     """Begin a hypothesis: anywhere near u, so vaguely that the frame alone speaks."""
     x, X = of.x, of.X
     x[row, U], x[row, V] = u, 0.0
@@ -171,7 +172,10 @@ def learn(
     if shares:
         shared = straighten(of, row, gain, tangent.slope1, tangent.slope2, table)
     if position.born:
-        _begin(of, row, u, prior.rate.sd)
+        begin(of, row, u, prior.rate.sd)
+    beside = 0.0
+    if frame.known_rate > 0.0:
+        beside = take_known(of, row, u, frame, scratch)
     if table.by_rate:
         readings = _of_derivatives(of, row, tangent, frame, prior)
     else:
@@ -180,4 +184,8 @@ def learn(
     if shares:
         follow(of, row, shared, gain, table)
     _take_moments(of, row, candidate.mean, candidate.sd)
+    if frame.known_rate > 0.0:
+        # one number more is surprising; of an object that has just come it says where that is
+        told = table.channels + (0.0 if position.born else 1.0)
+        return (surprise + beside) * table.channels / told
     return surprise + 1.0 if position.born else surprise

@@ -60,6 +60,10 @@ def mode_of_plain(
         precision = 0.0 if position.born else position.precision
         slope = t1 * z1 + t2 * z2 - away * precision
         curvature = t1 * t1 + t2 * t2 + precision
+        if frame.known_rate > 0.0:
+            along = math.exp(u) * frame.known_rate
+            slope += (frame.known_m * frame.known_rate - along) * along
+            curvature += along * along
         if slope > 0.0:
             low = u
         else:

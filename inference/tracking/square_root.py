@@ -17,7 +17,7 @@ from inference.tracking.readings_table import FIRST, SECOND
 from inference.tracking.roots import Root, add_factor, rotation, solve
 from simulator.compiled import compiled
 
-__all__ = ["Linear", "move", "triangularise", "update"]
+__all__ = ["Linear", "move", "triangularise", "update", "update_range"]
 
 Array = NDArray[np.float64]
 
@@ -149,3 +149,52 @@ def update(of: Hypotheses, row: int, readings: Linear, scratch: Scratch) -> floa
         for j in range(n):
             X[row, i, j] = work[i, j]
     return residual1 * pull1 + residual2 * pull2
+
+
+@borrowed
+@compiled
+def update_range(
+    of: Hypotheses, row: int, residual: float, slope: float, scratch: Scratch
+) -> float:
+    """Learn from a number that depends on log r alone.
+
+    Parameters
+    ----------
+    of, row : Hypotheses, int
+        The hypothesis; changed in place.
+    residual : float
+        The number less its prediction, in units of its standard deviation.
+    slope : float
+        Its derivative along log r, in the same units.
+    scratch : Scratch
+        Overwritten.
+
+    Returns
+    -------
+    float
+        Normalised innovation squared.
+    """
+    x, X, work, factors = of.x, of.X, scratch.work, scratch.factors
+    _, n, m = X.shape
+    variance = 1.0
+    for j in range(m):
+        factors[FIRST, j] = slope * X[row, U, j]
+        variance += factors[FIRST, j] * factors[FIRST, j]
+    for i in range(n):
+        gain = 0.0
+        for j in range(m):
+            gain += X[row, i, j] * factors[FIRST, j]
+        gain /= variance
+        work[i, n] = gain
+        x[row, i] += gain * residual
+        for j in range(m):
+            value = X[row, i, j] - gain * factors[FIRST, j]
+            if j < n:
+                work[i, j] = value
+            else:
+                X[row, i, j] = value
+    triangularise(work, 0, n, n + 1)
+    for i in range(n):
+        for j in range(n):
+            X[row, i, j] = work[i, j]
+    return residual * residual / variance

@@ -9,6 +9,7 @@ from inference.estimates import SdParts, Status
 from inference.posterior.answer.posterior import Posterior
 from inference.tracking.filter import EMPTY, EMPTY_SATURATED, SATURATED, run_filter
 from inference.tracking.hypotheses import TIME, copied
+from inference.tracking.known_range import beyond_support
 from inference.tracking.report import (
     BEST,
     CROSSTALK,
@@ -120,7 +121,8 @@ def step(
         `Tracker.first`, or what the last step returned.
     frames : Frames
         With times that increase and are later than the state's. ``object_present`` false says that
-        no object is there; true says nothing.
+        no object is there; true says nothing. A known range is one more reading of its frame, and
+        says that an object is there; readings that contradict it are an outlier.
     full : bool
         Whether to look for new objects along the whole range in every frame, also where none could
         be heavy enough to be kept: slower, with the same answer to within what is negligible.
@@ -134,8 +136,9 @@ def step(
     InvalidInputError
         At "/frames/..." for a column of another length, or not finite, and for a gain that is not
         positive; at "/frames/time_s" where times are missing, repeated or go back; at
-        "/frames/dw1_dt" and its like where derivatives are tracked and missing; at "/state" for
-        another tracker's state.
+        "/frames/dw1_dt" and its like where derivatives are tracked and missing; at
+        "/frames/known_range_m" for ranges that the scene does not allow; at
+        "/frames/displacement_m" for any; at "/state" for another tracker's state.
     """
     if state.signature != model.first.signature:
         raise InvalidInputError.at("/state", "belongs to another tracker")
@@ -156,7 +159,8 @@ def step(
     out = np.full((len(frames), REPORT_COLUMNS), np.nan)
     rows = np.full((len(frames), model.settings.hypotheses, HYPOTHESIS_COLUMNS), np.nan)
     hypotheses = copied(state.hypotheses)
-    table = np.ascontiguousarray(np.column_stack([values, gain]))
+    columns = [values, gain, *_known(model, frames)]
+    table = np.ascontiguousarray(np.column_stack(columns))
     run_filter(out, rows, times, table, kinds, hypotheses, model.model, full)
     return TrackState(hypotheses, state.signature), _track(model, out, rows)
 
@@ -205,6 +209,29 @@ def _times(frames: Frames, last: float) -> Array:
             "/frames/time_s", f"entry 0 is not later than the last frame, {last:.9g} s"
         )
     return times
+
+
+def _known(model: Tracker, frames: Frames) -> list[Array]:
+    """Return known ranges and one over their standard deviations, checked; nothing without any."""
+    if frames.displacement_m is not None:
+        first = np.flatnonzero(np.isfinite(frames.displacement_m))[0]
+        raise InvalidInputError.at(
+            "/frames/displacement_m",
+            f"entry {first} is given, and a tracker takes no displacements: their offset is an "
+            "unknown of many frames, which a posterior finds; give known_range_m, or null",
+        )
+    known, sd = frames.known_range_m, frames.known_range_sd_m
+    if known is None or sd is None:
+        return []
+    if (beyond := beyond_support(known, sd, model.model.table)).size:
+        low, high = np.exp([model.model.table.start, model.model.table.end])
+        raise InvalidInputError.at(
+            "/frames/known_range_m",
+            f"entry {beyond[0]} is {known[beyond[0]]:g} m, and the scene and the sensor allow "
+            f"ranges from {low:.4g} to {high:.4g} m: state a wider range_m",
+        )
+    told = np.isfinite(known)
+    return [np.where(told, known, 0.0), np.where(told, 1.0 / sd, 0.0)]
 
 
 def _observations(model: Tracker, frames: Frames) -> Array:

@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 from inference.tracking.borrowed import borrowed
 from inference.tracking.candidates import (
     NEW,
+    NEW_UNREAD,
     TrackCandidate,
     TrackCandidates,
-    add_candidate,
     candidates_for,
     heaviest_of,
     log_mass_of,
+    row_of,
     take,
 )
-from inference.tracking.empty_scene import expect_empty, learn_empty
+from inference.tracking.empty_scene import NEVER, Empty, learn_empty, weigh_empty
 from inference.tracking.evenness import counted_widths, even_out, log_total, take_width
 from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import (
@@ -32,24 +33,23 @@ from inference.tracking.hypotheses import (
     Scratch,
     copy,
     learns_crosstalk,
+    log_of,
     scratch_for,
 )
 from inference.tracking.learning import learn
 from inference.tracking.merging import prune
 from inference.tracking.modes import Scanned, find_candidates, scanned_for
 from inference.tracking.motion import Rules
-from inference.tracking.outliers import expected_readings, log_outlier
 from inference.tracking.places import Places, mass_bound
 from inference.tracking.prediction import born_prior, prior_of
 from inference.tracking.readings_table import ReadingsTable
+from inference.tracking.unread import add_unread, learn_unread
 from simulator.compiled import compiled
 
-__all__ = ["Model", "Room", "room_for", "weigh_frame"]
+__all__ = ["Model", "Room", "room_for", "weigh_frame", "weigh_known"]
 
 Array = NDArray[np.float64]
 
-_LEAST = -700.0  # log of a weight that underflows
-_ODD = math.log(1e-2)  # log weight from which on a frame may have been an outlier
 _SPARE = 5  # times as many hypotheses may be made by a frame as are kept after it
 
 
@@ -68,16 +68,6 @@ class Room(NamedTuple):
     candidates: TrackCandidates  # modes that were found
     scanned: Scanned  # where they were looked for
     scratch: Scratch  # for learning
-
-
-class Empty(NamedTuple):
-    """What the empty scene says of a frame."""
-
-    # log masses of no object: with readings as expected, and with an outlier
-    usual: float
-    odd: float
-    odd_born: float  # log mass of an object that has come and an outlier
-    surprise: float  # normalised innovation squared
 
 
 class Kept(NamedTuple):
@@ -106,11 +96,6 @@ def room_for(of: Hypotheses, places: Places) -> Room:
 
 
 @compiled
-def _log(weight: float) -> float:
-    return math.log(weight) if weight > 0.0 else _LEAST
-
-
-@compiled
 def _of_followed(frame: TrackedFrame, of: Hypotheses, model: Model, room: Room) -> int:
     """List the modes of the frame under every hypothesis; their number."""
     log_usual = math.log1p(-model.rules.outlier)
@@ -119,7 +104,7 @@ def _of_followed(frame: TrackedFrame, of: Hypotheses, model: Model, room: Room) 
     counted = counted_widths(of.numbers[ROUGHNESS])
     found, log_before = 0, -math.inf
     for h in range(1, followed + 1):
-        old, log_weight = found, _log(of.weight[h])
+        old, log_weight = found, log_of(of.weight[h])
         prior = prior_of(of, h, frame.gain, log_weight + log_usual, table)
         found = find_candidates(candidates, found, h, frame, prior, table, scan, room.scanned)
         if followed > 1 and counted < 1.0 and found > old:
@@ -130,50 +115,14 @@ def _of_followed(frame: TrackedFrame, of: Hypotheses, model: Model, room: Room) 
 
 
 @compiled
-def _of_empty(frame: TrackedFrame, of: Hypotheses, model: Model, room: Room) -> Empty:
-    """Weigh the empty scene, and an object that has come and is not seen."""
-    rules = model.rules
-    log_usual, log_odd = math.log1p(-rules.outlier), math.log(rules.outlier)
-    expected = expect_empty(of, frame, model.table, model.places.empty, room.scratch.nuisance)
-    strange = log_outlier(frame, expected.mean1, expected.mean2, model.table, rules)
-    log_empty = _log(of.weight[0])
-    return Empty(
-        log_empty + log_usual + expected.log_density,
-        log_empty + log_odd + strange,
-        _log(of.numbers[PENDING]) + log_odd + strange,
-        expected.surprise,
-    )
-
-
-@compiled
 def _of_new(frame: TrackedFrame, of: Hypotheses, model: Model, room: Room, found: int) -> int:
     """List the modes of an object that has just come; the new length of the list."""
     table, rules = model.table, model.rules
-    log_weight = _log(of.numbers[PENDING]) + math.log1p(-rules.outlier)
+    log_weight = log_of(of.numbers[PENDING]) + math.log1p(-rules.outlier)
     prior = born_prior(of, log_weight, rules.rate_sd, table)
     return find_candidates(
         room.candidates, found, NEW, frame, prior, table, model.places.scan, room.scanned
     )
-
-
-@compiled
-def _of_outliers(
-    frame: TrackedFrame, of: Hypotheses, model: Model, room: Room, found: int, best: float
-) -> tuple[int, float]:
-    """List the hypotheses that stay as they were, the frame being an outlier; length and best."""
-    candidates, rules = room.candidates, model.rules
-    log_odd = math.log(rules.outlier)
-    for h in range(1, int(of.numbers[COUNT]) + 1):
-        # a bound first: the density of a reading just as expected
-        log_weight = _log(of.weight[h]) + log_odd
-        if log_weight - math.log(rules.breadth) < best + _ODD:
-            continue
-        mean1, mean2 = expected_readings(of, h, frame.gain, model.table)
-        odd = log_weight + log_outlier(frame, mean1, mean2, model.table, rules)
-        if odd > best + _ODD and found < candidates.log_mass.size:
-            found = add_candidate(candidates, found, TrackCandidate(odd, 0.0, 0.0, 0.0, -h))
-            best = max(best, odd)
-    return found, best
 
 
 @compiled
@@ -218,12 +167,13 @@ def _keep(
         count += 1
         candidate = take(candidates, top)
         mass = math.exp(candidate.log_mass - best)
-        copy(after, count, of, abs(candidate.parent))
+        copy(after, count, of, row_of(candidate.parent))
         after.weight[count] = mass
         total += mass
         own = rules.most_surprise
         if candidate.parent < 0:
             outlying += mass
+            learn_unread(after, count, candidate, frame, rules.rate_sd, room.scratch)
         else:
             own = _learnt(count, candidate, frame, of, model, room)
         if mass > heaviest:
@@ -238,6 +188,32 @@ def _take_over(of: Hypotheses, after: Hypotheses, count: int, total: float) -> N
         copy(of, j, after, j)
         of.weight[j] = after.weight[j] / total
     of.numbers[COUNT] = count
+
+
+@compiled
+def _settle(
+    of: Hypotheses,
+    model: Model,
+    room: Room,
+    kept: Kept,
+    pending: float,
+    found: int,
+    best: float,
+) -> float:
+    """Make what was kept the filter's state; the total mass."""
+    candidates = room.candidates
+    for j in range(found):
+        # objects too light to be followed one by one: only that there may be one is remembered
+        new = candidates.parent[j] == NEW or candidates.parent[j] == NEW_UNREAD
+        if new and candidates.log_mass[j] > -math.inf:
+            pending += math.exp(candidates.log_mass[j] - best)
+    total = kept.total + pending
+    of.weight[0] = kept.empty / total
+    of.numbers[PENDING] = pending / total
+    most = of.x.shape[0] - 1
+    count = prune(room.after, kept.hypotheses, most, model.rules.same, room.scratch.work)
+    _take_over(of, room.after, count, total)
+    return total
 
 
 @borrowed
@@ -268,12 +244,12 @@ def weigh_frame(
     """
     rules, candidates = model.rules, room.candidates
     found = _of_followed(frame, of, model, room)
-    empty = _of_empty(frame, of, model, room)
+    empty = weigh_empty(frame, of, model.table, model.places.empty, rules, room.scratch)
     best = max(empty.usual, empty.odd, empty.odd_born)
     best = log_mass_of(candidates, 0, found, best)
     # what is too light to be looked for is kept at an upper bound of its weight until it is not
     bound = mass_bound(frame, of.X.shape[1], model.table, model.places)
-    log_bound = _log(of.numbers[PENDING]) + math.log(bound)
+    log_bound = log_of(of.numbers[PENDING]) + math.log(bound)
     pending = math.exp(min(log_bound - best, 0.0)) + math.exp(empty.odd_born - best)
     if full or log_bound > best + rules.log_negligible:
         old = found
@@ -281,19 +257,30 @@ def weigh_frame(
         best = log_mass_of(candidates, old, found, best)
         pending = math.exp(empty.odd_born - best)
     before = best
-    found, best = _of_outliers(frame, of, model, room, found, best)
+    found, best = add_unread(
+        candidates, found, best, frame, of, model.table, rules, empty.strange, False
+    )
     pending *= math.exp(before - best)
     kept = _keep(frame, of, model, room, found, best, empty)
-    for j in range(found):
-        # objects too light to be followed one by one: only that there may be one is remembered
-        if candidates.parent[j] == NEW and candidates.log_mass[j] > -math.inf:
-            pending += math.exp(candidates.log_mass[j] - best)
-    total = kept.total + pending
     if learns_crosstalk(of) and empty.usual > empty.odd:
         learn_empty(of, frame, model.table, model.places.empty, room.scratch)
-    of.weight[0] = kept.empty / total
-    of.numbers[PENDING] = pending / total
-    most = of.x.shape[0] - 1
-    count = prune(room.after, kept.hypotheses, most, rules.same, room.scratch.work)
-    _take_over(of, room.after, count, total)
+    total = _settle(of, model, room, kept, pending, found, best)
     return kept.outlying / total, kept.surprise
+
+
+@borrowed
+@compiled
+def weigh_known(frame: TrackedFrame, of: Hypotheses, model: Model, room: Room) -> None:
+    """Weigh every hypothesis by the known range of a frame whose readings are saturated.
+
+    Parameters
+    ----------
+    frame, of, model, room
+        As for `weigh_frame`.
+    """
+    empty = Empty(NEVER, NEVER, NEVER, 0.0, 0.0)
+    found, best = add_unread(
+        room.candidates, 0, NEVER, frame, of, model.table, model.rules, 0.0, True
+    )
+    kept = _keep(frame, of, model, room, found, best, empty)
+    _settle(of, model, room, kept, 0.0, found, best)

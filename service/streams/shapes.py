@@ -12,6 +12,7 @@ from inference.tracking.tracker import Tracker
 from service.column_names import NAMES, check_names
 from simulator.errors import InvalidInputError
 from simulator.frames import FrameColumns, Frames, frames_from_columns
+from simulator.known_ranges import MAY_BE_NULL
 from simulator.validated import parse
 
 __all__ = ["ANSWERED", "Shape", "frames_of", "of_one_frame", "one_frame", "passes", "shape_of"]
@@ -26,6 +27,7 @@ ANSWERED = frozenset(
 
 _NUMBERS = frozenset({float, int})
 _FLAGS = frozenset({bool})
+_NULLABLE = frozenset({float, int, type(None)})
 Kinds = frozenset[type]
 
 
@@ -62,6 +64,13 @@ class Shape(NamedTuple):
         return all(type(v) in kinds for v, kinds in zip(values, self.kinds, strict=True))
 
 
+def _kinds_of(column: str) -> Kinds:
+    """Return the types that values of a column have."""
+    if column == "object_present":
+        return _FLAGS
+    return _NULLABLE if column in MAY_BE_NULL else _NUMBERS
+
+
 def passes(name: str) -> bool:
     """Tell whether a member is passed through."""
     return name not in ANSWERED and name not in NAMES
@@ -80,12 +89,13 @@ def shape_of(model: Tracker, names: tuple[str, ...]) -> Shape:
     """
     columns = tuple(name for name in names if name in NAMES)
     passed = tuple(filter(passes, names))
-    kinds = tuple(_FLAGS if name == "object_present" else _NUMBERS for name in columns)
+    kinds = tuple(map(_kinds_of, columns))
     problem = None
     try:
         check_names([name for name in names if name not in ANSWERED or name in NAMES])
-        example = {name: [True] if kind is _FLAGS else [1.0]
-                   for name, kind in zip(columns, kinds, strict=True)}  # fmt: skip
+        # what may be null tells nothing in the example: only its values say what is wrong with it
+        examples: dict[Kinds, Any] = {_FLAGS: True, _NUMBERS: 1.0, _NULLABLE: None}
+        example = {name: [examples[kind]] for name, kind in zip(columns, kinds, strict=True)}
         step(model, model.first, frames_from_columns(model.sensor, example))
     except InvalidInputError as error:
         problem = of_one_frame(error)
