@@ -61,7 +61,7 @@ class Frames:
         False where the scene is known to hold no object.
     known_range_m, known_range_sd_m : ndarray, shape (n,), optional
         Ranges that a ruler or a robot tells, and their standard deviations [m]; nan where nothing
-        is known. Posteriors use them.
+        is known. Posteriors and trackers use them.
     displacement_m, displacement_sd_m : ndarray, shape (n,), optional
         The same of ranges less one offset of all frames, as odometry tells them.
     """

@@ -48,7 +48,10 @@ def known_range_problems(columns: Mapping[str, NDArray[Any]], max_range_m: float
         if value in columns:
             problems += _loose(columns[value], columns[sd], sd)
     if _KNOWN[0] in columns:
-        problems += _impossible(columns, max_range_m)
+        problems += _impossible(columns[_KNOWN[0]], max_range_m)
+    for value, _ in (_KNOWN, _MOVED):
+        if value in columns and "object_present" in columns and not problems:
+            problems += _of_nothing(columns[value], columns["object_present"], value)
     if _MOVED[0] in columns and not problems:
         problems += _unmoved(columns, max_range_m)
     return problems
@@ -75,19 +78,23 @@ def _loose(value: Array, sd: Array, name: str) -> list[Problem]:
     return [Problem(f"/{name}", f"{text}: what is known nearly exactly has a small one")]
 
 
-def _impossible(columns: Mapping[str, NDArray[Any]], max_range_m: float) -> list[Problem]:
+def _impossible(value: Array, max_range_m: float) -> list[Problem]:
     """Find known ranges that no frame can have."""
-    value, present = columns[_KNOWN[0]], columns.get("object_present")
-    known, pointer = np.isfinite(value), f"/{_KNOWN[0]}"
     with np.errstate(invalid="ignore"):
-        out = np.flatnonzero(known & ~((value > 0) & (value <= max_range_m)))
-    if out.size:
-        said = f"entry {out[0]} is {value[out[0]]:g} m, and the sensor tells ranges from 0 to "
-        return [Problem(pointer, f"{said}{max_range_m:.4g} m")]
-    if present is not None and (empty := np.flatnonzero(known & ~present)).size:
-        said = f"entry {empty[0]} must be null: the frame holds no object whose range it could be"
-        return [Problem(pointer, said)]
-    return []
+        out = np.flatnonzero(np.isfinite(value) & ~((value > 0) & (value <= max_range_m)))
+    if not out.size:
+        return []
+    said = f"entry {out[0]} is {value[out[0]]:g} m, and the sensor tells ranges from 0 to "
+    return [Problem(f"/{_KNOWN[0]}", f"{said}{max_range_m:.4g} m")]
+
+
+def _of_nothing(value: Array, present: NDArray[np.bool_], name: str) -> list[Problem]:
+    """Find what is known of an object in frames that hold none."""
+    empty = np.flatnonzero(np.isfinite(value) & ~present)
+    if not empty.size:
+        return []
+    said = f"entry {empty[0]} must be null: the frame holds no object whose range it could be"
+    return [Problem(f"/{name}", said)]
 
 
 def _unmoved(columns: Mapping[str, NDArray[Any]], max_range_m: float) -> list[Problem]:

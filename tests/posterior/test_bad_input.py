@@ -86,6 +86,12 @@ def moved(displacement_m: np.ndarray, sd_m: float | None) -> Frames:
             dataclasses.replace(told(1.0, 0.1), object_present=np.zeros(20, dtype=bool)),
             "/frames/known_range_m",
         ),
+        (
+            dataclasses.replace(
+                moved(np.linspace(0.0, 1.0, 20), 0.01), object_present=np.arange(20) > 0
+            ),
+            "/frames/displacement_m",
+        ),
     ],
 )
 def test_frames_that_no_border_has_checked(frames: Frames, pointer: str) -> None:

@@ -209,3 +209,31 @@ def test_dropped_lines_have_their_numbers(model: Tracker) -> None:
         (1, None, None), (5, 3, None), (9, 1, 2)
     ]  # fmt: skip
     assert (taken.place.dropped, taken.place.gaps, taken.place.answered) == (4, 2, 3)
+
+
+def test_known_ranges_of_lines(model: Tracker) -> None:
+    """A known range counts, null is none, and what a line cannot know is an error of that line."""
+    lines = [
+        frame(1, known_range_m=None, known_range_sd_m=None),
+        frame(2, known_range_m=1.0, known_range_sd_m=0.01),
+        frame(3, known_range_m=None, known_range_sd_m=None),
+        frame(4, known_range_m=1.0, known_range_sd_m=None),
+        frame(5, known_range_m=-1.0, known_range_sd_m=0.01),
+        frame(6, known_range_m=1.0, known_range_sd_m=0.01, object_present=False),
+        frame(7, known_range_m=1.0),
+        frame(8, displacement_m=None, displacement_sd_m=None),
+        frame(9, displacement_m=0.1, displacement_sd_m=0.01),
+        frame(10, known_range_m="far", known_range_sd_m=0.01),
+        frame(11),
+    ]
+    found = answered(model, [lines])
+    errors = {n: answer["error"]["pointer"] for n, answer in enumerate(found) if "error" in answer}
+    assert errors == {
+        3: "/known_range_sd_m", 4: "/known_range_m", 5: "/known_range_m", 6: "/known_range_sd_m",
+        8: "/displacement_m", 9: "/known_range_m",
+    }  # fmt: skip
+    assert answered(model, [[line] for line in lines]) == found
+    # 1 m is not what these readings say
+    assert found[1]["outlier"] > 0.5
+    assert found[1]["range_m"] == pytest.approx(1.0, abs=0.05)
+    assert found[1]["present"] == pytest.approx(1.0)

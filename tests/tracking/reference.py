@@ -66,7 +66,8 @@ class GridFilter:
         self.absent = self.absent * (1.0 - arrived) + total * left
         self.mass = moved * stayed + new * self.prior
 
-    def see(self, readings: Array) -> None:
+    def see(self, readings: Array, known: tuple[float, float] | None = None) -> None:
+        """Take in readings, and a known range with its standard deviation [m] if there is one."""
         used = [self.settings.observables != "w2", self.settings.observables != "w1"]
         noise = np.asarray(self.sensor.noise.read)
 
@@ -74,6 +75,9 @@ class GridFilter:
             return np.asarray(-0.5 * (((readings - mean) / noise) ** 2 * used).sum(axis=-1))
 
         logs, empty = log_likelihood(self.means), log_likelihood(self.empty)
+        if known is not None:
+            logs = logs - 0.5 * ((np.exp(self.u) - known[0]) / known[1]) ** 2
+            empty = -np.inf
         top = max(logs.max(), empty)
         self.mass = self.mass * np.exp(logs - top)[:, None]
         self.absent = float(self.absent * np.exp(empty - top))
