@@ -27,7 +27,7 @@ ANSWERED = frozenset(
 
 _NUMBERS = frozenset({float, int})
 _FLAGS = frozenset({bool})
-_NULLABLE = frozenset({float, int, type(None)})
+_NULLABLE: frozenset[type] = frozenset({float, int, type(None)})
 Kinds = frozenset[type]
 
 

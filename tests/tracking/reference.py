@@ -77,7 +77,7 @@ class GridFilter:
         logs, empty = log_likelihood(self.means), log_likelihood(self.empty)
         if known is not None:
             logs = logs - 0.5 * ((np.exp(self.u) - known[0]) / known[1]) ** 2
-            empty = -np.inf
+            empty = np.full_like(empty, -np.inf)
         top = max(logs.max(), empty)
         self.mass = self.mass * np.exp(logs - top)[:, None]
         self.absent = float(self.absent * np.exp(empty - top))
