@@ -3,6 +3,7 @@
 import dataclasses
 import math
 
+from simulator.remembered import remembered
 from simulator.scene import Quantity, Reference, Scene, Stroke
 
 __all__ = ["Known", "known_of"]
@@ -42,6 +43,7 @@ class Known:
         return 2.0 ** round(0.5 * math.log2(c0))
 
 
+@remembered
 def known_of(scene: Scene) -> Known:
     """Collect the known numbers of a scene.
 

@@ -4,6 +4,8 @@ import dataclasses
 import math
 from collections.abc import Iterable
 
+import numpy as np
+
 from inference.estimates import LeftOut
 from inference.known import Known, known_of
 from inference.technique import Technique
@@ -11,12 +13,14 @@ from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.errors import listed
 from simulator.frames import Frames
 from simulator.joint_scene import centre
+from simulator.remembered import remembered
 from simulator.scene import Scene
 from simulator.sensor import Sensor, SineWaveSensor
 
 __all__ = ["Plan", "cheapest", "obstacle", "plan"]
 
 _MOST_HALF_TURNS = 1000.0  # of phase to the background, each of which may hold a root
+_FEW = 1000  # frames whose estimates take no longer than their plan
 
 
 @dataclasses.dataclass(frozen=True)
@@ -117,6 +121,24 @@ def plan(sensor: Sensor, scene: Scene, frames: Frames | None = None) -> Plan:
     Plan
         The choice, and the reason against each other technique.
     """
+    if frames is None or len(frames) > _FEW:
+        return _planned(sensor, scene, frames)
+    if frames.object_present is not None or sensor.full_scale is not None:
+        return _planned(sensor, scene, frames)  # some of the frames may be ruled out
+    timed, derived = frames.time_s is not None, frames.derivatives is not None
+    return _planned_for(sensor, scene, len(frames), timed, derived)
+
+
+@remembered
+def _planned_for(sensor: Sensor, scene: Scene, n: int, timed: bool, derived: bool) -> Plan:
+    """Plan for frames of which all that matters is told."""
+    frames = Frames(
+        np.zeros((n, 2)), np.zeros(n) if timed else None, np.zeros((n, 2)) if derived else None
+    )
+    return _planned(sensor, scene, frames)
+
+
+def _planned(sensor: Sensor, scene: Scene, frames: Frames | None) -> Plan:
     scene = centre(sensor, scene)
     known = known_of(scene)
     obstacles = {

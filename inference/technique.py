@@ -79,7 +79,8 @@ class Technique:
         Task -> TechniqueResult; a technique of many frames raises RefusedError where the frames
         turn out not to determine what is unknown.
     obstacle : callable, optional
-        (sensor, scene, known, frames or None) -> a further reason why it cannot serve, or None.
+        (sensor, scene, known, frames or None) -> a further reason why it cannot serve, or None. Of
+        frames it asks how many there are, which columns they have, and which of them are ruled out.
     """
 
     name: str

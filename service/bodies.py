@@ -18,15 +18,17 @@ from service.errors import (
     SlowClientError,
     UnsupportedMediaTypeError,
 )
+from service.known_systems import read_system
 from service.shared import TINY_BYTES, shared_of
 from service.strict_json import SHORT, check_bulk, decode
-from simulator.validated import Validated, parse
+from simulator.validated import Validated
 
 __all__ = ["BodyOf", "check_media_type", "parse_document", "read_limited"]
 
 T = TypeVar("T", bound=Validated)
 
 _JSON = re.compile(r"application/(?:json|[a-z0-9!#$&^_.+-]+\+json)")
+_BLOCK = 2**16
 _CHARSETS = frozenset({"utf-8", "utf8", "us-ascii"})
 
 
@@ -55,7 +57,7 @@ def parse_document(model: type[T], raw: bytes) -> T:
     data = decode(raw)
     if raw.count(b",") >= SHORT:  # else nothing in it is long
         check_bulk(data)
-    return parse(model, data)
+    return read_system(model, data)
 
 
 async def read_limited(
@@ -113,7 +115,8 @@ async def read_limited(
                     raise BodyTooLargeError(message)
                 held.take(len(chunk))
                 body += chunk
-                clock.reschedule(begun + client_s + len(body) / 1e6)
+                if len(body) > _BLOCK:  # of less the time is none
+                    clock.reschedule(begun + client_s + len(body) / 1e6)
     except TimeoutError:
         raise SlowClientError(f"of the body {len(body)} bytes have come, too slowly") from None
     except ClientDisconnect:

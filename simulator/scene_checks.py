@@ -6,6 +6,7 @@ from simulator.errors import InvalidInputError, Problem
 from simulator.joint_checks import check_calibration, check_joint
 from simulator.model_error import ErrorSizes
 from simulator.priors import LEAST_LOG_MASS
+from simulator.remembered import remembered
 from simulator.scene import Quantity, Reference, Scene, Shadow, Stroke
 from simulator.sensor import PulsedSensor, Sensor
 
@@ -75,6 +76,7 @@ def _check_range_error(sensor: Sensor, scene: Scene, limit: float) -> list[Probl
     ]
 
 
+@remembered
 def check_scene(sensor: Sensor, scene: Scene) -> None:
     """Check known numbers and priors against physics and against the sensor.
 

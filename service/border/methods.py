@@ -4,10 +4,12 @@ import re
 from collections.abc import Sequence
 
 import anyio
+from starlette.requests import Request
 from starlette.routing import BaseRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.errors import MethodError
+from service.routes.direct import DirectRoute
 
 __all__ = ["Methods"]
 
@@ -33,6 +35,12 @@ class Methods:
             and (methods := getattr(route, "methods", None))
         ]
 
+        self._direct: dict[tuple[str, str], DirectRoute] = {
+            (route.path, method): route
+            for route in routes
+            if isinstance(route, DirectRoute)
+            for method in route.methods or ()
+        }
         # most requests are for a path without parameters
         self._fixed = {path: self._found(path) for _, path, _ in self._routes if "{" not in path}
 
@@ -56,15 +64,22 @@ class Methods:
         ------
         MethodError
             Where no route of the path takes the method.
+        HybridTofError
+            Of a route that is answered directly.
         """
         known = self._known(scope["path"]) if scope["type"] == "http" else None
         if known is None:
             await self._app(scope, receive, send)
             return
         scope["hybridtof.route"], methods = known
+        method = scope["method"]
+        direct = self._direct.get((scope["path"], method))
+        if direct is not None:
+            response = await direct.answer(Request(scope, receive, send))
+            await response(scope, receive, send)
+            return
         allowed = methods | {"OPTIONS"} | ({"HEAD"} if "GET" in methods else set())
         allow = ", ".join(sorted(allowed))
-        method = scope["method"]
         if method == "OPTIONS":
             headers = [(b"allow", allow.encode("ascii"))]
             await send({"type": "http.response.start", "status": 204, "headers": headers})

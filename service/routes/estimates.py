@@ -1,11 +1,9 @@
 """Deterministic estimates, at once."""
 
-from collections.abc import Callable, Coroutine
-from typing import Annotated, Any, cast, get_args
+from typing import Annotated, cast, get_args
 
 from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import Response
-from fastapi.routing import APIRoute
 
 from inference.estimate import estimate, estimate_planned
 from inference.fits.techniques.registry import FITS
@@ -20,6 +18,7 @@ from service.messages import MESSAGES
 from service.messages.answering import message_answer
 from service.problems import problem_responses
 from service.requests import EstimateRequest
+from service.routes.direct import DirectRoute
 from service.service_settings import ServiceSettings
 from service.shared import SMALL, TINY, TINY_BYTES, shared_of
 from simulator.compiled import NotReadyError, ready_only
@@ -30,26 +29,20 @@ __all__ = ["answer", "quick_answer", "router"]
 _READ = BodyOf(EstimateRequest)
 
 
-class _DirectRoute(APIRoute):
-    """A route that FastAPI describes, and whose parameters it does not look for.
-
-    That would take longer than the estimate of a frame.
-    """
-
-    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """Return what answers a request."""
-
-        async def handle(request: Request) -> Response:
-            shape = request.query_params.get("shape", "rows")
-            if shape not in get_args(AnswerShape):
+class _Estimates(DirectRoute):
+    async def answer(self, request: Request) -> Response:
+        """See `DirectRoute`."""
+        shape: AnswerShape = "rows"
+        if request.scope["query_string"]:
+            asked = request.query_params.get("shape", shape)
+            if asked not in get_args(AnswerShape):
                 message = f"must be {' or '.join(get_args(AnswerShape))}"
                 raise InvalidInputError.at("/query/shape", message)
-            return await create(request, await _READ(request), cast("AnswerShape", shape))
+            shape = cast("AnswerShape", asked)
+        return await create(request, await _READ(request), shape)
 
-        return handle
 
-
-router = APIRouter(prefix="/v1/estimates", tags=["estimates"], route_class=_DirectRoute)
+router = APIRouter(prefix="/v1/estimates", tags=["estimates"], route_class=_Estimates)
 _FORMS = ("application/json", *(message.media_type for message in MESSAGES))
 _ANY = frozenset({"", "*/*", _FORMS[0]})
 Body = Annotated[tuple[EstimateRequest, bytes], Depends(_READ)]

@@ -1,6 +1,7 @@
 """What is unknown in a scene, by scene path: all that an obstacle asks, without a kernel."""
 
 from simulator.parameters import parameters_of
+from simulator.remembered import remembered
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
@@ -23,10 +24,7 @@ def paths_of(sensor: Sensor) -> tuple[str, ...]:
     )
 
 
-# a plan asks several times in a row about one scene
-_asked: list[tuple[Sensor, Scene, tuple[str, ...]]] = []
-
-
+@remembered
 def unknowns_of(sensor: Sensor, scene: Scene) -> tuple[str, ...]:
     """Return the scene paths of everything unknown but the ranges.
 
@@ -42,10 +40,5 @@ def unknowns_of(sensor: Sensor, scene: Scene) -> tuple[str, ...]:
     tuple of str
         In the order object, crosstalk, background, shadow.
     """
-    for before, what, found in _asked[:1]:
-        if before is sensor and what is scene:
-            return found
     names = set(parameters_of(sensor, scene).names)
-    unknowns = tuple(path for path in paths_of(sensor) if path in names)
-    _asked[:] = [(sensor, scene, unknowns)]
-    return unknowns
+    return tuple(path for path in paths_of(sensor) if path in names)
