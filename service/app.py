@@ -97,6 +97,8 @@ def create_app(
         generate_unique_id_function=openapi.name_of,
         # pages that fetch their scripts from elsewhere; /openapi.json says what they would show
         docs_url=None,
+        # what is told of requests the border tells
+        telemetry={"tracing": False, "metrics": False, "logs": False},
         redoc_url=None,
     )
     app.state.shared = shared

@@ -1,10 +1,10 @@
 """Logs on standard error: one JSON object a line, or for a terminal one line of text."""
 
 import atexit
+import collections
 import contextlib
 import logging
 import os
-import queue
 import sys
 import threading
 import time
@@ -65,35 +65,37 @@ class Lines(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__()
-        self._lines: queue.Queue[bytes] = queue.Queue(_MOST_LINES)
+        self._lines: collections.deque[bytes] = collections.deque()
+        self._more = threading.Event()
+        self._writing = False
         threading.Thread(target=self._write, name="log", daemon=True).start()
         atexit.register(self.flush)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Hand a line over."""
-        with contextlib.suppress(queue.Full):
-            self._lines.put_nowait((self.format(record) + "\n").encode("utf-8", "replace"))
+        if len(self._lines) < _MOST_LINES:
+            self._lines.append((self.format(record) + "\n").encode("utf-8", "replace"))
+            if not self._more.is_set():
+                self._more.set()
 
     def flush(self) -> None:
         """Wait until what was said is written, but not for a reader that stands still."""
         end = time.monotonic() + _FLUSH_S
-        while self._lines.unfinished_tasks and time.monotonic() < end:
+        while (self._lines or self._writing) and time.monotonic() < end:
             time.sleep(0.005)
 
     def _write(self) -> None:
         while True:
-            lines = [self._lines.get()]
+            self._more.wait()
             time.sleep(_MOMENT_S)
-            with contextlib.suppress(queue.Empty):
-                while True:
-                    lines.append(self._lines.get_nowait())
-            rest = b"".join(lines)
+            self._more.clear()  # who says something from here on sets it again
+            self._writing = True
+            rest = b"".join([self._lines.popleft() for _ in range(len(self._lines))])
             with contextlib.suppress(OSError):  # nobody reads any more
                 while rest:
                     # not sys.stderr, whose lock a thread that is stuck would keep to the end
                     rest = rest[os.write(2, rest) :]
-            for _ in lines:
-                self._lines.task_done()
+            self._writing = False
 
 
 class NoSockets(logging.Filter):
@@ -117,6 +119,8 @@ def log_config(level: str) -> dict[str, Any]:
     level : str
         From which on lines are written.
     """
+    # of which no line tells, and which are asked at every line
+    logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False
     form = PlainLines if sys.stderr.isatty() else JsonLines
     return {
         "version": 1,

@@ -1,6 +1,7 @@
 """Frames: two readings each, with what else a sensor may deliver."""
 
 import dataclasses
+import functools
 from collections.abc import Mapping
 from typing import Annotated, Any
 
@@ -137,13 +138,10 @@ def frames_from_columns(
         finite, empty, or (gain) not positive, or that tells ranges which cannot be.
     """
     if isinstance(columns, FrameColumns):
-        # in the order of the fields, which a set has not: an answer has its problems in one order
-        named = [name for name in FrameColumns.model_fields if name in columns.model_fields_set]
-        columns = {name: getattr(columns, name) for name in named}
+        columns = columns.__dict__  # in the order of the fields
     given = {name: column for name, column in columns.items() if column is not None}
     first, second = sensor.columns
-    slopes = (f"d{first}_dt", f"d{second}_dt")
-    allowed = {"time_s", first, second, *slopes, "gain", "object_present", *MAY_BE_NULL}
+    slopes, allowed = _columns_of(first, second)
     problems = [
         Problem(f"/{name}", f"is not a column of a {sensor.kind} sensor")
         for name in given
@@ -187,6 +185,14 @@ def frames_from_columns(
         object_present=arrays.get("object_present"),
         **telling(arrays),
     )
+
+
+@functools.cache
+def _columns_of(first: str, second: str) -> tuple[tuple[str, str], frozenset[str]]:
+    """Return the names of the derivatives of two readings, and all names of columns."""
+    slopes = (f"d{first}_dt", f"d{second}_dt")
+    more = ("time_s", "gain", "object_present", *MAY_BE_NULL)
+    return slopes, frozenset({first, second, *slopes, *more})
 
 
 def check_frames(sensor: Sensor, frames: Frames) -> None:

@@ -36,6 +36,8 @@ def known_range_problems(columns: Mapping[str, NDArray[Any]], max_range_m: float
     list of Problem
         For each column its first bad entry.
     """
+    if columns.keys().isdisjoint(MAY_BE_NULL):
+        return []
     problems = [
         Problem(f"/{name}", f"is missing, and {other} is given")
         for pair in (_KNOWN, _MOVED)

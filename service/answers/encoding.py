@@ -13,9 +13,10 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
-from inference.estimates import Estimates, SdParts, Status, TechniqueResult
+from inference.estimates import Estimates, LeftOut, SdParts, Status, TechniqueResult
 from service.answers.estimates import AnswerShape
 from service.json_text import encode
+from simulator.remembered import remembered
 
 __all__ = ["encode_estimates"]
 
@@ -46,14 +47,19 @@ def encode_estimates(estimates: Estimates, shape: AnswerShape = "rows") -> bytes
     bytes
         JSON as in docs/http.md, estimates; null where a number is not available.
     """
-    left_out = [{"technique": item.name, "reason": item.reason} for item in estimates.left_out]
     parts = [b'{"chosen":', encode(estimates.chosen), b',"results":[']
     for number, result in enumerate(estimates.results):
         parts.append(b"," if number else b"")
         parts += _technique(result, shape)
-    parts += [b'],"left_out":', encode(left_out)]
+    parts += [b'],"left_out":', _left_out(estimates.left_out)]
     parts += [b',"assumptions":', encode(estimates.assumptions), b"}"]
     return b"".join(parts)
+
+
+@remembered
+def _left_out(items: tuple[LeftOut, ...]) -> bytes:
+    """JSON text; a plan that is remembered has one tuple."""
+    return encode([{"technique": item.name, "reason": item.reason} for item in items])
 
 
 def _technique(result: TechniqueResult, shape: AnswerShape) -> Iterator[bytes]:
@@ -61,6 +67,8 @@ def _technique(result: TechniqueResult, shape: AnswerShape) -> Iterator[bytes]:
     yield b'{"technique":' + encode(result.technique) + b',"frames":'
     if shape == "columns":
         yield from _columns(result)
+    elif len(result) == 1:
+        yield b"[" + _dumps(_frame(result)) + b"]"
     else:
         yield b"["
         for start in range(0, len(result), _BLOCK):
@@ -133,9 +141,6 @@ def _rows(result: TechniqueResult, start: int, stop: int) -> TechniqueResult:
 
 def _kinds(result: TechniqueResult) -> Iterator[tuple[int, Any]]:
     """Yield, for each kind of frame, one of its frames and the index of all."""
-    if len(result) == 1:
-        yield 0, _ALL
-        return
     near = result.near_fold.astype(np.int64) * 2 + np.isfinite(result.roots_sd_m[:, 0])
     code = result.status.astype(np.int64)
     code = code * len(result.reasons) + result.reason
@@ -149,6 +154,32 @@ def _kinds(result: TechniqueResult) -> Iterator[tuple[int, Any]]:
     borders = np.flatnonzero(np.diff(code[order])) + 1
     for index in np.split(order, borders):
         yield int(index[0]), index
+
+
+def _frame(result: TechniqueResult) -> dict[str, Any]:
+    """Return the one frame of a result."""
+    count, status = int(result.root_count[0]), result.status.item()
+    roots, sds = result.roots_m[0, :count].tolist(), result.roots_sd_m[0, :count].tolist()
+    unique = status == Status.UNIQUE and count == 1
+    frame: dict[str, Any] = {
+        "status": _STATUS[status],
+        "range_m": roots[0] if unique else None,
+        "sd_m": sds[0] if unique else None,
+        "roots_m": roots,
+        "roots_sd_m": sds,
+        "near_fold": result.near_fold.item(),
+    }
+    if reason := result.reasons[result.reason.item()]:
+        frame["reason"] = reason
+    parts = result.sd_parts_m
+    if parts is not None and unique and math.isfinite(sds[0]):
+        frame["sd_parts_m"] = dict(zip(SdParts._fields, (x[0, 0] for x in parts), strict=True))
+    for name in _OF_MOTION:
+        if (column := getattr(result, name)) is not None:
+            frame[name] = column.item()
+    if (bounds := result.range_bounds_m) is not None:
+        frame["range_bounds_m"] = bounds[0].tolist() if np.isfinite(bounds[0]).all() else None
+    return frame
 
 
 def _frames(result: TechniqueResult) -> str:

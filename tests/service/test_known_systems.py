@@ -23,7 +23,7 @@ GOOD: dict[str, Any] = {
     "scene": {"object": {"c0": 1.0, "c1": 0.1, "c2": 0.1}, "discrepancy": None},
     "frames": {"w1": [0.01], "w2": [1.5]},
 }
-VALUES = st.sampled_from([None, True, False, 1, 1.0, 0, 0.0, -0.0, float("nan"), "1", [], {}])
+VALUES: st.SearchStrategy[Any] = st.sampled_from([None, True, False, 1, 1.0, 0, 0.0, -0.0, float("nan"), "1", [], {}])
 PLACES = st.sampled_from(
     [
         ("scene", "discrepancy"),
@@ -92,7 +92,7 @@ def test_a_plan_that_was_made_before_is_that_of_the_frames(
     rng = np.random.default_rng(seed)
     frames = Frames(
         rng.normal(size=(n, 2)),
-        np.arange(n) * 0.1 if timed else None,
+        np.arange(n, dtype=np.float64) if timed else None,
         rng.normal(size=(n, 2)) if derived else None,
     )
     made = planning.plan(request.sensor, request.scene, frames)
