@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report readme api picture notebook notebook-data calibrate coverage kills fuzz stress mutations test check lint format types fast lock clean
+.PHONY: help setup demo report readme api docs picture notebook notebook-data calibrate coverage kills fuzz stress mutations test check lint format types fast lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -30,6 +30,10 @@ readme: $(READY) ## Write the table of techniques in docs/techniques.md anew
 
 api: $(READY) ## Write docs/api.md from the docstrings anew
 	$(BIN)/python docs/make_api.py > docs/api.md
+
+docs: $(READY) ## The documentation as a site, out/docs/docs/index.html; a warning is an error
+	$(BIN)/sphinx-build --fail-on-warning --keep-going --fresh-env --quiet -b html -c docs . out/docs
+	@echo "out/docs/docs/index.html"
 
 picture: $(READY) report ## Make the README's pictures anew
 	$(BIN)/hybridtof demo --out docs
@@ -89,4 +93,4 @@ clean: ## Remove what the targets made
 
 lock: ## Resolve the dependencies anew into requirements/ (needs uv)
 	uv pip compile pyproject.toml --extra postgres --extra cluster --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate --output-file requirements/runtime.txt
-	uv pip compile pyproject.toml --extra postgres --extra plots --extra notebooks --extra cluster --extra dev --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate --output-file requirements/dev.txt
+	uv pip compile pyproject.toml --extra postgres --extra plots --extra notebooks --extra cluster --extra docs --extra dev --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate --output-file requirements/dev.txt

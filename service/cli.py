@@ -26,7 +26,7 @@ from service.commands.command import EXIT_CODES
 from service.errors import ServiceError
 from simulator.errors import HybridTofError, InvalidInputError, RefusedError
 
-__all__ = ["main"]
+__all__ = ["command_line", "main"]
 
 
 class _Version(argparse.Action):
@@ -39,7 +39,8 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def _parser() -> argparse.ArgumentParser:
+def command_line() -> argparse.ArgumentParser:
+    """Return what parses a line of the command line: documents are held to it, too."""
     parser = argparse.ArgumentParser(
         prog="hybridtof",
         description="Distance from hybrid intensity/time-of-flight sensors (SI units).",
@@ -83,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         Exit code.
     """
-    parsed = _parser().parse_args(arguments)
+    parsed = command_line().parse_args(arguments)
     try:
         code = int(parsed.run(parsed))
         sys.stdout.flush()

@@ -2,7 +2,7 @@
 
 The flux has a smooth relative error (`simulator.discrepancy`), and the effective distance, which is
 what pulse and phase read, a smooth error in metres. Both are Gaussian processes along log r with
-the Matern 5/2 correlation of `simulator.discrepancy.matern` (docs/model.md, discrepancy).
+the Matern 5/2 correlation of `simulator.discrepancy.matern` (docs/model.md, discrepancy-law).
 
 The default of the range's error is what recorded photons wander about the robot's truth once
 offset and slope are calibrated: 0.77 mm rms from 0.1 to 0.4 m (`python -m benchmarks.recorded`,

@@ -1,0 +1,1 @@
+"""Pages: their links, their code, and what their examples print."""
