@@ -215,5 +215,6 @@ def _source(module: str) -> str:
 def test_mistakes_are_seen(check: Callable[[Path], None], text: str, tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(text + "\n", encoding="utf-8")
-    with pytest.raises((AssertionError, SyntaxError, SystemExit, ValueError, HybridTofError)):
+    seen = (AssertionError, AttributeError, SyntaxError, SystemExit, ValueError, HybridTofError)
+    with pytest.raises(seen):
         check(page)
