@@ -18,57 +18,16 @@ from inference.estimate import all_roots
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import PulsedSensor, parse_sensor
+from tests.extreme.sturm import roots_between, value
+from tests.extreme.tally import Tally
 
-__all__ = ["FAMILIES", "Extreme", "Tally", "extremes", "roots_between", "tally"]
+__all__ = ["FAMILIES", "Extreme", "extremes", "tally"]
 
 Array = NDArray[np.float64]
 EPSILON = float(np.finfo(float).eps)
 # readings this close to a fold, relative, may have the count of either side: their product with
 # the scene's numbers is rounded, as every reading is
 _EXCUSED = [k * EPSILON for k in (1, 2, 4, 8, 16)]
-
-
-def roots_between(coefficients: Sequence[Fraction], high: Fraction | None) -> int:
-    """Number of distinct roots in (0, high], or beyond 0, of a polynomial, highest power first."""
-    first = list(itertools.dropwhile(lambda c: c == 0, coefficients))
-    while first and first[-1] == 0:  # roots at 0 are none
-        first.pop()
-    n = len(first) - 1
-    if n < 1:
-        return 0
-    chain = [first, [c * (n - k) for k, c in enumerate(first[:-1])]]
-    while len(chain[-1]) > 1:
-        _, rest = _divided(chain[-2], chain[-1])
-        if not rest:  # roots that are multiple: the same ones, each once
-            return roots_between(_divided(first, chain[-1])[0], high)
-        chain.append([-c for c in rest])
-    at_zero = [p[-1] for p in chain]
-    at_high = [p[0] if high is None else _value(p, high) for p in chain]
-    return _changes(at_zero) - _changes(at_high)
-
-
-def _divided(p: list[Fraction], q: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
-    """Quotient and remainder."""
-    rest, quotient = list(p), []
-    while len(rest) >= len(q):
-        factor = rest[0] / q[0]
-        quotient.append(factor)
-        for k, c in enumerate(q):
-            rest[k] -= factor * c
-        rest.pop(0)
-    return quotient, list(itertools.dropwhile(lambda c: c == 0, rest))
-
-
-def _value(p: Sequence[Fraction], x: Fraction) -> Fraction:
-    total = Fraction(0)
-    for c in p:
-        total = total * x + c
-    return total
-
-
-def _changes(values: Sequence[Fraction]) -> int:
-    signs = [v > 0 for v in values if v != 0]
-    return sum(a != b for a, b in itertools.pairwise(signs))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,7 +52,7 @@ class Extreme:
                 "kind": "pulsed",
                 "pulse_width_s": self.pulse_width_s,
                 "gain": self.gain,
-                "noise": {"read": [1e-50, 1e-50]},
+                "noise": {"read": [1e-50, 1e-50], "derivative": [1e-50, 1e-50]},
             }
         )
         assert isinstance(parsed, PulsedSensor)
@@ -106,7 +65,7 @@ class Extreme:
             "discrepancy": 0,
         }
         if self.technique.startswith("background"):
-            known = self.technique == "background_intensity"
+            known = self.technique != "background_cancelling"
             prior = {"prior": "lognormal", "median": self.strength, "sigma": 1.0}
             scene["background"] = {
                 "strength": self.strength if known else prior,
@@ -121,9 +80,13 @@ class Extreme:
         q = (r + self.c1 / 2) ** 2 + (self.c0 - self.c1**2 / 4)
         light = self.gain * self.c0 * self.c2 / (r * r * q)
         w1, w2 = light * r / r0, light
-        if self.technique == "differential":
+        if "differential" in self.technique:
             slope = -light / r * (2 + r * (2 * r + self.c1) / q)
             w1, w2 = (slope * r + light) / r0, slope
+            if self.technique != "differential":
+                hidden = r * (r + self.c1s) + self.c0s
+                wall = self.strength * self.c0s * (2 * r + self.c1s) / hidden**2
+                w1, w2 = w1 + wall * self.distance / r0, w2 + wall
         elif self.technique.startswith("background"):
             wall = self.strength * r * (r + self.c1s) / (r * (r + self.c1s) + self.c0s)
             w1, w2 = w1 + wall * self.distance / r0, w2 + wall
@@ -159,10 +122,42 @@ def _differential(e: Extreme, w1: Fraction, w2: Fraction) -> list[Fraction]:
     return [3 * w2, 2 * c1 * w2 - 4 * w, c0 * w2 - 3 * c1 * w, -2 * c0 * w]
 
 
-def _both(e: Extreme, w1: Fraction, w2: Fraction) -> list[Fraction]:
+def _wall(e: Extreme, w1: Fraction, w2: Fraction) -> list[Fraction]:
     b, c0s, c1s, r0, far = _f(e.strength, e.c0s, e.c1s, e.sensor.r0, e.distance)
     w = r0 * w1 - b * far
     return [w2 - b, (w2 - b) * c1s - w, w2 * c0s - c1s * w, -(w + b * far) * c0s]
+
+
+def _times(*factors: Sequence[Fraction]) -> list[Fraction]:
+    product = [Fraction(1)]
+    for q in factors:
+        out = [Fraction(0)] * (len(product) + len(q) - 1)
+        for (i, a), (j, b) in itertools.product(enumerate(product), enumerate(q)):
+            out[i + j] += a * b
+        product = out
+    return product
+
+
+def _both(e: Extreme, w1: Fraction, w2: Fraction) -> list[Fraction]:
+    """4.83 times w2: of degree 8, and right also where w2 is zero."""
+    return _light_and_wall(e, w1, w2, -1)
+
+
+def _light_and_wall(e: Extreme, w1: Fraction, w2: Fraction, sign: int) -> list[Fraction]:
+    """The polynomial, or with a sign of 1 and positive numbers the sizes of its terms."""
+    one, zero = Fraction(1), Fraction(0)
+    numbers = (e.c0, e.c1, e.gain, e.c2, e.strength, e.c0s, e.c1s, e.distance, e.sensor.r0)
+    c0, c1, gain, c2, b, c0s, c1s, far, r0 = _f(*numbers)
+    if sign > 0:
+        c1, c1s, w1, w2 = abs(c1), abs(c1s), abs(w1), abs(w2)
+    w = r0 * w1
+    q, shadow = [one, c1, c0], [one, c1s, c0s]
+    n = [sign * 3 * w2, 4 * w + sign * 2 * c1 * w2, 3 * c1 * w + sign * c0 * w2, 2 * c0 * w]
+    own = _times([gain * c2 * c0], n, shadow, shadow)
+    wall = _times([(far * w2 + sign * w) * b * c0s], [2 * one, c1s, zero, zero, zero], q, q)
+    length = max(len(own), len(wall))
+    own, wall = ([zero] * (length - len(p)) + p for p in (own, wall))
+    return [x + y for x, y in zip(own, wall, strict=True)]
 
 
 FAMILIES: dict[str, Polynomial] = {
@@ -170,12 +165,15 @@ FAMILIES: dict[str, Polynomial] = {
     "intensity_w1": _late,
     "differential": _differential,
     "background_cancelling": _cancelling,
-    "background_intensity": _both,
+    "background_intensity": _wall,
+    "background_cancelling_differential": _both,
 }
 
 
 def _sizes(e: Extreme, p: Sequence[Fraction], w1: float, w2: float) -> list[Fraction]:
     """Sizes of what the coefficients are made of, where they are differences of it."""
+    if e.technique == "background_cancelling_differential":
+        return _light_and_wall(e, Fraction(w1), Fraction(w2), 1)
     if e.technique != "background_intensity":
         return [abs(c) for c in p]
     b, c0s, c1s, r0, far = _f(e.strength, e.c0s, abs(e.c1s), e.sensor.r0, e.distance)
@@ -209,20 +207,6 @@ def extremes(technique: str, rng: np.random.Generator) -> Iterator[Extreme]:
         )
 
 
-@dataclasses.dataclass
-class Tally:
-    """What came of many frames: wrong counts, folds decided by rounding, the worst root."""
-
-    frames: int = 0
-    roots: int = 0
-    excused: int = 0
-    wrong: list[tuple[Extreme, tuple[float, float], int, int]] = dataclasses.field(
-        default_factory=list
-    )
-    worst: float = 0.0  # of a root, in units of condition times rounding
-    where: tuple[Extreme, tuple[float, float], float] | None = None
-
-
 def _frames(e: Extreme, n: int, rng: np.random.Generator) -> Array:
     """Readings at random ranges, hard by the folds of the curve, and without sense."""
     size = math.sqrt(e.c0)
@@ -252,23 +236,23 @@ def _frames(e: Extreme, n: int, rng: np.random.Generator) -> Array:
 def _exact_count(e: Extreme, w1: float, w2: float, high: Fraction | None) -> int:
     p = FAMILIES[e.technique](e, Fraction(w1), Fraction(w2))
     # an object stands before its background
-    at_end = e.technique.startswith("background") and high is not None and _value(p, high) == 0
+    at_end = e.technique.startswith("background") and high is not None and value(p, high) == 0
     return roots_between(p, high) - at_end if any(p) else 0
 
 
-def tally(technique: str, scenes: int, frames: int, rng: np.random.Generator) -> Tally:
+def tally(technique: str, scenes: int, frames: int, rng: np.random.Generator) -> Tally[Extreme]:
     """Count every root of many frames twice, and hold each to the equation it solves.
 
     The condition of a root r is 1 + |sum of the terms' sizes / (r p'(r))|: what a relative error of
     the terms moves it by. Its error is |p(r) / (r p'(r))|, to first order, in exact arithmetic.
     """
-    total = Tally()
+    total = Tally[Extreme]()
     for e in itertools.islice(extremes(technique, rng), scenes):
         sensor = e.sensor
         readings = _frames(e, frames, rng)
         if not len(readings):
             continue
-        derivatives = readings if technique == "differential" else None
+        derivatives = readings if "differential" in technique else None
         given = Frames(
             np.ones_like(readings) if derivatives is not None else readings,
             time_s=np.arange(float(len(readings))),
@@ -309,8 +293,8 @@ def _end(e: Extreme) -> Fraction | None:
 
 def _error(p: Sequence[Fraction], sizes: Sequence[Fraction], r: Fraction) -> float:
     n = len(p) - 1
-    slope = r * _value([c * (n - k) for k, c in enumerate(p[:-1])], r)
-    size = _value(sizes, r)
+    slope = r * value([c * (n - k) for k, c in enumerate(p[:-1])], r)
+    size = value(sizes, r)
     if slope == 0:
         return 0.0  # a double root, of infinite condition
-    return float(abs(_value(p, r)) / (abs(slope) + size) / Fraction(EPSILON))
+    return float(abs(value(p, r)) / (abs(slope) + size) / Fraction(EPSILON))

@@ -22,7 +22,7 @@ def answers(e: Extreme, readings: np.ndarray, unit: float = 1.0) -> TechniqueRes
     scaled = dataclasses.replace(e, strength=e.strength * unit)
     document = {**scaled.document, "discrepancy": "default"}
     frames = Frames(readings * unit)
-    if e.technique == "differential":
+    if "differential" in e.technique:
         noise["derivative"] = noise["read"]
         time_s = np.arange(float(len(readings)))
         frames = Frames(np.ones_like(readings), time_s=time_s, derivatives=readings * unit)

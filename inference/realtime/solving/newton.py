@@ -2,7 +2,14 @@
 
 import math
 
-from inference.realtime.solving.bracketing import STEPS, best, narrowed, next_point, start
+from inference.realtime.solving.bracketing import (
+    EPSILON,
+    STEPS,
+    best,
+    narrowed,
+    next_point,
+    start,
+)
 from inference.realtime.solving.curves import dispatch
 from inference.realtime.solving.curves.curve import CurveParameters
 from simulator.compiled import compiled
@@ -20,6 +27,7 @@ def _newton(
     """
     target = top / bottom
     u = dispatch.guess(kind, top, bottom, p)
+    before = 1e-8
     for _ in range(12):
         if not low < u < high:
             return math.nan
@@ -30,8 +38,12 @@ def _newton(
         step = -math.log(ratio) / power
         if not abs(step) < 2.0:
             return math.nan
-        if abs(step) < 3e-8:  # what remains is its square
+        size = abs(step)
+        # what remains is its square, times what made it of the step before: by a fold, and over
+        # many turns of a phase, that is much; where steps stall they are rounding
+        if size < 3e-8 and (size * size * size < EPSILON * before * before or size > 0.5 * before):
             return min(max(u * (1.0 + step), low), high)
+        before = size
         u *= 1.0 + step + 0.5 * step * step if abs(step) < 0.02 else math.exp(step)
     return math.nan
 

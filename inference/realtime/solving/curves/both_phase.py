@@ -45,13 +45,12 @@ def turning(u: float, p: CurveParameters) -> float:
     b = log_slope(u, p.c0, p.c1)
     bend = object_bend(u, b, p)
     rate, rate_bend = background_rates(u, p)
-    k = p.wave
-    cosine, sine = math.cos(k * (p.distance - u)), math.sin(k * (p.distance - u))
-    x = b + rate * cosine
-    y = k * u + rate * sine
-    dx = bend - (k * u) * (k * u) + rate_bend * cosine
-    dy = 2.0 * k * u * b + rate_bend * sine
-    return x * dy - y * dx
+    turn, angle = p.wave * u, p.wave * (p.distance - u)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    # of object and wall; what the wall alone has is zero, and would be nothing but rounding
+    dx, dy = bend - turn * turn, 2.0 * turn * b
+    own = b * dy - turn * dx
+    return own + rate_bend * (b * sine - turn * cosine) + rate * (cosine * dy - sine * dx)
 
 
 @compiled

@@ -47,10 +47,11 @@ def turning(u: float, p: CurveParameters) -> float:
     b = log_slope(u, p.c0, p.c1)
     bend = object_bend(u, b, p)
     rate, rate_bend = background_rates(u, p)
-    # x = u Phi' + .., y = (u Phi)' u + R ..; second derivatives times u
-    x, y = b + rate, u * (1.0 + b) + p.distance * rate
+    # of (x, y - R x), which turns alike and whose second part is the object's alone: a wall that
+    # outshines it would leave nothing but rounding
+    x, y = b + rate, u * (1.0 + b) - p.distance * b
     dx = bend + rate_bend
-    dy = u * (2.0 * b + bend) + p.distance * rate_bend
+    dy = u * (2.0 * b + bend) - p.distance * bend
     return x * dy - y * dx
 
 

@@ -1,0 +1,434 @@
+"""Numbers of roots of sine waves in ball arithmetic, over 24 decades, and how far roots are off.
+
+The equations are those of docs/model.md, exact, multiplied out so that they have no pole; phases
+are formed from the exact frequency, never from a rounded wave number.
+"""
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from flint import arb, arb_series, ctx
+from numpy.typing import NDArray
+
+from inference.estimate import all_roots
+from simulator.frames import Frames
+from simulator.scene import parse_scene
+from simulator.sensor import SineWaveSensor, parse_sensor
+from tests.extreme.balls import BITS, Function, exact, roots_of
+from tests.extreme.tally import Tally
+
+__all__ = ["WAVES", "Wave", "certified_roots", "tally_waves", "wave_error", "waves"]
+
+Array = NDArray[np.float64]
+EPSILON = float(np.finfo(float).eps)
+_LIGHT = 299792458
+# readings and frequencies this close to a fold, relative, may have the count of either side
+_EXCUSED = [k * EPSILON for k in (1, 4, 16)]
+
+
+@dataclasses.dataclass(frozen=True)
+class Wave:
+    """A scene of a sine wave, in numbers."""
+
+    technique: str
+    frequency_hz: float
+    offset: float
+    gain: float
+    c0: float
+    c1: float
+    c2: float
+    distance: float
+    strength: float
+    c0s: float
+    c1s: float
+
+    @property
+    def sensor(self) -> SineWaveSensor:
+        parsed = parse_sensor(
+            {
+                "kind": "sine_wave",
+                "frequency_hz": self.frequency_hz,
+                "phase_offset_rad": self.offset,
+                "gain": self.gain,
+                "noise": {"read": [1e-50, 1e-50], "derivative": [1e-50, 1e-50]},
+            }
+        )
+        assert isinstance(parsed, SineWaveSensor)
+        return parsed
+
+    @property
+    def document(self) -> dict[str, object]:
+        scene: dict[str, object] = {
+            "object": {"c0": self.c0, "c1": self.c1, "c2": self.c2},
+            "discrepancy": 0,
+        }
+        if self.technique.startswith("background"):
+            prior = {"prior": "lognormal", "median": self.strength, "sigma": 1.0}
+            unknown = self.technique == "background_cancelling"
+            scene["background"] = {
+                "strength": prior if unknown else self.strength,
+                "distance_m": self.distance,
+                "shadow": {"c0": self.c0s, "c1": self.c1s},
+            }
+        return scene
+
+    @property
+    def high(self) -> arb:
+        """Upper end of the technique's interval [m]; of the intensity the half wavelength."""
+        half = arb(_LIGHT) / (2 * exact(self.frequency_hz))
+        if "differential" not in self.technique:
+            return exact(self.distance) if self.technique.startswith("background") else half
+        near = half / 2
+        if self.technique == "differential":
+            return near
+        return near if near < exact(self.distance) else exact(self.distance)
+
+    def readings(self, r: Array) -> Array:
+        """Readings at ranges [m], or their derivatives."""
+        k = self.sensor.wave_number
+        q = (r + self.c1 / 2) ** 2 + (self.c0 - self.c1**2 / 4)
+        light = self.gain * self.c0 * self.c2 / (r * r * q)
+        x = light * np.exp(1j * (k * r + self.offset))
+        far = np.exp(1j * (k * self.distance + self.offset))
+        hidden = r * (r + self.c1s) + self.c0s
+        if "differential" in self.technique:
+            x = x / r * (-2 - r * (2 * r + self.c1) / q + 1j * k * r)
+            if self.technique != "differential":
+                x = x + self.strength * self.c0s * (2 * r + self.c1s) / hidden**2 * far
+        elif self.technique.startswith("background"):
+            x = x + self.strength * r * (r + self.c1s) / hidden * far
+        return np.column_stack([x.real, x.imag])
+
+
+Series = Any  # a ball, or a power series of balls
+
+
+class Balls(NamedTuple):
+    """A frame: its scene in balls, the readings less the sensor's phase offset."""
+
+    x: arb
+    y: arb
+    k: arb
+    far: arb
+    gain: arb  # K, gain c0 c2
+    c0: arb
+    c1: arb
+    strength: arb
+    c0s: arb
+    c1s: arb
+
+    def sizes(self) -> "Balls":
+        """Everything as large as it is: what relative errors are relative to."""
+        return Balls(*(abs(part) for part in self))
+
+
+def _balls(e: Wave, first: float, second: float) -> Balls:
+    i, q, offset = exact(first), exact(second), exact(e.offset)
+    cosine, sine = offset.cos(), offset.sin()
+    return Balls(
+        x=i * cosine + q * sine,
+        y=q * cosine - i * sine,
+        k=4 * arb.pi() * exact(e.frequency_hz) / _LIGHT,
+        far=exact(e.distance),
+        gain=exact(e.gain) * exact(e.c0) * exact(e.c2),
+        c0=exact(e.c0),
+        c1=exact(e.c1),
+        strength=exact(e.strength),
+        c0s=exact(e.c0s),
+        c1s=exact(e.c1s),
+    )
+
+
+class Equation(NamedTuple):
+    """An equation of the range, what relative errors of its terms amount to, the object's light."""
+
+    value: Callable[[Balls, Series], Series]
+    size: Callable[[Balls, Series], Series]
+    light: Callable[[Balls, Series], Series] | None = None
+
+
+def _q(b: Balls, r: Series) -> Series:
+    return r * (r + b.c1) + b.c0
+
+
+def _q_shadow(b: Balls, r: Series) -> Series:
+    return r * (r + b.c1s) + b.c0s
+
+
+def _a(b: Balls, r: Series) -> Series:
+    return r * (4 * r + 3 * b.c1) + 2 * b.c0
+
+
+def _turned(b: Balls, r: Series) -> tuple[Series, Series]:
+    """rho times cosine and sine of k r - psi."""
+    cosine, sine = (b.k * r).cos(), (b.k * r).sin()
+    return b.x * cosine + b.y * sine, b.x * sine - b.y * cosine
+
+
+def _rho(b: Balls) -> Series:
+    return (b.x * b.x + b.y * b.y).sqrt()
+
+
+def _intensity(b: Balls, r: Series) -> Series:
+    return _rho(b) * r * r * _q(b, r) - b.gain
+
+
+def _intensity_size(b: Balls, r: Series) -> Series:
+    s = b.sizes()
+    return _rho(b) * r * r * _q(s, r) + s.gain
+
+
+def _differential(b: Balls, r: Series) -> Series:
+    cosine, sine = _turned(b, r)
+    return _a(b, r) * sine - b.k * r * _q(b, r) * cosine
+
+
+def _differential_size(b: Balls, r: Series) -> Series:
+    s, kr = b.sizes(), b.k * r
+    cosine, sine = (abs(part) for part in _turned(b, r))
+    value = _a(s, r) * sine + kr * _q(s, r) * cosine
+    return value + (1 + kr) * abs(_a(b, r) * cosine + kr * _q(b, r) * sine)
+
+
+def _cancelling(b: Balls, r: Series) -> Series:
+    angle = b.k * b.far
+    free = b.y * angle.cos() - b.x * angle.sin()
+    return free * r * r * _q(b, r) + b.gain * (b.k * (b.far - r)).sin()
+
+
+def _cancelling_size(b: Balls, r: Series) -> Series:
+    s, angle, left = b.sizes(), b.k * b.far, b.k * (b.far - r)
+    free = s.y * abs(angle.cos()) + s.x * abs(angle.sin())
+    turned = abs(b.x * angle.cos() + b.y * angle.sin())  # what an error of the phase moves it by
+    wave = abs(left.sin()) + abs(left.cos()) * b.k * b.far
+    return (free + turned) * r * r * _q(s, r) + s.gain * wave
+
+
+def _own(b: Balls, r: Series) -> Series:
+    _, sine = _turned(b, r)
+    return sine * _q_shadow(b, r) + b.strength * r * (r + b.c1s) * (b.k * (b.far - r)).sin()
+
+
+def _own_size(b: Balls, r: Series) -> Series:
+    s, left = b.sizes(), b.k * (b.far - r)
+    cosine, sine = (abs(part) for part in _turned(b, r))
+    phase = b.k * b.far
+    wall = s.strength * r * (r + s.c1s) * (abs(left.sin()) + abs(left.cos()) * phase)
+    return _q_shadow(s, r) * (sine + cosine * (1 + b.k * r)) + wall
+
+
+def _own_light(b: Balls, r: Series) -> Series:
+    cosine, _ = _turned(b, r)
+    return cosine - b.strength * r * (r + b.c1s) / _q_shadow(b, r) * (b.k * (b.far - r)).cos()
+
+
+def _both(b: Balls, r: Series) -> Series:
+    cosine, sine = _turned(b, r)
+    shadow = _q_shadow(b, r)
+    _, far = _turned(b, b.far)
+    q = _q(b, r)
+    wall = b.strength * b.c0s * (2 * r + b.c1s) * r * r * r * q * q * far
+    return b.gain * shadow * shadow * (b.k * r * q * cosine - _a(b, r) * sine) + wall
+
+
+def _both_size(b: Balls, r: Series) -> Series:
+    s, kr, angle = b.sizes(), b.k * r, b.k * b.far
+    cosine, sine = (abs(part) for part in _turned(b, r))
+    c_far, s_far = (abs(part) for part in _turned(b, b.far))
+    shadow, q = _q_shadow(s, r), _q(s, r)
+    wall = s.strength * s.c0s * (2 * r + s.c1s) * r * r * r * q * q
+    own = kr * q * cosine + _a(s, r) * sine + (1 + kr) * (kr * q * sine + _a(s, r) * cosine)
+    return s.gain * shadow * shadow * own + wall * (s_far + c_far * (1 + angle))
+
+
+WAVES: dict[str, Equation] = {
+    "intensity": Equation(_intensity, _intensity_size),
+    "differential": Equation(_differential, _differential_size),
+    "background_cancelling": Equation(_cancelling, _cancelling_size),
+    "background_intensity": Equation(_own, _own_size, _own_light),
+    "background_cancelling_differential": Equation(_both, _both_size),
+}
+
+
+def waves(technique: str, rng: np.random.Generator) -> Iterator[Wave]:
+    """Scenes of 1 Hz to 1 THz, lengths over 12 decades about it, shapes to 1e-15 of the pole."""
+    while True:
+        frequency = 10.0 ** rng.uniform(0, 12)
+        half = _LIGHT / (2 * frequency)
+        reach = half * 10.0 ** rng.uniform(*((-4, 1.3) if rng.random() < 0.98 else (1.3, 2.2)))
+        size = reach * 10.0 ** rng.uniform(-4, 4)
+        c0 = float(size * size)
+        if rng.random() < 0.5:
+            c1 = float(-2 * size * (1 - 10.0 ** rng.uniform(-15, -0.3)))
+        else:
+            c1 = float(size * 10.0 ** rng.uniform(-12, 6) * rng.choice([-1e-6, 1.0]))
+        c0s = float(c0 * 10.0 ** rng.uniform(-3, 1))
+        c1s = float(size * 10.0 ** rng.uniform(-6, 2))
+        if rng.random() < 0.3:
+            c1s = float(-2 * math.sqrt(c0s) * (1 - 10.0 ** rng.uniform(-9, -0.1)))
+        if not (c1 > -2 * math.sqrt(c0) and c1s > -2 * math.sqrt(c0s)):
+            continue
+        gain, c2 = 10.0 ** rng.uniform(-12, 12), 10.0 ** rng.uniform(-4, 2)
+        # what the object sends from where the background stands, over 8 decades
+        light = gain * c0 * c2 / (reach**2 * (reach * (reach + c1) + c0))
+        yield Wave(
+            technique,
+            frequency_hz=float(frequency),
+            offset=float(rng.uniform(-math.pi, math.pi)),
+            gain=float(gain),
+            c0=c0,
+            c1=c1,
+            c2=float(c2),
+            distance=float(reach),
+            strength=float(light * 10.0 ** rng.uniform(-4, 4)),
+            c0s=c0s,
+            c1s=c1s,
+        )
+
+
+def _frames(e: Wave, n: int, rng: np.random.Generator) -> Array:
+    """Readings at random ranges, near the shape's pole, hard by folds, and without sense."""
+    high = float(e.high)
+    size = math.sqrt(e.c0)
+    r = np.concatenate(
+        [
+            high * (1 - 10.0 ** rng.uniform(-9, -0.01, n // 4)),
+            high * 10.0 ** rng.uniform(-4, 0, n // 4),
+            np.clip(size * 10.0 ** rng.uniform(-3, 1, n // 4), 0, high * 0.999),
+        ]
+    )
+    found = e.readings(r)
+    any_phase = np.exp(1j * rng.uniform(-math.pi, math.pi, n // 4))
+    heights = np.hypot(*e.readings(high * rng.uniform(0.1, 1, n // 4)).T) * any_phase
+    found = np.concatenate([found, np.column_stack([heights.real, heights.imag])])
+    found = np.concatenate([found, found[rng.integers(0, len(found), n // 4)] * 1e-8])
+    found = np.concatenate([found, _by_folds(e, high, rng)])
+    sizes = np.abs(found)
+    good = np.isfinite(found).all(axis=1) & (sizes.max(axis=1) < 1e200)
+    return np.asarray(found[good & (sizes.min(axis=1) > 1e-200)])
+
+
+def _by_folds(e: Wave, high: float, rng: np.random.Generator) -> Array:
+    """Readings beside two turning points of what the technique inverts, to 1e-12."""
+    size = math.sqrt(e.c0)
+    grid = np.unique(
+        np.concatenate([size * np.geomspace(1e-2, 1e2, 1500), high * np.linspace(0, 1, 1500)])
+    )
+    grid = grid[(grid > 0) & (grid < high)]
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(_one_number(e, grid))))) + 1
+    found = []
+    for turn in rng.permutation(turns)[:2]:
+        low, up = grid[turn - 1], grid[turn + 1]
+        for _ in range(3):  # to 1e-8 of the range, where the number is right to rounding
+            near = np.linspace(low, up, 400)
+            values = _one_number(e, near)
+            best = int(np.argmax(np.abs(values - 0.5 * (values[0] + values[-1]))))
+            low, up = near[max(best - 1, 0)], near[min(best + 1, 399)]
+        x = e.readings(near[best : best + 1]) @ np.array([1, 1j])
+        off = rng.choice([-1.0, 1.0], 4) * 10.0 ** rng.uniform(-12, -3, 4)
+        found.append(x * (np.exp(1j * off) if "differential" in e.technique else 1 + off))
+    x = np.concatenate(found) if found else np.empty(0, complex)
+    return np.column_stack([x.real, x.imag])
+
+
+def _one_number(e: Wave, r: Array) -> Array:
+    """What a technique makes of a frame, for readings at ranges."""
+    x: NDArray[np.complex128] = e.readings(r) @ np.array([1, 1j])
+    with np.errstate(all="ignore"):
+        if "differential" in e.technique:
+            return np.asarray(np.unwrap(np.angle(x), period=math.pi))
+        if e.technique == "background_cancelling":
+            far = e.sensor.wave_number * e.distance + e.offset
+            return np.asarray((x * np.exp(-1j * far)).imag)
+        if e.technique == "background_intensity":
+            return np.asarray(np.unwrap(np.angle(x)))
+        return np.asarray(np.abs(x))
+
+
+def certified_roots(e: Wave, first: float, second: float) -> list[arb] | None:
+    """Enclose all roots; None where the count is not decided."""
+    ctx.prec = BITS
+    b, equation = _balls(e, first, second), WAVES[e.technique]
+    high = e.high
+    if e.technique == "intensity":
+        high = 2 * (abs(b.c1) + (4 * b.gain / _rho(b)).root(4))
+        high = high.mid()
+    g: Function = lambda r: equation.value(b, r)  # noqa: E731
+    found = roots_of(g, high)
+    if found is None or equation.light is None:
+        return found
+    # of a background that is seen the rest is the object: neither is negative
+    seen = [r for r in found if r + b.c1s > 0]
+    lights = [equation.light(b, r) for r in seen]
+    drowned = 256 * EPSILON * (_rho(b) + b.strength)  # in the rounding of the readings
+    if not all(abs(light) > drowned for light in lights):
+        return None
+    if any((r + b.c1s).contains(0) for r in found):
+        return None
+    return [r for r, light in zip(seen, lights, strict=True) if light > 0]
+
+
+def _count(e: Wave, first: float, second: float) -> int | None:
+    found = certified_roots(e, first, second)
+    return None if found is None else len(found)
+
+
+def _excused(e: Wave, first: float, second: float, count: int) -> bool:
+    """Say whether readings or a frequency within rounding have the count."""
+    for d in _EXCUSED:
+        for s1, s2, s3 in itertools.product((-d, 0.0, d), repeat=3):
+            moved = dataclasses.replace(e, frequency_hz=e.frequency_hz * (1 + s3))
+            exactly = _count(moved, first * (1 + s1), second * (1 + s2))
+            if exactly is None or exactly == count:
+                return True
+    return False
+
+
+def tally_waves(technique: str, scenes: int, frames: int, rng: np.random.Generator) -> Tally[Wave]:
+    """Count every root of many frames twice, and hold each to the equation it solves.
+
+    The error of a root is |g(r)| over |r g'(r)| + what relative errors of g's terms, phases among
+    them, amount to, in units of rounding.
+    """
+    total = Tally[Wave]()
+    for e in itertools.islice(waves(technique, rng), scenes):
+        readings = _frames(e, frames, rng)
+        if not len(readings):
+            continue
+        given = Frames(readings)
+        if "differential" in technique:
+            time_s = np.arange(float(len(readings)))
+            given = Frames(np.ones_like(readings), time_s=time_s, derivatives=readings)
+        result = all_roots(technique, e.sensor, parse_scene(e.document), given)
+        for n, (first, second) in enumerate(readings.tolist()):
+            roots = result.roots_m[n, : result.root_count[n]]
+            if technique == "background_intensity":
+                roots = roots[roots > -e.c1s]
+            count = len(roots)
+            total.frames += 1
+            total.roots += count
+            certified = _count(e, first, second)
+            if count != certified:
+                if certified is None or _excused(e, first, second, count):
+                    total.excused += 1
+                else:
+                    total.wrong.append((e, (first, second), count, certified))
+                continue
+            for root in roots.tolist():
+                error = wave_error(e, first, second, root)
+                if error > total.worst:
+                    total.worst, total.where = error, (e, (first, second), root)
+    return total
+
+
+def wave_error(e: Wave, first: float, second: float, root: float) -> float:
+    """Return how far a root is off, in units of its condition times rounding."""
+    ctx.prec = BITS
+    b, equation, r = _balls(e, first, second), WAVES[e.technique], exact(root)
+    y = equation.value(b, arb_series([r, 1], prec=2))
+    size = abs(r * y[1]) + equation.size(b, r)
+    return float(abs(y[0]) / size) / EPSILON
