@@ -52,9 +52,15 @@ class StreamRequest(TrackedSystem):
     policy : str
         "all": no line is dropped, a client that sends faster than it is answered has to wait.
         "latest": a line that has waited too long for its turn is dropped for a newer one.
+    calibrate : bool
+        Whether the stream learns its scene from its own frames, and anew where it has changed.
+    seed : int, optional
+        Of its calibrations; left out: drawn, and told.
     """
 
     policy: Literal["all", "latest"] = "all"
+    calibrate: bool = False
+    seed: Seed | None = None
 
 
 class EstimateRequest(SystemDescription):

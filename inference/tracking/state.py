@@ -9,11 +9,11 @@ from inference.posterior.archive import pack, unpack
 from inference.tracking.hypotheses import COUNT, Hypotheses
 from simulator.errors import InvalidInputError
 
-__all__ = ["TrackState", "check_state", "state_from_bytes", "state_to_bytes"]
+__all__ = ["BROKEN", "TrackState", "check_state", "state_from_bytes", "state_to_bytes"]
 
 _KIND = "track state 3"
 # what reading an archive raises where bytes are missing or changed
-_BROKEN = (
+BROKEN = (
     ValueError,
     KeyError,
     TypeError,
@@ -62,7 +62,7 @@ def state_from_bytes(data: bytes) -> TrackState:
             raise ValueError(meta["kind"])
         hypotheses = Hypotheses(*(arrays[name] for name in Hypotheses._fields))
         return TrackState(hypotheses, meta["signature"])
-    except _BROKEN as error:
+    except BROKEN as error:
         raise InvalidInputError.at("/state", "is not the state of a tracker") from error
 
 

@@ -2,10 +2,19 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from inference.tracking.settings import TrackingSettings
+    from service.streams.followers import Follower
+    from simulator.scene import Scene
+    from simulator.sensor import Sensor
 
 from service.commands.command import FRAMES_HELP, Subparsers, add_command, note
 
 __all__ = ["add_parser"]
+
+LAG = 300
 
 
 def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
@@ -21,6 +30,7 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
         examples="""
             hybridtof track frames.csv --scene scene.json > tracked.ndjson
             sensor-reader | hybridtof track - --scene scene.json
+            hybridtof track frames.ndjson --scene priors.json --calibrate --seed 7
         """,
     )
     parser.add_argument("frames", type=Path, help=FRAMES_HELP)
@@ -28,12 +38,57 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
         "--scene", type=Path, required=True, help="JSON file with members sensor and scene, and "
         "optionally tracking: settings of the tracker"
     )  # fmt: skip
+    parser.add_argument(
+        "--calibrate", action="store_true", help="learn the scene from the frames themselves, and "
+        "anew where it has changed; frames wait while a posterior is computed"
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, help="of the calibrations (default: 0)")
+    parser.add_argument(
+        "--lag", type=int, help="how many numbers after the frame that a calibration was asked at "
+        f"it applies (default: {LAG})"
+    )  # fmt: skip
+    parser.add_argument(
+        "--replay", type=Path, help="answers of a stream, or what GET said of it: calibrations "
+        "apply where they did there"
+    )  # fmt: skip
+
+
+def _follower(
+    args: argparse.Namespace, sensor: "Sensor", scene: "Scene", settings: "TrackingSettings"
+) -> "Follower":
+    """Return what follows the stream."""
+    from inference.self_calibration.plan import plan_of
+    from inference.tracking.tracker import tracker
+    from service.commands.files import reading
+    from service.streams.calibrated_here import (
+        concluding_as_before,
+        concluding_at_once,
+        events_in,
+    )
+    from service.streams.followers import Calibrating, Plain
+    from simulator.errors import InvalidInputError
+
+    if not args.calibrate:
+        for name in ("seed", "lag", "replay"):
+            if getattr(args, name) is not None:
+                raise InvalidInputError.at(f"--{name}", "is of calibrations: needs --calibrate")
+        return Plain(tracker(sensor, scene, settings))
+    lag = LAG if args.lag is None else args.lag
+    if lag < 1:
+        raise InvalidInputError.at("--lag", "must be 1 or more")
+    if not 0 <= (args.seed or 0) < 2**53:
+        raise InvalidInputError.at("--seed", "must be an integer from 0 to 2^53 - 1")
+    plan = plan_of(sensor, scene, settings, args.seed or 0)
+    if args.replay is None:
+        return Calibrating.of(plan, concluding_at_once(plan, lag))
+    with reading(args.replay):
+        events = events_in(args.replay)
+    return Calibrating.of(plan, concluding_as_before(plan, events))
 
 
 def _run(args: argparse.Namespace) -> int:
     import time
 
-    from inference.tracking.tracker import tracker
     from service.checked_system import checked_system
     from service.commands.files import naming, open_lines, read_document, reading
     from service.commands.output import write_result
@@ -45,12 +100,14 @@ def _run(args: argparse.Namespace) -> int:
     from service.streams.taking import take
 
     stated = read_document(TrackedSystem, args.scene)
-    with naming({"/settings": f"{args.scene}#/tracking", "": str(args.scene)}):
+    names = {"/settings": f"{args.scene}#/tracking", "/calibrate": "--calibrate"}
+    own = {name: name for name in ("--seed", "--lag", "--replay")}
+    with naming(names | own | {"": str(args.scene)}):
         sensor, scene = checked_system(stated.sensor, stated.scene)
-        model = tracker(sensor, scene, stated.tracking)
+        follower = _follower(args, sensor, scene, stated.tracking)
     for doubt in doubts(sensor):
         note(args, f"note: {doubt}")
-    place, kept = Place(model.first), Kept()
+    place, kept = Place(follower.first), Kept()
     with reading(args.frames), open_lines(args.frames) as lines:
         form: Form | None = None
         for line in lines:
@@ -60,7 +117,7 @@ def _run(args: argparse.Namespace) -> int:
                 form, is_frame = form_like(line)
                 if not is_frame:
                     continue
-            taken = take(model, place, [Line(line, time.perf_counter())], form, kept)
+            taken = take(follower, place, [Line(line, time.perf_counter())], form, kept)
             kept.add(taken)
             place = taken.place
             write_result(taken.answers[0])

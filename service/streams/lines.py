@@ -3,6 +3,7 @@
 import dataclasses
 from typing import NamedTuple, Protocol
 
+from inference.self_calibration.state import CalibrationState
 from inference.tracking.state import TrackState
 
 __all__ = ["COUNTS", "WINDOW", "Earlier", "Line", "Place", "Taken"]
@@ -38,8 +39,8 @@ class Place:
 
     Attributes
     ----------
-    state : TrackState
-        The tracker's.
+    state : TrackState or CalibrationState
+        What follows the stream (`service.streams.followers`).
     sequence : int
         Number of the last line that was answered; -1 before the first.
     answered, errors, dropped, gaps : int
@@ -55,7 +56,7 @@ class Place:
         The last answer; empty before the first.
     """
 
-    state: TrackState
+    state: TrackState | CalibrationState
     sequence: int = -1
     answered: int = 0
     errors: int = 0

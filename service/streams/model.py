@@ -1,10 +1,12 @@
-"""From the request that made a stream to the tracker that follows it."""
+"""From the request that made a stream to what follows it."""
 
 import functools
 
-from inference.tracking.tracker import Tracker, tracker
+from inference.self_calibration.plan import plan_of
+from inference.tracking.tracker import tracker
 from service.checked_system import checked_system
 from service.requests import StreamRequest
+from service.streams.followers import Calibrating, Follower, Plain
 from service.strict_json import decode
 from simulator.errors import InvalidInputError, Problem
 from simulator.validated import parse
@@ -18,8 +20,8 @@ def request_of(raw: bytes) -> StreamRequest:
 
 
 @functools.lru_cache(maxsize=256)
-def model_of(raw: bytes) -> Tracker:
-    """Return a stream's tracker; streams of the same request share it.
+def model_of(raw: bytes) -> Follower:
+    """Return what follows a stream; streams of the same request share it.
 
     Parameters
     ----------
@@ -28,17 +30,22 @@ def model_of(raw: bytes) -> Tracker:
 
     Returns
     -------
-    Tracker
+    Follower
 
     Raises
     ------
     InvalidInputError, RefusedError
-        As `inference.tracking.tracker.tracker`, with pointers into the request.
+        As `inference.tracking.tracker.tracker`, and `inference.self_calibration.plan.plan_of`, with
+        pointers into the request.
     """
     asked = request_of(raw)
     sensor, scene = checked_system(asked.sensor, asked.scene)
+    if asked.seed is not None and not asked.calibrate:
+        raise InvalidInputError.at("/seed", "is of calibrations: set calibrate, or leave it out")
     try:
-        return tracker(sensor, scene, asked.tracking)
+        if asked.calibrate:
+            return Calibrating.of(plan_of(sensor, scene, asked.tracking, asked.seed or 0))
+        return Plain(tracker(sensor, scene, asked.tracking))
     except InvalidInputError as error:
         raise InvalidInputError(*map(_renamed, error.problems)) from None
 

@@ -10,13 +10,12 @@ import anyio.to_thread
 import orjson
 from starlette.requests import ClientDisconnect
 
-from inference.tracking.state import state_from_bytes, state_to_bytes
-from inference.tracking.tracker import Tracker
 from service.border.traces import Traces
 from service.errors import ConflictError, GoneError, NotFoundError, SlowClientError
 from service.store.stream_record import StreamChange, StreamRecord
 from service.store.stream_store import StreamStore
 from service.streams.cutting import Cutter
+from service.streams.followers import Follower
 from service.streams.forms import JsonLines
 from service.streams.lines import COUNTS, Place, Taken
 from service.streams.model import model_of
@@ -34,7 +33,7 @@ _TRIES = 3
 Send = Callable[[list[bytes]], Awaitable[None]]
 
 
-def place_of(record: StreamRecord, model: Tracker) -> Place:
+def place_of(record: StreamRecord, model: Follower) -> Place:
     """Return where a stream stands, from its row.
 
     Raises
@@ -43,12 +42,10 @@ def place_of(record: StreamRecord, model: Tracker) -> Place:
         Where the state is of another version of the tracker.
     """
     try:
-        state = state_from_bytes(record.state)
-        same = state.signature == model.first.signature
-    except InvalidInputError:  # its form is another one
-        same = False
-    if not same:
-        raise GoneError("the stream's state is of another version of hybridtof: make a new one")
+        state = model.from_bytes(record.state)
+    except InvalidInputError:
+        message = "the stream's state is of another version of hybridtof: make a new one"
+        raise GoneError(message) from None
     return Place(state, record.sequence, last=record.last, **record.counts)
 
 
@@ -90,8 +87,8 @@ class Producer:
         Counts lines.
     record : StreamRecord
         As the stream stood when it was opened.
-    model, place : Tracker, Place
-        Its tracker, and where it stands.
+    model, place : Follower, Place
+        What follows it, and where it stands.
     latest : bool
         Whether stale lines are dropped.
     holder : str or None
@@ -107,7 +104,7 @@ class Producer:
     limiter: anyio.CapacityLimiter
     traces: Traces
     record: StreamRecord
-    model: Tracker
+    model: Follower
     place: Place
     latest: bool
     holder: str | None
@@ -177,7 +174,7 @@ class Producer:
         change = StreamChange(
             self.record.id,
             self.record.number,
-            state_to_bytes(place.state) if taken.changed else b"",
+            self.model.to_bytes(place.state) if taken.changed else b"",
             place.sequence,
             {name: getattr(place, name) for name in _KEPT},
             place.last,

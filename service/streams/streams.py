@@ -8,7 +8,6 @@ from collections.abc import AsyncIterator
 
 import anyio
 
-from inference.tracking.state import state_to_bytes
 from service.border.traces import Traces
 from service.errors import ConflictError, GoneError, NotFoundError, StoreError
 from service.store.holder import has_ended, holder_name
@@ -68,7 +67,7 @@ class Streams:
             Where there is no room.
         """
         model = await asyncio.to_thread(model_of, raw)
-        state = state_to_bytes(model.first)
+        state = model.to_bytes(model.first)
         return await asyncio.to_thread(self._store.add, uuid.uuid4().hex, client, raw, state)
 
     async def get(self, stream_id: str, client: str) -> StreamRecord:

@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from inference.tracking.hypotheses import TIME
-from inference.tracking.track import step
-from inference.tracking.tracker import Tracker
 from service.errors import BodyTooLargeError, ConflictError, GoneError
 from service.streams.answered import answers_of, encoded, error_of
 from service.streams.cutting import LONGEST
+from service.streams.followers import Follower
 from service.streams.forms import Form
 from service.streams.lines import COUNTS, WINDOW, Earlier, Line, Place, Taken
 from service.streams.shapes import (
@@ -40,14 +38,14 @@ _Waiting = tuple[int, int, float, float, tuple[Any, ...], dict[str, Any] | None]
 
 
 def take(
-    model: Tracker, place: Place, lines: Sequence[Line], form: Form, earlier: Earlier
+    follower: Follower, place: Place, lines: Sequence[Line], form: Form, earlier: Earlier
 ) -> Taken:
     """Answer lines in their order.
 
     Parameters
     ----------
-    model : Tracker
-        Which follows the stream.
+    follower : Follower
+        Which answers frames.
     place : Place
         Where the stream stands.
     lines : sequence of Line
@@ -62,9 +60,9 @@ def take(
     Taken
     """
     try:
-        return _Batch(model, place, form, earlier, alone=False).take(lines)
+        return _Batch(follower, place, form, earlier, alone=False).take(lines)
     except _UnsoundError:
-        return _Batch(model, place, form, earlier, alone=True).take(lines)
+        return _Batch(follower, place, form, earlier, alone=True).take(lines)
 
 
 class _UnsoundError(Exception):
@@ -75,13 +73,14 @@ class _Batch:
     """One call of `take`."""
 
     def __init__(
-        self, model: Tracker, place: Place, form: Form, earlier: Earlier, alone: bool
+        self, follower: Follower, place: Place, form: Form, earlier: Earlier, alone: bool
     ) -> None:
-        self._model, self._form, self._earlier, self._alone = model, form, earlier, alone
+        self._follower, self._form, self._earlier, self._alone = follower, form, earlier, alone
+        self._model = follower.base
         self._place = place
         self._state = place.state
         self._sequence = place.sequence
-        self._time = float(place.state.hypotheses.numbers[TIME])
+        self._time = follower.time_of(place.state)
         self._unnumbered = place.unnumbered
         self._counts = dict.fromkeys(COUNTS, 0)
         self._surprise, self._misfit = place.surprise, place.misfit
@@ -190,16 +189,23 @@ class _Batch:
         try:
             if frames is None:
                 frames = frames_of(self._model, self._shape, values)
-            self._state, track = step(self._model, self._state, frames)
+            self._state, pieces = self._follower.follow(self._state, frames, sequences)
         except InvalidInputError as error:
             if not self._alone:
                 raise _UnsoundError from None
-            self._time = float(self._state.hypotheses.numbers[TIME])
+            self._time = self._follower.time_of(self._state)
             raise of_one_frame(error) from None
         now = time.perf_counter()
-        said = answers_of(track, sequences, times, [now - begun for begun in arrivals], also)
-        for place, answer in zip(at, said, strict=True):
-            self._answers[place] = answer
+        latencies, start = [now - begun for begun in arrivals], 0
+        for track, event in pieces:
+            part = slice(start, start + len(track))
+            more = also[part]
+            if event is not None:
+                more = ({**(more[0] or {}), "calibration": event}, *more[1:])
+            said = answers_of(track, sequences[part], times[part], latencies[part], more)
+            for place, answer in zip(at[part], said, strict=True):
+                self._answers[place] = answer
+            start += len(track)
         self._counts["answered"] += len(waiting)
         surprise = float(track.surprise[-1])
         self._surprise = surprise if np.isfinite(surprise) else None

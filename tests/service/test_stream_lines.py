@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from inference.tracking.tracker import Tracker, tracker
 from service.errors import MalformedError
 from service.streams.cutting import LONGEST, Cutter
+from service.streams.followers import Plain
 from service.streams.forms import JsonLines
 from service.streams.kept import Kept
 from service.streams.lines import WINDOW, Line, Place
@@ -38,7 +39,7 @@ def frame(n: int, **more: Any) -> bytes:
 def answered(model: Tracker, batches: Sequence[Sequence[bytes | None]]) -> list[dict[str, Any]]:
     place, kept, found = Place(model.first), Kept(), []
     for batch in batches:
-        taken = take(model, place, [Line(raw, time.perf_counter()) for raw in batch],
+        taken = take(Plain(model), place, [Line(raw, time.perf_counter()) for raw in batch],
                      JsonLines(), kept)  # fmt: skip
         kept.add(taken)
         place = taken.place
@@ -201,9 +202,9 @@ def test_rooms() -> None:
 def test_dropped_lines_have_their_numbers(model: Tracker) -> None:
     now = time.perf_counter()
     lines = [Line(frame(1), now), Line(frame(5), now, 3), Line(frame(6, sequence=9), now, 1)]
-    (first,) = take(model, Place(model.first), lines[1:2], JsonLines(), Kept()).answers
+    (first,) = take(Plain(model), Place(model.first), lines[1:2], JsonLines(), Kept()).answers
     assert json.loads(first)["sequence"] == 4
-    taken = take(model, Place(model.first), lines, JsonLines(), Kept())
+    taken = take(Plain(model), Place(model.first), lines, JsonLines(), Kept())
     found = [json.loads(answer) for answer in taken.answers]
     assert [(a["sequence"], a.get("dropped"), a.get("gap")) for a in found] == [
         (1, None, None), (5, 3, None), (9, 1, 2)

@@ -18,7 +18,6 @@ from websockets.exceptions import InvalidStatus
 
 from benchmarks.kills import postgres
 from benchmarks.streams import lines_of, survived, system
-from inference.tracking.state import state_to_bytes
 from service.app import create_app
 from service.border.keys import new_key, write_keys
 from service.border.traces import Traces
@@ -328,7 +327,7 @@ def test_after_an_upgrade_a_stream_is_gone_and_says_so(store: StreamStore) -> No
     """The form of the tracker's state changes; nobody has sent a state that could be wrong."""
     request = json.dumps(system()).encode()
     model = model_of(request)
-    assert place_of(store.add("a", "k", request, state_to_bytes(model.first)), model).sequence == -1
+    assert place_of(store.add("a", "k", request, model.to_bytes(model.first)), model).sequence == -1
     with pytest.raises(GoneError, match="another version"):
         place_of(store.add("b", "k", request, b"a state in another form"), model)
 
