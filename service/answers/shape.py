@@ -101,6 +101,9 @@ def _json_type(
 ) -> Any:
     """Return what a field of some type is in JSON."""
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if hasattr(origin, "__value__"):
+        # an alias by name, as NDArray is from numpy 2.5 on
+        return _json_type(origin.__value__[arguments], shapes, known)
     if dataclasses.is_dataclass(hint):
         return _model_of(hint, shapes, known, {})
     if origin is np.ndarray:

@@ -11,6 +11,7 @@ import jsonschema
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from typing_extensions import TypeAliasType, TypeVar
 
 from service.answers.shape import Shape, model_of
 from service.app import create_app
@@ -134,6 +135,19 @@ def test_a_model_is_what_the_dataclass_says() -> None:
     }
     for name, value in bad.items():
         assert not check.is_valid(GOOD | {name: value}), name
+
+
+Element = TypeVar("Element", bound=np.generic)
+Named = TypeAliasType("Named", NDArray[Element], type_params=(Element,))
+
+
+def test_an_array_by_another_name_is_an_array() -> None:
+    """What NDArray itself is from numpy 2.5 on, which takes Python 3.12."""
+    kind = dataclasses.make_dataclass("Kind", [("values", Named[np.float64])])
+    good = {"values": [1.0, None]}
+    assert model_of(kind, {}).model_validate(good, strict=True).model_dump() == good
+    with pytest.raises(ValueError, match="values"):
+        model_of(kind, {}).model_validate({"values": "x"}, strict=True)
 
 
 def test_a_shape_names_what_is_there() -> None:
