@@ -21,7 +21,7 @@ from simulator.sensor import PulsedSensor, parse_sensor
 from tests.extreme.sturm import roots_between, value
 from tests.extreme.tally import Tally
 
-__all__ = ["FAMILIES", "Extreme", "extremes", "tally"]
+__all__ = ["FAMILIES", "Extreme", "extremes", "root_error", "tally"]
 
 Array = NDArray[np.float64]
 EPSILON = float(np.finfo(float).eps)
@@ -275,9 +275,8 @@ def tally(technique: str, scenes: int, frames: int, rng: np.random.Generator) ->
                 else:
                     total.wrong.append((e, (w1, w2), count, exact))
                 continue
-            p = FAMILIES[technique](e, Fraction(w1), Fraction(w2))
             for root in result.roots_m[n, :count].tolist():
-                error = _error(p, _sizes(e, p, w1, w2), Fraction(root))
+                error = root_error(e, w1, w2, root)
                 if error > total.worst:
                     total.worst, total.where = error, (e, (w1, w2), root)
     return total
@@ -291,7 +290,10 @@ def _end(e: Extreme) -> Fraction | None:
     return Fraction(e.sensor.r0)
 
 
-def _error(p: Sequence[Fraction], sizes: Sequence[Fraction], r: Fraction) -> float:
+def root_error(e: Extreme, w1: float, w2: float, root: float) -> float:
+    """Return how far a root is off, in units of its condition times rounding."""
+    p, r = FAMILIES[e.technique](e, Fraction(w1), Fraction(w2)), Fraction(root)
+    sizes = _sizes(e, p, w1, w2)
     n = len(p) - 1
     slope = r * value([c * (n - k) for k, c in enumerate(p[:-1])], r)
     size = value(sizes, r)

@@ -23,7 +23,9 @@ GOOD: dict[str, Any] = {
     "scene": {"object": {"c0": 1.0, "c1": 0.1, "c2": 0.1}, "discrepancy": None},
     "frames": {"w1": [0.01], "w2": [1.5]},
 }
-VALUES: st.SearchStrategy[Any] = st.sampled_from([None, True, False, 1, 1.0, 0, 0.0, -0.0, float("nan"), "1", [], {}])
+VALUES: st.SearchStrategy[Any] = st.sampled_from(
+    [None, True, False, 1, 1.0, 0, 0.0, -0.0, float("nan"), "1", [], {}]
+)
 PLACES = st.sampled_from(
     [
         ("scene", "discrepancy"),

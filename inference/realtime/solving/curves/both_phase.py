@@ -95,9 +95,11 @@ def residual(u: float, top: float, bottom: float, p: CurveParameters) -> float:
 
     The solver's intervals turn by less than a right angle, so that it has the sign of the angle.
     """
-    x, y = direction(u, p)
-    turn = p.wave * u - top / bottom
-    return x * math.sin(turn) + y * math.cos(turn)
+    target = top / bottom
+    turn = p.wave * u - target
+    own = log_slope(u, p.c0, p.c1) * math.sin(turn) + p.wave * u * math.cos(turn)
+    # the wall's angle is the same everywhere
+    return own + background_rate(u, p) * math.sin(p.wave * p.distance - target)
 
 
 @compiled

@@ -47,12 +47,10 @@ def turning(u: float, p: CurveParameters) -> float:
     b = log_slope(u, p.c0, p.c1)
     bend = object_bend(u, b, p)
     rate, rate_bend = background_rates(u, p)
-    # of (x, y - R x), which turns alike and whose second part is the object's alone: a wall that
-    # outshines it would leave nothing but rounding
-    x, y = b + rate, u * (1.0 + b) - p.distance * b
-    dx = bend + rate_bend
-    dy = u * (2.0 * b + bend) - p.distance * bend
-    return x * dy - y * dx
+    # of object and wall; what the wall alone has is zero, and would be nothing but rounding
+    y, dy = u * (1.0 + b), u * (2.0 * b + bend)
+    own = b * dy - y * bend
+    return own + rate * (dy - p.distance * bend) + rate_bend * (p.distance * b - y)
 
 
 @compiled
@@ -87,8 +85,10 @@ def guess(top: float, bottom: float, p: CurveParameters) -> float:  # noqa: ARG0
 @compiled
 def residual(u: float, top: float, bottom: float, p: CurveParameters) -> float:
     """Return numerator bottom - denominator top, which has no pole."""
-    x, y = direction(u, p)
-    return y * bottom - x * top
+    b = log_slope(u, p.c0, p.c1)
+    own = u * (1.0 + b) * bottom - b * top
+    # q = R to within rounding leaves the wall nothing
+    return own + background_rate(u, p) * (p.distance * bottom - top)
 
 
 @compiled
