@@ -4,6 +4,8 @@ import argparse
 import csv
 import dataclasses
 import json
+import os
+import resource
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -12,7 +14,7 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from benchmarks.mutations.faults import Fault, read_faults, wrong_with
-from benchmarks.mutations.trial import Result, copied, failing_of, result_of, try_fault
+from benchmarks.mutations.trial import LONGEST_S, Result, copied, failing_of, result_of, try_fault
 from benchmarks.resumable import code_version
 from service.whole_files import write_whole
 
@@ -89,6 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--named-only", action="store_true", help="not the fast suite where the named tests pass"
     )
+    parser.add_argument("--nice", type=int, default=19, help="how low the priority is")
     parser.add_argument("--clean", action="store_true", help="run the named tests without a fault")
     asked = parser.parse_args(arguments)
     faults, out = read_faults(), asked.out.resolve()
@@ -96,6 +99,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if wrong:
         print("\n".join(wrong), file=sys.stderr)
         return 2
+    os.nice(asked.nice)
+    # processes inherit it, and what waits for them uses next to none
+    resource.setrlimit(resource.RLIMIT_CPU, (LONGEST_S, LONGEST_S + 60))
     if asked.clean:
         tests = {test for fault in faults for test in fault.tests}
         with copied(ROOT) as tree:

@@ -5,7 +5,6 @@ import dataclasses
 import json
 import os
 import re
-import resource
 import shutil
 import subprocess
 import sys
@@ -16,11 +15,13 @@ from pathlib import Path
 
 from benchmarks.mutations.faults import Fault, planted
 
-__all__ = ["Result", "copied", "failing_of", "result_of", "try_fault"]
+__all__ = ["LONGEST_S", "Result", "copied", "failing_of", "result_of", "try_fault"]
 
 _LEFT_OUT = (".git", ".venv", "__pycache__", "out", "build", "dist", ".*_cache", ".hypothesis")
-# of a process, after which it counts as hanging
-_LONGEST_S = 900
+# seconds of a process, after which a fault counts as hanging it
+LONGEST_S = 900
+# of pytest: what the tests need; to load all that is installed takes longer than most tests
+_PLUGINS = ("anyio", "hypothesispytest", "xdist")
 _FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
 _NAMED, _ALL = "named tests", "fast suite"
 # pytest: tests failed, and collecting them did; all else is no verdict on the fault
@@ -61,13 +62,8 @@ def copied(root: Path) -> Iterator[Path]:
         yield tree
 
 
-def _limited() -> None:
-    os.nice(19)
-    resource.setrlimit(resource.RLIMIT_CPU, (_LONGEST_S, _LONGEST_S))
-
-
 def _failing(tree: Path, arguments: Sequence[str], cache: Path) -> str | None:
-    """Run tests of a tree at low priority; return the first that fails, None where none does.
+    """Run tests of a tree; return the first that fails, None where none does.
 
     Raises
     ------
@@ -78,11 +74,13 @@ def _failing(tree: Path, arguments: Sequence[str], cache: Path) -> str | None:
     own = {
         "PYTHONPATH": str(tree),
         "PYTHONDONTWRITEBYTECODE": "1",
+        "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
         "XDG_CACHE_HOME": str(cache),
         "OPENBLAS_NUM_THREADS": "1",
         "OMP_NUM_THREADS": "1",
     }
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *arguments]
+    plugins = [part for name in (*_PLUGINS, "no:cacheprovider") for part in ("-p", name)]
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "--tb=line", *plugins, *arguments]
     done = subprocess.run(  # noqa: S603
         command,
         cwd=tree,
@@ -90,12 +88,11 @@ def _failing(tree: Path, arguments: Sequence[str], cache: Path) -> str | None:
         capture_output=True,
         text=True,
         check=False,
-        preexec_fn=_limited,
     )
     if done.returncode == _PASSED:
         return None
     if done.returncode in _KILLED:
-        return f"hangs: more than {_LONGEST_S} s of processor time"
+        return f"hangs: more than {LONGEST_S} s of processor time"
     found = _FAILED.search(done.stdout)
     if done.returncode not in _NOTICED or found is None:
         raise RuntimeError(f"pytest ended with {done.returncode}: {done.stdout[-2000:]}")
