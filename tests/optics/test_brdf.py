@@ -1,6 +1,7 @@
 """Reflectance against published constants, normalisation and the white furnace."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -134,6 +135,23 @@ def test_white_furnace_is_not_exceeded(masking: str, m: float) -> None:
             f = reflect(material, 0, wi[2], wo[2], h[2], tan2, length / 2)
             total += f / wi[2] * math.sin(theta) * wx * wy * math.pi / 4 * math.pi
     assert 0.5 < total < 1.0 + 1e-6
+
+
+@pytest.mark.parametrize("masking", ["v_cavity", "smith", "none"])
+def test_light_takes_the_same_way_back(masking: Any) -> None:
+    """Helmholtz: what is reflected does not change where incidence and exit change places."""
+    packed = pack_material(
+        Material(diffuse=0.3, specular=0.7, roughness=0.6, fresnel=Dielectric(), masking=masking)
+    )
+    # directions in one plane, on both sides of the normal and on one
+    for first, second in ((0.2, -1.3), (0.1, 1.4), (1.2, 1.35)):
+        half = 0.5 * (first + second)
+        between = math.cos(0.5 * (first - second)), math.tan(half) ** 2
+        there, back = (
+            reflect(packed, 0, math.cos(a), math.cos(b), math.cos(half), between[1], between[0])
+            for a, b in ((first, second), (second, first))
+        )
+        assert there == pytest.approx(back, rel=1e-14)
 
 
 def test_mixture_is_the_sum_of_its_parts() -> None:

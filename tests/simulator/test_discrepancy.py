@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from simulator.discrepancy import DISCREPANCY_SD, discrepancy_basis, matern
+from simulator.discrepancy import DISCREPANCY_SD, SLOPE_SD, discrepancy_basis, matern
 from simulator.model_error import FITTED_SHARE, RANGE_ERROR_SD, ModelError
 from simulator.optics.misfit import model_misfit
 from simulator.scene import Scene, parse_scene
@@ -39,6 +39,18 @@ def test_slopes_are_derivatives_and_the_functions_constant_outside() -> None:
     ends = np.array([math.log(0.1), math.log(2.0)])
     np.testing.assert_allclose(basis.values(outside), basis.values(ends), rtol=1e-12)
     assert not basis.slopes(outside).any()
+
+
+def test_the_slope_has_the_stated_size() -> None:
+    """-C''(0), by a difference of a series whose next term is 25 h^2 / 24 of the whole."""
+    h = 1e-4
+    bend = 2.0 * (1.0 - float(matern(np.array(h)))) / h**2
+    assert pytest.approx(bend, rel=1e-6) == SLOPE_SD**2
+    basis = discrepancy_basis(0.1, 2.0)
+    inside = np.linspace(math.log(0.2), math.log(1.0), 40)
+    # functions that are left out have next to no size, but are steep: a few hundredths of the slope
+    drawn = np.square(basis.slopes(inside)).sum(axis=1)
+    assert np.sqrt(drawn).mean() == pytest.approx(SLOPE_SD, rel=0.03)
 
 
 def test_a_prior_without_a_lower_end_has_a_basis() -> None:

@@ -91,6 +91,16 @@ def test_slopes_of_readings_against_differences(wave: tuple[float, float] | None
             assert slope[j] == pytest.approx((up[j] - down[j]) / (2 * h), rel=1e-8, abs=1e-12)
 
 
+@pytest.mark.parametrize("spacing", ["linear", "log"])
+def test_a_radial_way_has_both_of_its_ends(spacing: Any) -> None:
+    way = RadialTrajectory(from_m=0.1, to_m=1.6, frames=5, spacing=spacing, duration_s=2.0)
+    even = [0.1, 0.2, 0.4, 0.8, 1.6] if spacing == "log" else [0.1, 0.475, 0.85, 1.225, 1.6]
+    np.testing.assert_allclose(way.ranges(), even, rtol=1e-14)
+    np.testing.assert_allclose(way.times(), [0.0, 0.5, 1.0, 1.5, 2.0], rtol=1e-15)
+    unhurried = RadialTrajectory(from_m=0.1, to_m=1.6, frames=5)
+    np.testing.assert_allclose(unhurried.times(), [0.0, 0.01, 0.02, 0.03, 0.04], rtol=1e-14)
+
+
 def test_same_seed_same_frames_and_another_seed_others() -> None:
     sensor = parse_sensor(
         {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1e-3, 1e-3]}}
