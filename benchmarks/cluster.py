@@ -61,6 +61,8 @@ class Cluster:
         For a file.
     workers : int
         How many, of one thread each.
+    protocol : str
+        ``tls``, or ``tcp`` without certificates.
 
     Attributes
     ----------
@@ -68,13 +70,15 @@ class Cluster:
         Of a service that is to use them.
     """
 
-    def __init__(self, dask: Mapping[str, str], folder: Path, workers: int) -> None:
+    def __init__(
+        self, dask: Mapping[str, str], folder: Path, workers: int, protocol: str = "tls"
+    ) -> None:
         here = {"PYTHONPATH": str(Path(__file__).parents[1])}
         self._environment = os.environ | here | dict(dask)
         self._ending = threading.Event()
         self._lock = threading.Lock()
         self._parts: dict[str, subprocess.Popen[bytes]] = {}
-        self._address, self._file = "tls://127.0.0.1:0", folder / "scheduler.json"
+        self._address, self._file = f"{protocol}://127.0.0.1:0", folder / "scheduler.json"
         self._start("scheduler")
         while not self._file.exists():
             if self._parts["scheduler"].poll() is not None:
@@ -106,7 +110,7 @@ class Cluster:
         port = address.rpartition(":")[2]
         where = f"{address} --nthreads 1 --no-nanny"
         if kind == "scheduler":
-            where = f"--protocol tls --port {port}"
+            where = f"--protocol {address.partition(':')[0]} --port {port}"
         options = (*where.split(), "--no-dashboard")
         return sys.executable, "-m", f"distributed.cli.dask_{kind}", *options
 
@@ -130,6 +134,16 @@ class Cluster:
                     if part.poll() is not None:
                         self._start(name)
 
+    def pids(self) -> dict[str, int]:
+        """Return the processes that are there by name: scheduler, workers, and those of chunks."""
+        with self._lock:
+            found = {name: part.pid for name, part in self._parts.items()}
+        for name, pid in tuple(found.items()):
+            for child in children(pid):
+                if "spawn_main" in command_of(child):
+                    found[f"process of {name}"] = child
+        return found
+
     def kill(self, rng: random.Random, what: str = "") -> str:
         """Kill the scheduler, a worker, or the process in which a worker computes a chunk.
 
@@ -140,12 +154,7 @@ class Cluster:
         what : str
             With what its name must begin.
         """
-        with self._lock:
-            found = {name: part.pid for name, part in self._parts.items()}
-        for name, pid in tuple(found.items()):
-            for child in children(pid):
-                if "spawn_main" in command_of(child):
-                    found[f"process of {name}"] = child
+        found = self.pids()
         name = rng.choice(sorted(name for name in found if name.startswith(what)))
         with contextlib.suppress(ProcessLookupError):
             os.kill(found[name], 9)

@@ -116,8 +116,12 @@ class Cluster:
             with contextlib.suppress(Exception, CancelledError):
                 future.result()
         with contextlib.suppress(OSError, TimeoutError):
-            self._wait(self._client.close())
+            self._wait(self._let_go())
         self._end_loop()
+
+    async def _let_go(self) -> None:
+        # in its own loop: elsewhere the client takes itself for one that blocks
+        await self._client.close()
 
     def _end_loop(self) -> None:
         self._loop.call_soon_threadsafe(self._loop.stop)

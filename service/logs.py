@@ -104,11 +104,7 @@ class NoSockets(logging.Filter):
     def filter(self, record: logging.LogRecord) -> bool:
         """See `logging.Filter`."""
         said = str(record.msg)
-        return not (
-            '"WebSocket' in said
-            or said.startswith("connection ")
-            or "completing handshake" in said  # of a refusal
-        )
+        return not ('"WebSocket' in said or said.startswith("connection "))
 
 
 def log_config(level: str) -> dict[str, Any]:

@@ -101,8 +101,8 @@ class ProcessPool(Executor):
         Parameters
         ----------
         limit_s : float
-            Processor time of the task [s], without that of compiling; beyond it the process is
-            ended, and the task run again as if it had crashed.
+            Processor time of the task [s], without that of compiling and of importing what it
+            needs; beyond it the process is ended, and the task run again as if it had crashed.
         fn, *args
             As of `submit`.
         """
@@ -121,10 +121,7 @@ class ProcessPool(Executor):
         return future
 
     def submit_once(self, limit_s: float, fn: Callable[..., R], /, *args: Any) -> Future[R]:
-        """Hand over a task as `submit_within` does, whose future raises `OverdueError` beyond it.
-
-        The first task of a process has some seconds more, for its imports.
-        """
+        """Hand over a task as `submit_within` does; beyond it the future raises `OverdueError`."""
         return self._submit(Watch(limit_s, self._stall_s, again=False), fn, *args)
 
     def compiling(self, future: Future[Any]) -> bool:

@@ -12,7 +12,9 @@ from typing import Any
 import h11
 import uvicorn
 from fastapi import FastAPI
+from uvicorn._types import ASGISendEvent
 from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from service.errors import MalformedError, ServiceError, SlowClientError
 from service.problems import response_of
@@ -147,6 +149,18 @@ class _Bounded(H11Protocol):
         self.transport.close()
 
 
+class _Sockets(WebSocketsSansIOProtocol):
+    """A WebSocket, or an answer by HTTP that there is none.
+
+    uvicorn takes the latter for a handshake that was forgotten, and logs an error.
+    """
+
+    async def send(self, message: ASGISendEvent) -> None:
+        await super().send(message)
+        if message["type"] == "websocket.http.response.body" and self.close_sent:
+            self.handshake_complete = True
+
+
 def server_of(app: FastAPI, settings: ServiceSettings, **more: Any) -> uvicorn.Server:
     """Return a server of an application, not yet running.
 
@@ -168,6 +182,7 @@ def server_of(app: FastAPI, settings: ServiceSettings, **more: Any) -> uvicorn.S
         # nothing depends on who a proxy says that a client is
         proxy_headers=False,
         # a message is a line, or a few
+        ws=_Sockets,
         ws_max_size=_MESSAGE,
         ws_per_message_deflate=False,
         # an open connection must not hold up the end

@@ -33,7 +33,8 @@ THREAD_VARIABLES = (
 def work(pipe: "Connection[object, object]") -> None:
     """Run tasks from a pipe and send back ``(True, result)`` or ``(False, exception)``.
 
-    Before it there may be any number of ``(COMPILING, True or False)``.
+    Before it there are any number of ``(COMPILING, True or False)``, the first when the task
+    begins.
 
     Parameters
     ----------
@@ -56,6 +57,7 @@ def work(pipe: "Connection[object, object]") -> None:
         except Exception as error:
             answer: tuple[bool, object] = (False, _portable(error))
         else:
+            pipe.send((COMPILING, False))  # what it needs is imported, and its own time begins
             watch_compiling(lambda going: pipe.send((COMPILING, going)))
             answer = run(task)
         try:

@@ -16,8 +16,7 @@ from service.worker import COMPILING, THREAD_VARIABLES, work
 __all__ = ["DiedError", "Watch", "WorkerProcess"]
 
 _LOOK_S = 0.5
-# what the first task of a process may take beyond its limit, where it has one try: it imports what
-# it needs
+# what a process may take until it has a task: it imports what the task needs
 _IMPORTS_S = 15.0
 _environment_lock = threading.Lock()
 
@@ -98,7 +97,6 @@ class WorkerProcess:
         with _one_thread_each():
             self.process.start()
         far.close()  # so that the process's death is the end of the pipe
-        self._fresh = True
 
     @property
     def pid(self) -> int:
@@ -116,12 +114,14 @@ class WorkerProcess:
         """
         try:
             self.pipe.send(task)
+            self._await(watch, watch.limit_s + _IMPORTS_S)
+            spent_s = 0.0
             while True:
-                self._await(watch)
                 answer: Any = self.pipe.recv()
                 if answer[0] != COMPILING:
                     return bool(answer[0]), answer[1]
                 watch.compiling = answer[1]
+                spent_s += self._await(watch, watch.limit_s - spent_s)
         except (EOFError, OSError):
             self.process.join(_LOOK_S)
             own = ended_by_itself(self.process.exitcode)
@@ -129,29 +129,28 @@ class WorkerProcess:
             raise DiedError(f"exit code {self.process.exitcode}", own) from None
         finally:
             watch.compiling = False
-            self._fresh = False
 
-    def _await(self, watch: Watch) -> None:
-        """Return when there is something to receive.
+    def _await(self, watch: Watch, left_s: float) -> float:
+        """Wait until there is something to receive; return the processor time that counts [s].
 
         On a loaded machine wall time tells nothing: what runs at all takes processor time.
         """
-        limit_s = watch.limit_s + (_IMPORTS_S if self._fresh and not watch.again else 0.0)
         began = self._clock()
         seen, since = began, time.monotonic()
-        while not self.pipe.poll(_LOOK_S):
+        while left_s < 0.0 or not self.pipe.poll(_LOOK_S):
             used, now = self._clock(), time.monotonic()
             if used > seen:
                 seen, since = used, now
             if watch.compiling:
                 began = used
-            if used - began > limit_s:
+            if used - began > left_s:
                 self.end(kill=True)
                 message = f"more than {watch.limit_s:.0f} s of processor time"
                 raise DiedError(message, own=True, overdue=True)
             if now - since > watch.stall_s:
                 self.end(kill=True)
                 raise DiedError(f"stood still for {watch.stall_s:.0f} s", own=False)
+        return 0.0 if watch.compiling else self._clock() - began
 
     def _clock(self) -> float:
         used = processor_time(self.pid)

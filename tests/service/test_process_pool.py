@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from service import process_pool
-from service.errors import WorkerDiedError
+from service.errors import OverdueError, WorkerDiedError
 from service.process_pool import ProcessPool
 from service.process_watch import ended_by_itself
 from service.worker import THREAD_VARIABLES
@@ -88,6 +88,25 @@ def test_task_that_takes_more_than_its_limit_is_given_up() -> None:
     with ProcessPool(1) as pool:
         with pytest.raises(WorkerDiedError, match="processor time"):
             pool.submit_within(0.1, _spin).result()
+        assert pool.submit(_pid, 0).result()
+
+
+def _compile_and_spin() -> None:
+    """Never compile, nor compute, for long at a time."""
+    from simulator.processor_time import _watch
+
+    while True:
+        _watch.begin()
+        _watch.end()
+        until = time.process_time() + 0.02
+        while time.process_time() < until:
+            pass
+
+
+def test_each_compiling_is_no_new_beginning() -> None:
+    with ProcessPool(1) as pool:
+        with pytest.raises(OverdueError, match="processor time"):
+            pool.submit_once(0.5, _compile_and_spin).result()
         assert pool.submit(_pid, 0).result()
 
 
