@@ -114,7 +114,7 @@ def exact(number: int) -> Case:
 
 def _light(sensor: Sensor, shape: Array, range_m: float) -> tuple[float, float]:
     c0, c1, c2 = shape.tolist()
-    flux = sensor.gain * c0 * c2 / (range_m**2 * (range_m**2 + c1 * range_m + c0))
+    flux = sensor.known_gain * c0 * c2 / (range_m**2 * (range_m**2 + c1 * range_m + c0))
     return _of_flux(sensor, flux, range_m)
 
 

@@ -106,8 +106,8 @@ def estimate_planned(
         reason = ELSEWHERE.get(name)
         if reason is None:
             # a fit over many frames asks the frames alone
-            stated = centre(sensor, scene) if name in TECHNIQUES else scene
-            reason = obstacle(ALL_TECHNIQUES[name], sensor, stated, known_of(stated), frames)
+            of, stated = centre(sensor, scene) if name in TECHNIQUES else (sensor, scene)
+            reason = obstacle(ALL_TECHNIQUES[name], of, stated, known_of(stated, of), frames)
         found = LeftOut(name, reason) if reason else _run(sensor, scene, frames, name)
         if isinstance(found, LeftOut):
             left_out[name] = found
@@ -136,18 +136,18 @@ def _taken(result: TechniqueResult, seconds: float) -> TechniqueResult:
 def _solved(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> TechniqueResult:
     solve = ALL_TECHNIQUES[name].solve
     if scene.joint is None or name not in TECHNIQUES:
-        return solve(Task(sensor, scene, frames, known_of(scene)))
+        return solve(Task(sensor, scene, frames, known_of(scene, sensor)))
 
-    def at(stated: Scene) -> TechniqueResult:
-        known = known_of(stated)
-        reason = obstacle(ALL_TECHNIQUES[name], sensor, stated, known, frames)
+    def at(of: Sensor, stated: Scene) -> TechniqueResult:
+        known = known_of(stated, of)
+        reason = obstacle(ALL_TECHNIQUES[name], of, stated, known, frames)
         if reason is not None:
             raise RefusedError(f"a standard deviation off the scene's centre it {reason}")
-        return solve(Task(sensor, stated, frames, known, physical=False))
+        return solve(Task(of, stated, frames, known, physical=False))
 
-    middle = centre(sensor, scene)
-    result = solve(Task(sensor, middle, frames, known_of(middle)))
-    pairs = ((at(plus), at(minus)) for plus, minus in around(sensor, scene))
+    of, middle = centre(sensor, scene)
+    result = solve(Task(of, middle, frames, known_of(middle, of)))
+    pairs = ((at(*plus), at(*minus)) for plus, minus in around(sensor, scene))
     return with_shared_error(result, pairs)
 
 
@@ -177,8 +177,8 @@ def all_roots(
     """
     if technique not in TECHNIQUES:
         raise InvalidInputError.at("/technique", f"{technique!r} is not a real-time technique")
-    scene = centre(sensor, scene)
-    known = known_of(scene)
+    sensor, scene = centre(sensor, scene)
+    known = known_of(scene, sensor)
     reason = obstacle(TECHNIQUES[technique], sensor, scene, known, frames)
     if reason is not None:
         raise InvalidInputError.at("/technique", reason)

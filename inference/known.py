@@ -5,6 +5,7 @@ import math
 
 from simulator.remembered import remembered
 from simulator.scene import Quantity, Reference, Scene, Stroke
+from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = ["Known", "known_of"]
 
@@ -21,7 +22,8 @@ class Known:
     crosstalk : (float, float) or None
         What to subtract from the readings; None where it is unknown.
     support : (float, float)
-        Where the scene's ``range_m`` has mass [m]; (0, inf) where it is not given.
+        Where the scene's ``range_m`` has mass [m]; (0, inf) where it is not given. Of a pulse with
+        a timing offset, where the late window is neither empty nor the whole pulse as well.
     """
 
     numbers: dict[str, float]
@@ -44,13 +46,15 @@ class Known:
 
 
 @remembered
-def known_of(scene: Scene) -> Known:
+def known_of(scene: Scene, sensor: Sensor | None = None) -> Known:
     """Collect the known numbers of a scene.
 
     Parameters
     ----------
     scene : Scene
         The scene; an optional term may be absent, so that none of its numbers counts as known.
+    sensor : Sensor, optional
+        Its timing offset cuts the support.
 
     Returns
     -------
@@ -86,4 +90,7 @@ def known_of(scene: Scene) -> Known:
     elif scene.range_m is not None:
         distribution = scene.range_m.distribution()
         support = (max(distribution.low, 0.0), distribution.high)
+    if isinstance(sensor, PulsedSensor) and isinstance(sensor.timing_offset_s, float | int):
+        shift = sensor.known_shift_m
+        support = (max(support[0], -shift), min(support[1], sensor.r0 - shift))
     return Known(numbers, crosstalk, support)

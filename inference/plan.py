@@ -8,6 +8,7 @@ import numpy as np
 
 from inference.estimates import LeftOut
 from inference.known import Known, known_of
+from inference.realtime.registry import TECHNIQUES as REALTIME
 from inference.technique import Technique
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.errors import listed
@@ -15,7 +16,8 @@ from simulator.frames import Frames
 from simulator.joint_scene import centre
 from simulator.remembered import remembered
 from simulator.scene import Scene
-from simulator.sensor import Sensor, SineWaveSensor
+from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor
+from simulator.sensor_unknowns import GAIN
 
 __all__ = ["Plan", "cheapest", "obstacle", "plan"]
 
@@ -57,6 +59,9 @@ def obstacle(
     """
     if sensor.kind not in technique.kinds:
         return "a sine wave has no late window"
+    of_sensor = _sensor_obstacle(technique, sensor)
+    if of_sensor is not None:
+        return of_sensor
     if technique.differential:
         if technique.uses_background and scene.motion == "tangential":
             return "needs radial motion: a range that does not change leaves the background alone"
@@ -90,6 +95,27 @@ def obstacle(
         return f"needs {listed(missing)} as known numbers"
     if technique.obstacle is not None:
         return technique.obstacle(sensor, scene, known, frames)
+    return None
+
+
+def _sensor_obstacle(technique: Technique, sensor: Sensor) -> str | None:
+    """Return why a technique cannot serve a sensor that is not calibrated, None if it can."""
+    fits = technique.name not in REALTIME
+    if fits and isinstance(sensor, PulsedSensor) and sensor.timing_offset_s is not None:
+        return "fits over many frames take no timing_offset_s; ask a posterior"
+    missing = [
+        path
+        for path in sensor.unknown
+        if fits
+        or (path == GAIN and "object.c2" in technique.needs)
+        # neither w2 nor the modulus depends on when light comes
+        or (path != GAIN and technique.name != "intensity")
+    ]
+    if missing:
+        return (
+            f"needs {listed(missing)} as known numbers: the sensor states priors, and a posterior "
+            "of frames of known range learns them, for a calibrated scene"
+        )
     return None
 
 
@@ -139,8 +165,8 @@ def _planned_for(sensor: Sensor, scene: Scene, n: int, timed: bool, derived: boo
 
 
 def _planned(sensor: Sensor, scene: Scene, frames: Frames | None) -> Plan:
-    scene = centre(sensor, scene)
-    known = known_of(scene)
+    sensor, scene = centre(sensor, scene)
+    known = known_of(scene, sensor)
     obstacles = {
         name: obstacle(technique, sensor, scene, known, frames)
         for name, technique in ALL_TECHNIQUES.items()

@@ -87,7 +87,7 @@ def aliases_of(sensor: Sensor, scene: Scene) -> float:
     if isinstance(sensor, PulsedSensor) or scene.background is None:
         return 1.0
     if scene.joint is not None:
-        return max(aliases_of(sensor, each) for pair in around(sensor, scene) for each in pair)
+        return max(aliases_of(*each) for pair in around(sensor, scene) for each in pair)
     distance = scene.background.distance_m
     if not isinstance(distance, float | int):
         return 1.0

@@ -40,6 +40,7 @@ def priors_of(sensor: Sensor, scene: Scene) -> dict[str, Prior | None]:
         quantities["background.distance_m"] = scene.background.distance_m
         if not scene.shadow_is_object and scene.shadow is not None:
             quantities["background.shadow.c0"], quantities["background.shadow.c1"] = scene.shadow
+    quantities |= sensor.quantities
     return {path: value for path, value in quantities.items() if not isinstance(value, float | int)}
 
 

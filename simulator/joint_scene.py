@@ -1,4 +1,4 @@
-"""A scene with a joint law as scenes of known numbers: at its centre, and around it.
+"""A scene with a joint law, and its sensor, in known numbers: at its centre, and around it.
 
 Plans, techniques and requests ask for both again and again: those of the last scenes are kept.
 """
@@ -19,8 +19,8 @@ __all__ = ["around", "centre"]
 Array = NDArray[np.float64]
 
 
-def centre(sensor: Sensor, scene: Scene) -> Scene:
-    """Return the scene with the numbers at the centre of its joint law.
+def centre(sensor: Sensor, scene: Scene) -> tuple[Sensor, Scene]:
+    """Return sensor and scene with the numbers at the centre of the scene's joint law.
 
     Parameters
     ----------
@@ -29,27 +29,29 @@ def centre(sensor: Sensor, scene: Scene) -> Scene:
 
     Returns
     -------
-    Scene
-        Without a joint law; the scene itself where it has none.
+    (Sensor, Scene)
+        Without a joint law; they themselves where the scene has none.
 
     Raises
     ------
     RefusedError
         Where a number is beyond what can be computed with.
     """
-    return scene if scene.joint is None else _centre(sensor, scene)
+    return (sensor, scene) if scene.joint is None else _centre(sensor, scene)
 
 
 @functools.lru_cache(maxsize=16)
-def _centre(sensor: Sensor, scene: Scene) -> Scene:
+def _centre(sensor: Sensor, scene: Scene) -> tuple[Sensor, Scene]:
     parameters = parameters_of(sensor, scene)
     origin = np.zeros((1, len(parameters)))
     return _at(sensor, scene, parameters.names, parameters.natural(origin)[0])
 
 
 @functools.lru_cache(maxsize=16)
-def around(sensor: Sensor, scene: Scene) -> tuple[tuple[Scene, Scene], ...]:
-    """Return scenes a standard deviation off the centre on either side, a pair a direction.
+def around(
+    sensor: Sensor, scene: Scene
+) -> tuple[tuple[tuple[Sensor, Scene], tuple[Sensor, Scene]], ...]:
+    """Return both a standard deviation off the centre on either side, a pair a direction.
 
     The directions are independent of one another under the joint law.
 
@@ -60,7 +62,7 @@ def around(sensor: Sensor, scene: Scene) -> tuple[tuple[Scene, Scene], ...]:
 
     Returns
     -------
-    tuple of (Scene, Scene)
+    tuple of ((Sensor, Scene), (Sensor, Scene))
         Without joint laws.
 
     Raises
@@ -79,7 +81,9 @@ def around(sensor: Sensor, scene: Scene) -> tuple[tuple[Scene, Scene], ...]:
     )
 
 
-def _at(sensor: Sensor, scene: Scene, names: tuple[str, ...], values: Array) -> Scene:
+def _at(
+    sensor: Sensor, scene: Scene, names: tuple[str, ...], values: Array
+) -> tuple[Sensor, Scene]:
     """Put numbers in place of what the joint law names."""
     assert scene.joint is not None  # noqa: S101  # its callers have seen to it
     numbers = {
@@ -104,9 +108,9 @@ def _at(sensor: Sensor, scene: Scene, names: tuple[str, ...], values: Array) -> 
     changes: dict[str, object] = {"joint": None, "calibration": None}
     changes["object"] = scene.object.model_copy(update=of("object."))
     if scene.crosstalk_values is not None:
-        given = of("crosstalk.")
+        light = of("crosstalk.")
         changes["crosstalk"] = tuple(
-            given.get(column, value)
+            light.get(column, value)
             for column, value in zip(sensor.columns, scene.crosstalk_values, strict=True)
         )
     if scene.background is not None:
@@ -115,4 +119,6 @@ def _at(sensor: Sensor, scene: Scene, names: tuple[str, ...], values: Array) -> 
         if shadow and isinstance(scene.background.shadow, Shadow):
             update["shadow"] = scene.background.shadow.model_copy(update=shadow)
         changes["background"] = scene.background.model_copy(update=update)
-    return scene.model_copy(update=changes)
+    given = of("sensor.")
+    known = sensor.model_copy(update=given) if given else sensor
+    return known, scene.model_copy(update=changes)

@@ -11,7 +11,7 @@ from numba.core import caching, sigutils
 from simulator.compile_lock import turn
 from simulator.kernel_cache import CacheFolder, base_folder
 
-__all__ = ["dispatcher", "is_none", "overload", "unliteral"]
+__all__ = ["dispatcher", "is_none", "is_number", "overload", "unliteral"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 # numba's classes carry no types, and its stubs know a part of its options
@@ -34,6 +34,11 @@ def overload(function: Callable[..., Any]) -> Callable[[F], F]:
 def is_none(kind: object) -> bool:
     """Tell whether a type is that of None."""
     return kind is types.none
+
+
+def is_number(kind: object) -> bool:
+    """Tell whether a type is that of a number."""
+    return isinstance(kind, types.Number)
 
 
 class _Locator(_CacheLocator):  # type: ignore[misc]

@@ -43,8 +43,9 @@ def check_drawn(scene: Scene, drawn: Mapping[str, float]) -> None:
                 members.insert(0, "values")
         elif term == "range_m":
             members = []
+        where = ["/sensor"] if term == "sensor" else ["/scene", term]
         raise InvalidInputError.at(
-            "/".join(["/scene", term, *members]), f"a value drawn from the prior {_BEYOND}"
+            "/".join([*where, *members]), f"a value drawn from the prior {_BEYOND}"
         )
 
 
@@ -60,7 +61,7 @@ def check_readings(
     Parameters
     ----------
     sensor : Sensor
-        The sensor.
+        The sensor, nothing of it unknown.
     trajectory : RadialTrajectory or SampledTrajectory
         The trajectory.
     factor : ndarray, shape (n,)
@@ -102,5 +103,5 @@ def check_readings(
         where = "from_m" if 2 * frame < moments.shape[0] else "to_m"
     raise InvalidInputError.at(
         f"/trajectory/{where}",
-        f"the reading of frame {frame} {_BEYOND} at a gain of {sensor.gain:g}",
+        f"the reading of frame {frame} {_BEYOND} at a gain of {sensor.known_gain:g}",
     )

@@ -18,6 +18,7 @@ from simulator.range_prior import RangePrior, range_prior, range_prior_rows, str
 from simulator.scene import Reference, Scene, Stroke
 from simulator.scene_checks import check_scene
 from simulator.sensor import PulsedSensor, Sensor
+from simulator.sensor_unknowns import add_sensor, sensor_terms
 from simulator.unknowns import Unknown, Values, add_quantity, add_reflectance, add_shape
 
 __all__ = ["OFFSET", "Parameters", "Terms", "Unknown", "parameters_of", "with_offset"]
@@ -49,6 +50,11 @@ class Terms:
         - ((log r - a4) a5)^2 / 2 on [a6, a7] [m].
     offset : ndarray, shape (n,), optional
         Range at a displacement of zero [m].
+    gain : ndarray, shape (n,), optional
+        Of the sensor where it is unknown [reading units m^2].
+    lag : ndarray, shape (n,), optional
+        Of the sensor where it is unknown (`simulator.sensor_unknowns`): a phase [rad], or of a
+        pulse a length [m].
     """
 
     object: Array
@@ -56,6 +62,8 @@ class Terms:
     background: Array | None
     ranges: Array
     offset: Array | None = None
+    gain: Array | None = None
+    lag: Array | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -165,6 +173,7 @@ class Parameters:
             background,
             range_prior_rows(self.range_prior, values, background, z.shape[0]),
             values.get(OFFSET),
+            *sensor_terms(values),
         )
 
     def sample(self, rng: np.random.Generator, n: int) -> Array:
@@ -224,7 +233,7 @@ def parameters_of(sensor: Sensor, scene: Scene) -> Parameters:
     Returns
     -------
     unknowns : Parameters
-        In the order object, crosstalk, background, shadow, stroke.
+        In the order object, crosstalk, background, shadow, sensor, stroke.
 
     Raises
     ------
@@ -253,6 +262,7 @@ def parameters_of(sensor: Sensor, scene: Scene) -> Parameters:
         shadow = scene.shadow
         if shadow is not None and not scene.shadow_is_object:
             add_shape("background.shadow", shadow[0], shadow[1], known, unknowns)
+    add_sensor(sensor, known, unknowns)
     prior = range_prior(sensor, scene)
     if isinstance(prior, Stroke):
         unknowns += stroke_unknowns(prior)

@@ -5,15 +5,20 @@ does not read ``r0``), ``background`` for a scene without one.
 """
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 from simulator.background import shadow, shadow_slope
-from simulator.compiled import compiled
+from simulator.compiled import compiled, when_compiling
 from simulator.object_model import log_slope, object_flux
+from simulator.sensor import Reach
 
 __all__ = [
     "background_readings",
     "background_slopes",
     "covariance",
+    "late_rate",
+    "late_share",
     "noise_parts",
     "object_readings",
     "object_slopes",
@@ -22,9 +27,73 @@ __all__ = [
 Pair = tuple[float, float]
 
 
+def late_share(r: float, r0: Reach) -> float:
+    """Return the share of an echo from r [m] that is late, min(r / r0, 1) (docs/model.md, 2.33).
+
+    With a timing offset of length s, (r + s) / r0 within 0 and 1 (docs/model.md, sensor-unknowns).
+    The machine code is chosen by the type of ``r0``: of sensors without one it has nothing of it.
+    """
+    if isinstance(r0, tuple):
+        return min(max((r + r0[1]) / r0[0], 0.0), 1.0)
+    return min(r / r0, 1.0)
+
+
+def _late_slopes(flux: float, slope: float, r: float, r0: Reach) -> Pair:
+    """Return r d/dr of both windows of an echo; ``slope`` is that of the log of its flux."""
+    if isinstance(r0, tuple):
+        share = (r + r0[1]) / r0[0]
+        if 0.0 < share < 1.0:
+            return flux * (slope * share + r / r0[0]), flux * slope
+        return (flux * slope if share > 0.0 else 0.0), flux * slope
+    if r < r0:
+        return flux * (slope + 1.0) * (r / r0), flux * slope
+    return flux * slope, flux * slope
+
+
+def late_rate(r: float, r0: Reach) -> float:
+    """Return how `late_share` changes with r [1/m]."""
+    if isinstance(r0, tuple):
+        return 1.0 / r0[0] if 0.0 < r + r0[1] < r0[0] else 0.0
+    return 1.0 / r0 if r < r0 else 0.0
+
+
+@when_compiling
+def _overload_pulses() -> None:
+    from simulator.machine_code import is_number, overload
+
+    @overload(late_share)
+    def _share(r: Any, r0: Any) -> Callable[..., Any]:  # noqa: ARG001
+        if is_number(r0):
+            return lambda r, r0: min(r / r0, 1.0)
+        return lambda r, r0: min(max((r + r0[1]) / r0[0], 0.0), 1.0)
+
+    @overload(late_rate)
+    def _rate(r: Any, r0: Any) -> Callable[..., Any]:  # noqa: ARG001
+        if is_number(r0):
+            return lambda r, r0: 1.0 / r0 if r < r0 else 0.0
+        return lambda r, r0: 1.0 / r0[0] if 0.0 < r + r0[1] < r0[0] else 0.0
+
+    @overload(_late_slopes)
+    def _slopes(flux: Any, slope: Any, r: Any, r0: Any) -> Callable[..., Any]:  # noqa: ARG001
+        def plain(flux: Any, slope: Any, r: Any, r0: Any) -> Any:
+            if r < r0:
+                return flux * (slope + 1.0) * (r / r0), flux * slope
+            return flux * slope, flux * slope
+
+        def delayed(flux: Any, slope: Any, r: Any, r0: Any) -> Any:
+            share = (r + r0[1]) / r0[0]
+            if 0.0 < share < 1.0:
+                return flux * (slope * share + r / r0[0]), flux * slope
+            if share > 0.0:
+                return flux * slope, flux * slope
+            return 0.0 * flux, flux * slope
+
+        return plain if is_number(r0) else delayed
+
+
 @compiled
 def object_readings(
-    r: float, r0: float, wave: Pair | None, strength: float, c0: float, c1: float
+    r: float, r0: Reach, wave: Pair | None, strength: float, c0: float, c1: float
 ) -> Pair:
     """Return the object's mean readings (w1, w2) or (i, q), crosstalk not included.
 
@@ -32,8 +101,8 @@ def object_readings(
     ----------
     r : float
         Range [m], positive.
-    r0 : float
-        c T_p / 2 of a pulse [m]; late is the share min(r / r0, 1) (docs/model.md, 2.33).
+    r0 : float or (float, float)
+        c T_p / 2 of a pulse [m], and with it the length of a timing offset [m]: `late_share`.
     wave : (float, float) or None
         Wave number k [rad/m] and phase offset [rad] of a sine wave, None for a pulse.
     strength : float
@@ -45,12 +114,12 @@ def object_readings(
     if wave is not None:
         phase = wave[0] * r + wave[1]
         return flux * math.cos(phase), flux * math.sin(phase)
-    return flux * min(r / r0, 1.0), flux
+    return flux * late_share(r, r0), flux
 
 
 @compiled
 def object_slopes(
-    r: float, r0: float, wave: Pair | None, strength: float, c0: float, c1: float
+    r: float, r0: Reach, wave: Pair | None, strength: float, c0: float, c1: float
 ) -> Pair:
     """Return r d/dr of `object_readings`, which is their derivative along log r."""
     flux = object_flux(r, strength, c0, c1)
@@ -59,15 +128,13 @@ def object_slopes(
         phase = wave[0] * r + wave[1]
         cosine, sine, turn = math.cos(phase), math.sin(phase), wave[0] * r
         return flux * (slope * cosine - turn * sine), flux * (slope * sine + turn * cosine)
-    if r < r0:
-        return flux * (slope + 1.0) * (r / r0), flux * slope
-    return flux * slope, flux * slope
+    return _late_slopes(flux, slope, r, r0)
 
 
 @compiled
 def background_readings(
     r: float,
-    r0: float,
+    r0: Reach,
     wave: Pair | None,
     background: tuple[float, float, float, float],
 ) -> Pair:
@@ -88,13 +155,13 @@ def background_readings(
     if wave is not None:
         phase = wave[0] * distance + wave[1]
         return visible * math.cos(phase), visible * math.sin(phase)
-    return visible * min(distance / r0, 1.0), visible
+    return visible * late_share(distance, r0), visible
 
 
 @compiled
 def background_slopes(
     r: float,
-    r0: float,
+    r0: Reach,
     wave: Pair | None,
     background: tuple[float, float, float, float],
 ) -> Pair:
@@ -104,7 +171,7 @@ def background_slopes(
     if wave is not None:
         phase = wave[0] * distance + wave[1]
         return change * math.cos(phase), change * math.sin(phase)
-    return change * min(distance / r0, 1.0), change
+    return change * late_share(distance, r0), change
 
 
 @compiled

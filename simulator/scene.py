@@ -8,7 +8,8 @@ import pydantic
 from simulator.joint import Calibration, Joint
 from simulator.model_error import Discrepancy, ModelError
 from simulator.priors import Prior
-from simulator.validated import Number, Positive, Validated, parse
+from simulator.quantity import Quantity
+from simulator.validated import Positive, Validated, parse
 
 __all__ = [
     "Background",
@@ -24,15 +25,6 @@ __all__ = [
 ]
 
 
-def _kind_of_quantity(value: object) -> str:
-    # anything that is not an object is read as a number, so that the message speaks of numbers
-    return "unknown" if isinstance(value, dict | Validated) else "known"
-
-
-Quantity = Annotated[
-    Annotated[Number, pydantic.Tag("known")] | Annotated[Prior, pydantic.Tag("unknown")],
-    pydantic.Discriminator(_kind_of_quantity),
-]
 Motion = Literal["radial", "tangential", "static"]
 
 

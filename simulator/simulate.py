@@ -13,9 +13,15 @@ from simulator.errors import InvalidInputError
 from simulator.frames import Frames
 from simulator.overflow import check_drawn, check_readings
 from simulator.parameters import Terms, parameters_of
-from simulator.readings import background_readings, noise_parts, object_readings
+from simulator.readings import (
+    background_readings,
+    late_share,
+    noise_parts,
+    object_readings,
+)
 from simulator.scene import Scene
-from simulator.sensor import Sensor, instrument
+from simulator.sensor import Reach, Sensor, instrument
+from simulator.sensor_unknowns import sensor_at
 from simulator.trajectories import RadialTrajectory, SampledTrajectory
 
 __all__ = ["Simulation", "mean_readings", "simulate"]
@@ -49,7 +55,7 @@ def _frame_moments(
     factor: Array,
     late: Array | None,
     gain: float,
-    r0: float,
+    r0: Reach,
     wave: Pair | None,
     shape: tuple[float, float, float],
     crosstalk: Pair | None,
@@ -73,7 +79,7 @@ def _frame_moments(
                     cosine, sine = math.cos(wave[0] * late[i]), math.sin(wave[0] * late[i])
                     o1, o2 = o1 * cosine - o2 * sine, o1 * sine + o2 * cosine
                 else:
-                    o1 = o2 * max(min((ranges[i] + late[i]) / r0, 1.0), 0.0)
+                    o1 = o2 * max(late_share(ranges[i] + late[i], r0), 0.0)
         m1, m2 = o1, o2
         if background is not None:
             b1, b2 = background_readings(ranges[i], r0, wave, background)
@@ -91,13 +97,13 @@ def _moments(
     sensor: Sensor, terms: Terms, ranges: Array, factor: Array, late: Array | None = None
 ) -> Array:
     c0, c1, c2 = terms.object[0].tolist()
-    noise = sensor.noise
+    noise, sensor = sensor.noise, sensor_at(sensor, terms)
     r0, wave = instrument(sensor)
     return _frame_moments(
         ranges,
         factor,
         late,
-        sensor.gain,
+        sensor.known_gain,
         r0,
         wave,
         (c0, c1, c2),
@@ -154,7 +160,8 @@ def simulate(
     Parameters
     ----------
     sensor : Sensor
-        Its noise is added; readings are cut at its full scale.
+        Its noise is added; readings are cut at its full scale. Unknowns are drawn once from their
+        priors.
     scene : Scene
         Unknowns are drawn once from their priors, and so are model errors that it states in
         numbers; its default of them adds nothing.
@@ -201,9 +208,10 @@ def simulate(
             factor = factor * np.exp(_smooth_error(rng, ranges, wrong.flux))
         if wrong.integrated and wrong.range_m > 0:
             late = _smooth_error(rng, ranges, wrong.range_m)
-        moments = _moments(sensor, parameters.terms(z), ranges, factor, late)
+        terms = parameters.terms(z)
+        moments = _moments(sensor, terms, ranges, factor, late)
         readings = moments[:, :2] + _noise(rng, *moments[:, 2:].T)
-    check_readings(sensor, trajectory, factor, moments, readings)
+    check_readings(sensor_at(sensor, terms), trajectory, factor, moments, readings)
     if sensor.full_scale is not None:
         limit = np.asarray(sensor.full_scale)
         readings = np.clip(readings, -limit, limit)

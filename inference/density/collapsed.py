@@ -119,8 +119,16 @@ class CollapsedDensity:
         """
         c0, c1, c2 = terms.object.T
         with np.errstate(over="ignore", invalid="ignore"):
-            shapes = np.column_stack([self.sensor.gain * c0 * c2, c0, c1])
-        return Rows(shapes, terms.crosstalk, terms.background, terms.ranges, offsets=terms.offset)
+            gain = self.sensor.known_gain if terms.gain is None else terms.gain
+            shapes = np.column_stack([gain * c0 * c2, c0, c1])
+        return Rows(
+            shapes,
+            terms.crosstalk,
+            terms.background,
+            terms.ranges,
+            offsets=terms.offset,
+            lags=terms.lag,
+        )
 
     def integral_rows(self, terms: Terms) -> Rows:
         """Return parameter vectors for kernels that integrate ranges out, or draw them."""
@@ -185,6 +193,9 @@ class CollapsedDensity:
         for part in (terms.crosstalk, terms.background):
             if part is not None:
                 good &= np.isfinite(part).all(axis=1)
+        for values in (terms.gain, terms.lag):
+            if values is not None:
+                good &= np.isfinite(values)
         if good.all():
             out = self._of_terms(terms)
         elif good.any():

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulator.compiled import compiled, when_compiling
-from simulator.sensor import Sensor, instrument
+from simulator.sensor import Reach, Sensor, instrument
 
 __all__ = [
     "Background",
@@ -41,8 +41,9 @@ class Instrument(NamedTuple):
 
     Attributes
     ----------
-    r0 : float
-        c T_p / 2 of a pulse [m]; 0 for a sine wave, which does not read it.
+    r0 : float or (float, float)
+        c T_p / 2 of a pulse [m], and with it the length of a timing offset where the sensor has one
+        (`simulator.readings.late_share`); 0 for a sine wave, which does not read it.
     wave : (float, float) or None
         Wave number [rad/m] and phase offset [rad] of a sine wave; None for a pulse.
     read : (float, float)
@@ -53,7 +54,7 @@ class Instrument(NamedTuple):
         Standard deviation of a common relative error of the object's signal.
     """
 
-    r0: float
+    r0: Reach
     wave: Pair | None
     read: Pair
     shot: float | None
@@ -184,6 +185,9 @@ class Rows(NamedTuple):
         First knot and rate of all of them.
     offsets : ndarray, shape (n,), or None
         As `FrameScene.offset`.
+    lags : ndarray, shape (n,), or None
+        Of the sensor, in place of its phase offset [rad] or the length of its timing offset [m],
+        where that is unknown.
     """
 
     shapes: Array
@@ -194,6 +198,7 @@ class Rows(NamedTuple):
     flux_errors: Array | None = None
     flux_grid: Pair | None = None
     offsets: Array | None = None
+    lags: Array | None = None
 
 
 def instrument_of(sensor: Sensor) -> Instrument:
@@ -221,6 +226,7 @@ def row_of(rows: Rows, i: int) -> Rows:
         None if rows.flux_errors is None else rows.flux_errors[one],
         rows.flux_grid,
         None if rows.offsets is None else rows.offsets[one],
+        None if rows.lags is None else rows.lags[one],
     )
 
 
@@ -243,7 +249,7 @@ def scene_of(rows: Rows, instrument: Instrument, i: int) -> FrameScene:
             priors[i, 7],
             rows.reference,
         ),
-        instrument,
+        _instrument_of(instrument, instrument.r0, instrument.wave, rows.lags, i),
         _flux_error_of(rows.flux_errors, rows.flux_grid, i),
         _offset_of(rows.offsets, i),
     )
@@ -267,6 +273,18 @@ def _offset_of(offsets: Array | None, i: int) -> float | None:
     return None if offsets is None else float(offsets[i])
 
 
+def _instrument_of(
+    of: Instrument, r0: Reach, wave: Pair | None, lags: Array | None, i: int
+) -> Instrument:
+    if lags is None:
+        return of
+    if wave is not None:
+        wave = (wave[0], float(lags[i]))
+    elif isinstance(r0, tuple):
+        r0 = (r0[0], float(lags[i]))
+    return Instrument(r0, wave, of.read, of.shot, of.relative)
+
+
 @when_compiling
 def _overload_members() -> None:
     from simulator.machine_code import is_none, overload
@@ -288,6 +306,18 @@ def _overload_members() -> None:
         if is_none(knots):
             return lambda knots, grid, i: None  # noqa: ARG005
         return lambda knots, grid, i: FluxError(knots[i], grid[0], grid[1])
+
+    @overload(_instrument_of)
+    def _instrument(of: Any, r0: Any, wave: Any, lags: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001
+        if is_none(lags):
+            return lambda of, r0, wave, lags, i: of  # noqa: ARG005
+        if is_none(wave):
+            return lambda of, r0, wave, lags, i: Instrument(  # noqa: ARG005
+                (r0[0], lags[i]), None, of.read, of.shot, of.relative
+            )
+        return lambda of, r0, wave, lags, i: Instrument(  # noqa: ARG005
+            of.r0, (wave[0], lags[i]), of.read, of.shot, of.relative
+        )
 
     @overload(_offset_of)
     def _offset(offsets: Any, i: Any) -> Callable[..., Any]:  # noqa: ARG001

@@ -8,7 +8,14 @@ from numpy.typing import NDArray
 from inference.frame.sensitivity import Value
 from simulator.parameters import Parameters, Terms
 
-__all__ = ["COORDINATES", "coordinate_slopes", "some_of", "term_changes"]
+__all__ = [
+    "COORDINATES",
+    "SENSOR_COORDINATES",
+    "coordinate_slopes",
+    "has_sensor",
+    "some_of",
+    "term_changes",
+]
 
 Array = NDArray[np.float64]
 
@@ -27,8 +34,18 @@ COORDINATES = (
 
 Derivatives are along log c0, c1 / sqrt(c0) with c0 held, log c2, the crosstalk [reading units],
 log B, log R, log c0' and c1' / sqrt(c0') with c0' held, everything else held. A term
-that the scene lacks has columns of zeros.
+that the scene lacks has columns of zeros. Behind them, where something of the sensor is unknown,
+are its `SENSOR_COORDINATES`.
 """
+
+SENSOR_COORDINATES = ("sensor.known_gain", "sensor.lag")
+"""The log of the gain, and the lag: a phase [rad] or a length [m] (`sensor_unknowns`)."""
+
+
+def has_sensor(terms: Terms) -> bool:
+    """Tell whether something of the sensor is unknown."""
+    return terms.gain is not None or terms.lag is not None
+
 
 # the maps from z are smooth and of unit scale: a central difference errs by 1e-10 of itself, and an
 # error of the map multiplies a derivative, it is not added to it
@@ -40,7 +57,9 @@ def some_of(terms: Terms, k: slice) -> Terms:
     crosstalk = None if terms.crosstalk is None else terms.crosstalk[k]
     background = None if terms.background is None else terms.background[k]
     offset = None if terms.offset is None else terms.offset[k]
-    return Terms(terms.object[k], crosstalk, background, terms.ranges[k], offset)
+    gain = None if terms.gain is None else terms.gain[k]
+    lag = None if terms.lag is None else terms.lag[k]
+    return Terms(terms.object[k], crosstalk, background, terms.ranges[k], offset, gain, lag)
 
 
 def term_changes(reference: Terms, plus: Terms, minus: Terms) -> Array:
@@ -55,10 +74,16 @@ def term_changes(reference: Terms, plus: Terms, minus: Terms) -> Array:
 
     Returns
     -------
-    ndarray, shape (9, k)
-        Differences along `COORDINATES`.
+    ndarray, shape (9 or 11, k)
+        Differences along `COORDINATES`, and the sensor's where something of it is unknown.
     """
-    change = np.zeros((len(COORDINATES), plus.object.shape[0]))
+    count = len(COORDINATES)
+    of_sensor = len(SENSOR_COORDINATES) if has_sensor(reference) else 0
+    change = np.zeros((count + of_sensor, plus.object.shape[0]))
+    if plus.gain is not None and minus.gain is not None:
+        change[count] = np.log(plus.gain / minus.gain)
+    if plus.lag is not None and minus.lag is not None:
+        change[count + 1] = plus.lag - minus.lag
     root = math.sqrt(float(reference.object[0, 0]))
     change[Value.C0], change[Value.C2] = np.log(plus.object[:, (0, 2)] / minus.object[:, (0, 2)]).T
     change[Value.C1] = (plus.object[:, 1] - minus.object[:, 1]) / root
@@ -89,7 +114,7 @@ def coordinate_slopes(parameters: Parameters, z: Array) -> tuple[Terms, Array]:
     Returns
     -------
     (Terms, ndarray)
-        Of one vector; shape (9, d), along `COORDINATES`.
+        Of one vector; shape (9 or 11, d), along `COORDINATES` and the sensor's.
     """
     d = z.size
     steps = _STEP * np.concatenate([np.zeros((1, d)), np.eye(d), -np.eye(d)])

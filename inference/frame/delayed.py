@@ -4,13 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.frame.arguments import Pair
+from simulator.sensor import Reach
 
 __all__ = ["delayed"]
 
 Array = NDArray[np.float64]
 
 
-def delayed(light: Array, log_r: Array, r0: float, wave: Pair | None) -> Array:
+def delayed(light: Array, log_r: Array, r0: Reach, wave: Pair | None) -> Array:
     """Return the change of an object's readings with the distance that its light seems to come.
 
     Linear in the light, so that of its slopes or rates it is the change of these.
@@ -32,5 +33,9 @@ def delayed(light: Array, log_r: Array, r0: float, wave: Pair | None) -> Array:
     if wave is not None:
         return wave[0] * np.column_stack([-light[:, 1], light[:, 0]])
     # the late window holds no more than the whole pulse
-    late = np.where(log_r < np.log(r0), light[:, 1] / r0, 0.0)
+    if isinstance(r0, tuple):
+        r = np.exp(log_r) + r0[1]
+        late = np.where((r > 0) & (r < r0[0]), light[:, 1] / r0[0], 0.0)
+    else:
+        late = np.where(log_r < np.log(r0), light[:, 1] / r0, 0.0)
     return np.column_stack([late, np.zeros(log_r.size)])

@@ -22,10 +22,12 @@ from simulator.parameters import Terms
 from simulator.readings import (
     background_readings,
     background_slopes,
+    late_rate,
     object_readings,
     object_slopes,
 )
-from simulator.sensor import Sensor
+from simulator.sensor import Reach, Sensor, instrument
+from simulator.sensor_unknowns import sensor_at
 
 __all__ = [
     "SLOPES",
@@ -151,13 +153,13 @@ def _add_background(
 
 @compiled
 def _distance_slopes(
-    distance: float, r0: float, wave: tuple[float, float] | None
+    distance: float, r0: Reach, wave: tuple[float, float] | None
 ) -> tuple[float, float]:
     """Return how the readings of one unit of flux change with the distance that it comes from."""
     if wave is not None:
         phase = wave[0] * distance + wave[1]
         return -wave[0] * math.sin(phase), wave[0] * math.cos(phase)
-    return (1.0 / r0 if distance < r0 else 0.0), 0.0
+    return late_rate(distance, r0), 0.0
 
 
 @compiled
@@ -185,8 +187,9 @@ class Sensitivity:
         Mean readings [reading units].
     signal : ndarray, shape (n, 2)
         The object's part of them; zero for a frame without object.
-    by_term : ndarray, shape (n, 2, 9)
-        Derivatives along `inference.frame.coordinates.COORDINATES`.
+    by_term : ndarray, shape (n, 2, 9 or 11)
+        Derivatives along `inference.frame.coordinates.COORDINATES`, and along the gain's log and
+        the lag where something of the sensor is unknown.
     by_range : ndarray, shape (n, 2)
         Derivative along log r; zero for a frame without object.
     """
@@ -225,9 +228,10 @@ def sensitivity(
     Sensitivity
         Not finite where a number overflows.
     """
+    sensor, of_sensor = sensor_at(sensor, terms), terms.gain is not None or terms.lag is not None
     n = log_r.size
     factors = np.ones(n) if gain is None else np.ascontiguousarray(gain)
-    gains = np.full(n, sensor.gain)
+    gains = np.full(n, sensor.known_gain)
     values, scales = np.zeros(Value.LOG_RANGE), np.ones(Value.LOG_RANGE)
     values[: Value.CROSSTALK_1] = terms.object[0]
     if terms.crosstalk is not None:
@@ -249,7 +253,26 @@ def sensitivity(
         if flux_error is not None:
             by_range = by_range + flux_error[1][:, None] * signal
         by_term = slopes[:, : Value.LOG_RANGE, :2].transpose(0, 2, 1) * scales
+        if of_sensor:
+            light = slopes[:, Value.READINGS, :2] - values[Value.CROSSTALK_1 : Value.STRENGTH]
+            lag = _by_lag(sensor, light, signal, np.exp(log_r), values[Value.DISTANCE])
+            by_term = np.concatenate([by_term, np.stack([signal, lag], axis=2)], axis=2)
     return Sensitivity(slopes[:, Value.READINGS, :2], signal, by_term, by_range)
+
+
+def _by_lag(sensor: Sensor, light: Array, signal: Array, r: Array, distance: float) -> Array:
+    """Return how readings change with the sensor's lag, per radian or per metre, shape (n, 2).
+
+    Of the light of object and background together, of which ``signal`` is the object's.
+    """
+    r0, wave = instrument(sensor)
+    if wave is not None:
+        return np.column_stack([-light[:, 1], light[:, 0]])
+    assert isinstance(r0, tuple)  # noqa: S101  # a lag comes with its r0
+    late, behind = r + r0[1], distance + r0[1]
+    of_object = np.where((late > 0) & (late < r0[0]), signal[:, 1], 0.0)
+    of_rest = light[:, 1] - signal[:, 1] if 0 < behind < r0[0] else np.zeros(r.size)
+    return np.column_stack([(of_object + of_rest) / r0[0], np.zeros(r.size)])
 
 
 def whiteners(sensor: Sensor, of: Sensitivity) -> Array:

@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.frame.arguments import Background, RangePrior
-from inference.frame.coordinates import COORDINATES, coordinate_slopes
+from inference.frame.coordinates import COORDINATES, coordinate_slopes, has_sensor
 from inference.frame.sensitivity import Sensitivity, Value, sensitivity, whiteners
 from inference.identifiability.elimination import eliminate
 from inference.identifiability.information import Information
 from simulator.discrepancy import discrepancy_basis
 from simulator.parameters import OFFSET, Parameters, Terms
-from simulator.sensor import Sensor
+from simulator.sensor import Sensor, SineWaveSensor, shift_of
+from simulator.sensor_unknowns import GAIN, PHASE, TIMING, lag_path
 
 __all__ = ["Experiment", "information"]
 
@@ -109,9 +110,14 @@ class Experiment:
         """Unit of each coordinate of `COORDINATES` in which it is dimensionless.
 
         Crosstalk is measured by the light of the scene: the median over the frames of the
-        modulus of the readings without it, for both readings of a sine wave the same.
+        modulus of the readings without it, for both readings of a sine wave the same. The sensor's
+        lag is measured by that of a typical range.
         """
-        units = np.ones(len(COORDINATES))
+        units = np.ones(self._count)
+        if has_sensor(self.terms):
+            # by how much the light of a typical range would have to be late
+            wave = self.sensor.wave_number if isinstance(self.sensor, SineWaveSensor) else 1.0
+            units[-1] = wave * self._typical_m
         if self.terms.crosstalk is not None:
             light = np.abs(self.readings.mean - self.terms.crosstalk[0])
             if self.sensor.kind != "pulsed":
@@ -124,14 +130,14 @@ class Experiment:
 
     @functools.cached_property
     def directions(self) -> Array:
-        """How the coordinates of `COORDINATES` move with each of ``names``, (9, d).
+        """How the coordinates of `COORDINATES` move with each of ``names``, (9 or 11, d).
 
         Along log c0, c1 / sqrt(c0), log c2, the crosstalk in `units`, log B, log R, log c0', c1' /
         sqrt(c0'), and the offset of displacements over a typical range, as in the tables of
         Cramer-Rao bounds: c0 moves with c1 / sqrt(c0) held where c1 is unknown.
         """
         columns = dict(zip(self._paths, np.diag(self.units), strict=True))
-        columns[OFFSET] = np.zeros(len(COORDINATES))  # readings do not depend on it
+        columns[OFFSET] = np.zeros(self._count)  # readings do not depend on it
         for path, (c0, c1) in self._shapes.items():
             if f"{path}.c1" in self.names:
                 row = COORDINATES.index(f"{path}.c1")
@@ -139,9 +145,9 @@ class Experiment:
         if self.background is not None and self.parameters.shadow_is_object:
             # the shadow has the object's parameters and moves with them
             for name in ("object.c0", "object.c1"):
-                columns[name][Value.SHADOW_C0 :] = columns[name][: Value.C2]
+                columns[name][Value.SHADOW_C0 : len(COORDINATES)] = columns[name][: Value.C2]
         if not self.names:
-            return np.empty((len(COORDINATES), 0))
+            return np.empty((self._count, 0))
         return np.stack([columns[name] for name in self.names], axis=1)
 
     @property
@@ -157,7 +163,13 @@ class Experiment:
         """Scene paths of the coordinates."""
         first, second = self.parameters.crosstalk or ("crosstalk.0", "crosstalk.1")
         before, after = COORDINATES[: Value.CROSSTALK_1], COORDINATES[Value.STRENGTH :]
-        return (*before, first, second, *after)
+        of_sensor = (GAIN, lag_path(self.sensor)) if has_sensor(self.terms) else ()
+        return (*before, first, second, *after, *of_sensor)
+
+    @property
+    def _count(self) -> int:
+        """Number of coordinates."""
+        return len(self._paths)
 
     @functools.cached_property
     def in_si_units(self) -> Array:
@@ -178,6 +190,10 @@ class Experiment:
                 result[j, j] = self.units[self._paths.index(name)]
             elif name == OFFSET:
                 result[j, j] = self._typical_m
+            elif name == PHASE:
+                result[j, j] = self.units[-1]
+            elif name == TIMING:
+                result[j, j] = self.units[-1] / shift_of(1.0)
             else:
                 result[j, j] = values[name]
         return result
@@ -196,7 +212,7 @@ class Experiment:
 
     @functools.cached_property
     def change(self) -> Array:
-        """Derivatives of the coordinates of `COORDINATES` along z, shape (9, d)."""
+        """Derivatives of the coordinates of `COORDINATES` along z, shape (9 or 11, d)."""
         with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
             return coordinate_slopes(self.parameters, self.z)[1]
 
@@ -226,8 +242,8 @@ class Experiment:
 
         Returns
         -------
-        ndarray, shape (n, 2, 9)
-            Along `COORDINATES`.
+        ndarray, shape (n, 2, 9 or 11)
+            Along `COORDINATES`, and the sensor's where something of it is unknown.
         ndarray, shape (n, 2)
             Along log r; nan for a frame without object.
         ndarray, shape (n, 2, k)

@@ -13,6 +13,7 @@ from inference.identifiability.remedies import Offer, Remedy, cheap_remedies, re
 from simulator.errors import listed
 from simulator.object_model import log_slope
 from simulator.parameters import OFFSET
+from simulator.sensor_unknowns import PHASE, TIMING
 
 __all__ = ["Diagnosis"]
 
@@ -38,7 +39,7 @@ def _relative(parameter: str, sd: float) -> str:
         unit = "sqrt(c0)"
     elif parameter.startswith("crosstalk"):
         unit = "the scene's light"
-    elif parameter == OFFSET:
+    elif parameter in (OFFSET, PHASE, TIMING):
         unit = "a typical range"
     if sd < 1:
         return f"{100 * sd:.2g} %" + ("" if unit == "itself" else f" of {unit}")

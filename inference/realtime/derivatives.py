@@ -9,6 +9,7 @@ from inference.realtime.net import (
     UNREPRESENTABLE,
     Net,
     net_readings,
+    on_time,
     rule_out,
 )
 from inference.realtime.windows import Windows, differences
@@ -105,4 +106,4 @@ def _measured(sensor: Sensor, frames: Frames) -> Net:
     state = rule_out(sensor, frames)
     bad = ~(np.isfinite(first) & np.isfinite(second))
     state[bad & (state == 0)] = UNREPRESENTABLE
-    return Net(first, second, var1, var2, np.zeros(n), 0.0, state)
+    return on_time(sensor, Net(first, second, var1, var2, np.zeros(n), 0.0, state))

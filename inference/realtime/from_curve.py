@@ -36,7 +36,7 @@ def curve_parameters(known: Known, sensor: Sensor) -> CurveParameters:
     unit, numbers = known.unit, known.numbers
     contrast = 0.0
     if known.has("background.strength", "object.c2"):
-        strength = known.get("background.strength") / sensor.gain
+        strength = known.get("background.strength") / sensor.known_gain
         contrast = strength / known.get("object.c2") * unit * unit
     return CurveParameters(
         c0=numbers.get("object.c0", 0.0) / unit / unit,

@@ -77,7 +77,7 @@ def law_of_motion(sensor: Sensor, net: Net, rate: Net, error_m: float) -> Motion
             x, y = net.first / modulus, net.second / modulus
             amplitude = (rate.first * x + rate.second * y) / modulus
             turn = (rate.second * x - rate.first * y) / modulus
-            phase = np.mod(np.arctan2(y, x) - sensor.phase_offset_rad, 2 * np.pi)
+            phase = np.mod(np.arctan2(y, x) - sensor.known_phase_rad, 2 * np.pi)
             zeta = 1 + turn / (amplitude * phase)
             # tan of the angle between derivative and reading, over the phase
             size = rate.first**2 + rate.second**2

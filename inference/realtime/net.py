@@ -11,7 +11,7 @@ from inference.frame.noise import covariance, noise_of
 from inference.technique import Task
 from simulator.compiled import compiled
 from simulator.frames import Frames
-from simulator.sensor import Sensor
+from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = [
     "ABSENT",
@@ -22,6 +22,7 @@ __all__ = [
     "Net",
     "known_net_readings",
     "net_readings",
+    "on_time",
     "rule_out",
 ]
 
@@ -148,7 +149,30 @@ def net_readings(
         state=rule_out(sensor, frames),
     )
     _fill(np.ascontiguousarray(frames.readings), crosstalk, gain, whole, net)
-    return net
+    return on_time(sensor, net)
+
+
+def on_time(sensor: Sensor, net: Net) -> Net:
+    """Return signals as a pulse without timing offset would give them.
+
+    Of an offset of length s the late window has w1 = w2 (r + s) / r0, so that w1 - w2 s / r0 is
+    what it would be without (docs/model.md, sensor-unknowns): linear, and so is its noise.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The sensor; another one's signals stay as they are.
+    net : Net
+        Its signals, or their derivatives.
+    """
+    if not isinstance(sensor, PulsedSensor) or sensor.timing_offset_s is None:
+        return net
+    share = sensor.known_shift_m / sensor.r0
+    return net._replace(
+        first=net.first - share * net.second,
+        var1=net.variance(np.ones_like(net.var1), np.full_like(net.var1, -share)),
+        cov=net.cov - share * net.var2,
+    )
 
 
 @compiled

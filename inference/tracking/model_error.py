@@ -52,7 +52,8 @@ def model_changes(sensor: Sensor, error: ModelError, knots: Knots, scale: Array)
         with np.errstate(divide="ignore", invalid="ignore"):
             raw = np.where(scale > 0, light / scale, 0.0)
         if isinstance(sensor, PulsedSensor) and not scale[1] > 0:
-            raw[:, 1] = raw[:, 0] * sensor.r0 / np.exp(knots.positions)
+            shift = sensor.known_shift_m
+            raw[:, 1] = raw[:, 0] * sensor.r0 / (np.exp(knots.positions) + shift)
         late = delayed(raw, knots.positions, *instrument(sensor)) * scale
         changes += [late * s[:, None] for s in _shapes(knots.positions, error.range_m)]
     return changes

@@ -24,6 +24,7 @@ from simulator.compiled import compiled
 from simulator.errors import RefusedError
 from simulator.parameters import Terms
 from simulator.sensor import PulsedSensor, Sensor
+from simulator.sensor_unknowns import sensor_at
 
 __all__ = [
     "MEAN",
@@ -100,9 +101,10 @@ def means_over(positions: Array, sensor: Sensor, terms: Terms, by_rate: bool) ->
 
 def _scene(sensor: Sensor, terms: Terms) -> FrameScene:
     """Return the first parameter vector without crosstalk, before a sensor without its noise."""
+    sensor = sensor_at(sensor, terms)
     c0, c1, c2 = terms.object[0].tolist()
     background = None if terms.background is None else Background(*terms.background[0].tolist())
-    shape, prior = Shape(sensor.gain * c0 * c2, c0, c1), prior_of(terms.ranges[0])
+    shape, prior = Shape(sensor.known_gain * c0 * c2, c0, c1), prior_of(terms.ranges[0])
     instrument = instrument_of(sensor)._replace(shot=None, relative=None)
     return FrameScene(shape, None, background, prior, instrument, None)
 
@@ -118,8 +120,11 @@ def empty_readings(sensor: Sensor, terms: Terms, by_rate: bool) -> Array:
 def _bounds(sensor: Sensor, law: RangePrior) -> tuple[float, float]:
     low, high = integration_bounds(law)
     if isinstance(sensor, PulsedSensor):
-        # the late window's kink at r0 belongs to neither side
-        high = min(high, math.log(sensor.r0) - 1e-12)
+        # the late window's kinks, at r0 and where it begins, belong to neither side
+        shift = sensor.known_shift_m
+        high = min(high, math.log(max(sensor.r0 - shift, 1e-300)) - 1e-12)
+        if shift < 0.0:
+            low = max(low, math.log(-shift) + 1e-12)
     return low, high
 
 
@@ -166,7 +171,7 @@ def knots_of(
     """
     factors = np.tile(observed.scale, 4)
     error = _ERROR / (5.0 * rate_sd) if observed.by_rate else _ERROR
-    low, high = _bounds(sensor, law)
+    low, high = _bounds(sensor_at(sensor, terms), law)
     if not high > low:
         raise RefusedError(
             "no range is possible: the prior of the range and the shadow exclude one another; "

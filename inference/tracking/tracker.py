@@ -31,6 +31,7 @@ from simulator.parameters import Terms, parameters_of
 from simulator.range_prior import RangePrior
 from simulator.scene import Reference, Scene, Stroke
 from simulator.sensor import PulsedSensor, Sensor
+from simulator.sensor_unknowns import sensor_at
 
 __all__ = ["Tracker", "tracker"]
 
@@ -134,6 +135,7 @@ def tracker(
     # derivatives do not see crosstalk at all
     spared = unknown_crosstalk if learns or observed.by_rate else ()
     known = nuisance_of(parameters, posterior, spared)
+    sensor = sensor_at(sensor, known.centre)
     if observed.by_rate and known.plus:
         raise RefusedError(
             "derivatives can be tracked only with a known scene; state its values as numbers, or "

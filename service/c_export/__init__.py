@@ -22,7 +22,7 @@ from service.c_export.source import ROUNDING, Asked, Exported, Generator, litera
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene
-from simulator.sensor import Sensor
+from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = ["GENERATORS", "c_text", "export_c"]
 
@@ -116,6 +116,8 @@ def export_c(technique: str, sensor: Sensor, scene: Scene, tolerance: float = 1e
     if not 1e-9 <= tolerance <= 0.1:
         raise InvalidInputError.at("/tolerance", f"must lie from 1e-9 to 0.1, is {tolerance:g}")
     known = known_of(scene)
+    if isinstance(sensor, PulsedSensor) and sensor.timing_offset_s is not None:
+        raise RefusedError("timing_offset_s is not exported to C; leave it out, and take it off")
     reason = obstacle(ALL_TECHNIQUES[technique], sensor, scene, known, None)
     if reason is not None:
         raise RefusedError(f"{technique}: {reason}")

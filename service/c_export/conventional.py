@@ -92,7 +92,7 @@ def conventional(asked: Asked) -> Exported:
             "which are small beside the noise of the same reading",
             limits,
         )
-    k, offset = sensor.wave_number, math.remainder(sensor.phase_offset_rad, 2 * math.pi)
+    k, offset = sensor.wave_number, math.remainder(sensor.known_phase_rad, 2 * math.pi)
     return Exported(
         constants | {"OFFSET": offset, "WAVE_NUMBER": k, "TURN": 2 * math.pi},
         {},

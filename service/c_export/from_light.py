@@ -110,7 +110,9 @@ class _Form:
 
 
 def _strength(asked: Asked) -> float:
-    return float(asked.sensor.gain * asked.known.get("object.c2") * asked.known.get("object.c0"))
+    return float(
+        asked.sensor.known_gain * asked.known.get("object.c2") * asked.known.get("object.c0")
+    )
 
 
 def _crosstalk(asked: Asked) -> tuple[float, float]:

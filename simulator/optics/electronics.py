@@ -102,9 +102,9 @@ def mean_pair(light: Light, sensor: Sensor, delay_s: float = 0.0) -> Pair:
         # exact while no light passes from wholly inside the pulse to wholly late
         shift = 0.5 * speed_of_light * delay_s / sensor.r0
         late = min(max(light.late + light.flux * shift, 0.0), light.flux)
-        return sensor.gain * late, sensor.gain * light.flux
-    phase = sensor.phase_offset_rad + 2 * math.pi * sensor.frequency_hz * delay_s
-    value = sensor.gain * light.phasor * complex(math.cos(phase), math.sin(phase))
+        return sensor.known_gain * late, sensor.known_gain * light.flux
+    phase = sensor.known_phase_rad + 2 * math.pi * sensor.frequency_hz * delay_s
+    value = sensor.known_gain * light.phasor * complex(math.cos(phase), math.sin(phase))
     return value.real, value.imag
 
 

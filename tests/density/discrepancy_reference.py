@@ -56,11 +56,11 @@ def sum_over_paths(
     delta = rng.standard_normal((paths, u.size)) @ root.T
     r = np.exp(u)
     c0, c1, c2 = c
-    flux = sensor.gain * c0 * c2 / (r**2 * (r**2 + c1 * r + c0)) * np.exp(delta)
+    flux = sensor.known_gain * c0 * c2 / (r**2 * (r**2 + c1 * r + c0)) * np.exp(delta)
     if isinstance(sensor, PulsedSensor):
         first, second = flux * r / sensor.r0, flux
     else:
-        phase = sensor.wave_number * r + sensor.phase_offset_rad
+        phase = sensor.wave_number * r + sensor.known_phase_rad
         first, second = flux * np.cos(phase), flux * np.sin(phase)
     weight = np.full(u.size, 1 / (u.size - 1))
     weight[[0, -1]] /= 2

@@ -39,11 +39,11 @@ def mean_readings(case: Case, u: Array) -> tuple[Array, Array, Array, Array]:
     """Mean readings of scene and object, written anew from docs/model.md."""
     r = np.exp(u)
     c0, c1, c2 = case.c
-    flux = case.sensor.gain * c0 * c2 / (r**2 * ((r + c1 / 2) ** 2 + (c0 - c1**2 / 4)))
+    flux = case.sensor.known_gain * c0 * c2 / (r**2 * ((r + c1 / 2) ** 2 + (c0 - c1**2 / 4)))
     if isinstance(case.sensor, PulsedSensor):
         o1, o2 = flux * r / case.sensor.r0, flux
     else:
-        phase = case.sensor.wave_number * r + case.sensor.phase_offset_rad
+        phase = case.sensor.wave_number * r + case.sensor.known_phase_rad
         o1, o2 = flux * np.cos(phase), flux * np.sin(phase)
     m1, m2 = o1.copy(), o2.copy()
     if case.background is not None:
@@ -53,7 +53,7 @@ def mean_readings(case: Case, u: Array) -> tuple[Array, Array, Array, Array]:
             m1 += visible * distance / case.sensor.r0
             m2 += visible
         else:
-            angle = case.sensor.wave_number * distance + case.sensor.phase_offset_rad
+            angle = case.sensor.wave_number * distance + case.sensor.known_phase_rad
             m1 += visible * math.cos(angle)
             m2 += visible * math.sin(angle)
     if case.crosstalk is not None:

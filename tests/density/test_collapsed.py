@@ -44,7 +44,7 @@ def bare_background(sensor: Sensor) -> NDArray[np.float64]:
     if isinstance(sensor, PulsedSensor):
         return np.array([strength * distance / sensor.r0, strength])
     assert isinstance(sensor, SineWaveSensor)
-    angle = sensor.wave_number * distance + sensor.phase_offset_rad
+    angle = sensor.wave_number * distance + sensor.known_phase_rad
     return np.array([strength * math.cos(angle), strength * math.sin(angle)])
 
 
@@ -87,7 +87,8 @@ def test_a_frames_gain_scales_object_and_background_but_not_crosstalk(sensor: Se
     found = of(sensor, KNOWN, Frames(frames.readings, gain=gain)).frame_log_likelihoods(NOTHING)[0]
     for k, factor in enumerate(gain):
         stronger = parse_sensor(
-            sensor.model_dump(mode="json", exclude_unset=True) | {"gain": sensor.gain * factor}
+            sensor.model_dump(mode="json", exclude_unset=True)
+            | {"gain": sensor.known_gain * factor}
         )
         brighter = BACKGROUND | {"strength": BACKGROUND["strength"] * factor}
         one = of(stronger, KNOWN | {"background": brighter}, frames.select([k]))

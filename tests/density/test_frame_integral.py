@@ -230,7 +230,7 @@ def test_units_of_the_readings_shift_the_log_likelihood(scale: float) -> None:
         snr = signal / min(noise["read"])
         noise["read"] = [scale * x for x in noise["read"]]
         noise["shot"] *= scale
-        sensor["gain"] = case.sensor.gain * scale
+        sensor["gain"] = case.sensor.known_gain * scale
         scene = case.scene.model_dump(mode="json", exclude_unset=True)
         if case.crosstalk is not None:
             scene["crosstalk"] = [scale * x for x in case.crosstalk]

@@ -51,7 +51,7 @@ def without(frames: Frames) -> Frames:
 
 def pointwise(sensor: Any, reading: Array, r: Array) -> Array:
     """Log density of one frame's readings given r, written anew."""
-    strength: float = sensor.gain * PLATE["c0"] * PLATE["c2"]
+    strength: float = sensor.known_gain * PLATE["c0"] * PLATE["c2"]
     means: tuple[Array, Array]
     flux = strength / (r**2 * (r**2 + PLATE["c1"] * r + PLATE["c0"]))
     if sensor.kind == "pulsed":
@@ -68,7 +68,7 @@ def information(sensor: Any, r: Array) -> Array:
     """Fisher information on log r by central differences of the means."""
 
     def means(r: Array) -> Array:
-        flux = sensor.gain * PLATE["c0"] * PLATE["c2"]
+        flux = sensor.known_gain * PLATE["c0"] * PLATE["c2"]
         flux = flux / (r**2 * (r**2 + PLATE["c1"] * r + PLATE["c0"]))
         if sensor.kind == "pulsed":
             return np.array([flux * r / sensor.r0, flux])

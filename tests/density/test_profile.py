@@ -36,7 +36,7 @@ def means(density: CollapsedDensity, z: Array, positions: Array) -> Array:
     out = []
     for u, gain in zip(positions, density.frames[:, 2], strict=True):
         r, mean = math.exp(u), np.zeros(2)
-        strength = density.sensor.gain * c0 * c2 * gain
+        strength = density.sensor.known_gain * c0 * c2 * gain
         mean += object_readings(r, r0, wave, strength, c0, c1)
         if terms.background is not None:
             background = tuple(terms.background[0])

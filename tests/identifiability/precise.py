@@ -25,13 +25,13 @@ def precise_readings(
     def carrier(length: mp.mpf) -> list[mp.mpf]:
         if isinstance(sensor, PulsedSensor):
             return [min(length / mp.mpf(sensor.r0), mp.mpf(1)), mp.mpf(1)]
-        phase = mp.mpf(sensor.wave_number) * length + mp.mpf(sensor.phase_offset_rad)
+        phase = mp.mpf(sensor.wave_number) * length + mp.mpf(sensor.known_phase_rad)
         return [mp.cos(phase), mp.sin(phase)]
 
     total = [mp.mpf(0), mp.mpf(0)]
     if r is not None:
         c0, c1, c2 = (values[name] for name in OBJECT)
-        flux = mp.mpf(sensor.gain) * gain * c0 * c2 / (r**2 * (r**2 + c1 * r + c0))
+        flux = mp.mpf(sensor.known_gain) * gain * c0 * c2 / (r**2 * (r**2 + c1 * r + c0))
         total = [t + flux * c for t, c in zip(total, carrier(r), strict=True)]
     if "background.strength" in values:
         visible = mp.mpf(1)

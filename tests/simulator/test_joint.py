@@ -258,6 +258,6 @@ def test_numbers_that_overflow_are_refused() -> None:
     mode = {"mean": [0.0], "covariance": [[4.0]]}
     joint = {"unknowns": ["object.c2"], "modes": [mode]}
     stated = parse_scene({"object": wide, "joint": joint})
-    assert centre(SENSOR, stated).object.c2 == 1.0
+    assert centre(SENSOR, stated)[1].object.c2 == 1.0
     with pytest.raises(RefusedError, match=r"object\.c2 is beyond"):
         around(SENSOR, stated)

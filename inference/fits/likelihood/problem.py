@@ -206,6 +206,7 @@ def _static(sensor: Sensor, parameters: Parameters, low: Array, high: Array, gai
     free = bool(np.isinf(low[crosstalk]).all() and np.isinf(high[crosstalk]).all())
     share = float(np.median(gain)) if parameters.has_background and free else 0.0
     r0, wave = instrument(sensor)
+    assert not isinstance(r0, tuple)  # noqa: S101  # the plan leaves timing offsets to posteriors
     return Static(share, r0, *(wave or (0.0, 0.0)))
 
 
@@ -267,7 +268,7 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames, *, exact: bool = F
         unit=unit,
         frames=readings,
         present=frames.present,
-        gain=sensor.gain / unit,
+        gain=sensor.known_gain / unit,
         instrument=Instrument(
             r0,
             wave,

@@ -58,8 +58,8 @@ def supports_of(
     box = {
         Value.C0: wide,
         Value.C2: (
-            dim / sensor.gain * near * near * 1e-12,
-            bright / sensor.gain * far**4 / wide[0] * 1e6,
+            dim / sensor.known_gain * near * near * 1e-12,
+            bright / sensor.known_gain * far**4 / wide[0] * 1e6,
         ),
         Value.STRENGTH: (dim * 1e-9, bright * 1e3),
         Value.DISTANCE: (near * 1e-3, farthest),

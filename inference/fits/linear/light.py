@@ -28,7 +28,7 @@ def carrier(sensor: Sensor, r: Array) -> Array:
     """Return what one unit of flux from range r reads, shape (n, 2)."""
     if isinstance(sensor, PulsedSensor):
         return np.stack([np.minimum(r / sensor.r0, 1.0), np.ones_like(r)], axis=1)
-    phase = sensor.wave_number * r + sensor.phase_offset_rad
+    phase = sensor.wave_number * r + sensor.known_phase_rad
     return np.stack([np.cos(phase), np.sin(phase)], axis=1)
 
 

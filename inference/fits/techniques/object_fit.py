@@ -53,12 +53,12 @@ def _flux(task: Task, r: Array, frames: Frames) -> Array:
     if task.scene.background is not None:
         strength, distance, c0, c1 = (task.known.get(path) for path in _BACKGROUND)
         net = net - background_light(sensor, (strength, distance, c0, c1), r, frames)
-    return np.asarray(component(sensor, net, r) / gains(frames) / sensor.gain)
+    return np.asarray(component(sensor, net, r) / gains(frames) / sensor.known_gain)
 
 
 def _signal(task: Task, r: Array, frames: Frames) -> Array:
     """Return the object's part of the readings as its flux has it, shape (n, 2)."""
-    size = task.sensor.gain * gains(frames) * _flux(task, r, frames)
+    size = task.sensor.known_gain * gains(frames) * _flux(task, r, frames)
     return np.asarray(size[:, None] * carrier(task.sensor, r))
 
 

@@ -41,15 +41,13 @@ def _replicate(
     """Fill out[i, j] with readings drawn at the log ranges positions[i, j]."""
     for i in range(positions.shape[0]):
         scene = scene_of(rows, instrument, i)
-        shape = scene.shape
+        shape, of = scene.shape, scene.instrument
         for j in range(positions.shape[1]):
             gain, r, signal = gains[j], math.inf, (0.0, 0.0)
             if math.isfinite(positions[i, j]):
                 r = math.exp(positions[i, j])
                 strength = _strength(gain * shape.strength, errors, i, j)
-                signal = object_readings(
-                    r, instrument.r0, instrument.wave, strength, shape.c0, shape.c1
-                )
+                signal = object_readings(r, of.r0, of.wave, strength, shape.c0, shape.c1)
             mean = with_surroundings(signal, r, gain, scene)
             noise = noise_of(mean, signal, instrument)
             common = math.sqrt(noise.shared) * normals[i, j, 2]

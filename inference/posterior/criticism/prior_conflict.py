@@ -241,8 +241,8 @@ def _distribution(law: Distribution | Stroke | Reference) -> Distribution:
 def _without_ends(density: CollapsedDensity, law: Distribution) -> CollapsedDensity:
     """Return the density under a law that goes on where this one ends, as far as sensors see."""
     ends = law.from_normal(special.ndtri([_OUTER, 1 - _OUTER]))
-    r0, wave = density.instrument.r0, density.instrument.wave
-    farthest = r0 if wave is None else 2 * math.pi / wave[0]
+    wave = density.instrument.wave
+    farthest = density.sensor.max_range_m if wave is None else 2 * math.pi / wave[0]
     high = min(_BEYOND * float(ends[1]), farthest)
     if math.isfinite(law.high):
         high = max(high, law.high)

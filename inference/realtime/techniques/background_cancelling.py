@@ -82,7 +82,7 @@ def _parts(task: Task, net: Net) -> tuple[Curve, _Parts]:
         to_free, to_whole = Form(-(sensor.r0 / distance), 1.0), Form(0.0, 1.0)
     else:
         curve = cancelling_quadrature.CURVE
-        angle = cycles_phase(sensor.frequency_hz, distance) + sensor.phase_offset_rad
+        angle = cycles_phase(sensor.frequency_hz, distance) + sensor.known_phase_rad
         cosine, sine = math.cos(angle), math.sin(angle)
         # free = - Im(x e^-j(kR + offset)), whole = its real part
         free = weighted_differences(net.first, sine, net.second, cosine)
@@ -105,7 +105,7 @@ def _solve(task: Task) -> TechniqueResult:
     with np.errstate(all="ignore"):
         curve, parts = _parts(task, net)
         free = parts.free
-        scale = known.unit**2 / (sensor.gain * known.get("object.c2"))
+        scale = known.unit**2 / (sensor.known_gain * known.get("object.c2"))
         target = free * scale
         state = net.state.copy()
         lost = (free != 0) & ((target == 0) | ~np.isfinite(target))
@@ -120,7 +120,7 @@ def _solve(task: Task) -> TechniqueResult:
         physical = None
         if task.physical and known.has("background.strength"):
             scene = _Scene(
-                gain=sensor.gain * known.get("object.c2"),
+                gain=sensor.known_gain * known.get("object.c2"),
                 c0=known.get("object.c0"),
                 c1=known.get("object.c1"),
                 strength=known.get("background.strength"),

@@ -89,7 +89,7 @@ def _part(sensor: Sensor, net: Net, background: KnownBackground, unit: float, wi
     else:
         phase = Phase(
             wave=sensor.wave_number * unit,
-            offset=sensor.phase_offset_rad,
+            offset=sensor.known_phase_rad,
             far=cycles_phase(sensor.frequency_hz, background.distance * unit),
         )
         solve_phase(net, background, phase, NOISE_BAND, found)

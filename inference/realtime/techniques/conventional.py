@@ -75,10 +75,14 @@ def conventional_range(sensor: Sensor, frames: Frames, crosstalk: Pair = (0.0, 0
     late, whole = crosstalk
     if isinstance(sensor, PulsedSensor):
         flat = np.ascontiguousarray(frames.readings).reshape(-1)
-        return ranges_alone(flat, sensor.r0, late, whole)
+        ranges = ranges_alone(flat, sensor.r0, late, whole)
+        if sensor.timing_offset_s is not None:
+            ranges -= sensor.known_shift_m
+            ranges[ranges <= 0] = np.nan
+        return ranges
     with np.errstate(all="ignore"):
         x, y = frames.readings[:, 0] - late, frames.readings[:, 1] - whole
-        phase = _phase(x, y, sensor.phase_offset_rad)
+        phase = _phase(x, y, sensor.known_phase_rad)
         phase[((x == 0) & (y == 0)) | ~np.isfinite(x + y)] = np.nan
         phase /= sensor.wave_number
     return phase
@@ -110,14 +114,16 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
     low, high = task.known.support if task.physical else (0.0, math.inf)
     full_late, full_whole = sensor.full_scale or (math.inf, math.inf)
     crosstalk_late, crosstalk_whole = task.known.crosstalk
+    # w1 = w2 (r + shift) / r0
+    shift = sensor.known_shift_m
     pulse = Pulse(
         r0=sensor.r0,
         crosstalk_late=crosstalk_late,
         crosstalk_whole=crosstalk_whole,
         read=sensor.noise.read,
         shot=sensor.noise.shot,
-        low=low * (1 - _SLACK),
-        high=high * (1 + _SLACK),
+        low=low * (1 - _SLACK) + shift,
+        high=high * (1 + _SLACK) + shift,
         full_late=full_late,
         full_whole=full_whole,
         error=model_error_of(task).range_m,
@@ -135,6 +141,8 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
     near.fill(0)
     if bad:
         explain(flat, pulse, _CODES, columns)
+    if shift != 0.0:
+        roots -= shift
     if frames.object_present is not None:
         absent = ~frames.object_present & (reason != SATURATED)
         reason[absent], roots[absent], sds[absent] = ABSENT, np.nan, np.nan
@@ -162,7 +170,7 @@ def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
     k, error = sensor.wave_number, model_error_of(task).range_m
     with np.errstate(all="ignore"):
         modulus = np.hypot(net.first, net.second)
-        phase = _phase(net.first, net.second, sensor.phase_offset_rad)
+        phase = _phase(net.first, net.second, sensor.known_phase_rad)
         safe = np.where(modulus > 0, modulus, 1.0)
         # gradient of the phase: (-q, i) / modulus^2
         sd = np.sqrt(net.variance(-net.second / safe / safe, net.first / safe / safe))

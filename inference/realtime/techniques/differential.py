@@ -95,7 +95,7 @@ def target_of(task: Task, rate: Net) -> Targets:
             return Targets(top, d2, sd, contact | (ratio == 0), still)
         length = np.hypot(d1, d2)
         # turned into the upper half plane first: there a small phase keeps its relative precision
-        cosine, sine = math.cos(sensor.phase_offset_rad), math.sin(sensor.phase_offset_rad)
+        cosine, sine = math.cos(sensor.known_phase_rad), math.sin(sensor.known_phase_rad)
         x, y = d1 * cosine + d2 * sine, d2 * cosine - d1 * sine
         turned = np.where((y < 0) | ((y == 0) & (x < 0)), -1.0, 1.0)
         phase = np.arctan2(turned * y, turned * x)

@@ -67,7 +67,7 @@ def _solve(task: Task) -> TechniqueResult:
             reading = np.hypot(net.first, net.second)
             safe = np.where(reading > 0, reading, 1.0)
             variance = net.variance(net.first / safe, net.second / safe)
-    scale = task.known.unit**2 / (task.sensor.gain * task.known.get("object.c2"))
+    scale = task.known.unit**2 / (task.sensor.known_gain * task.known.get("object.c2"))
     light = (reading, variance, scale)
     return range_from_light("intensity", task, intensity.CURVE, np.inf, net, light)
 

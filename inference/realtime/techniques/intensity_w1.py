@@ -14,7 +14,7 @@ def _solve(task: Task) -> TechniqueResult:
     assert isinstance(task.sensor, PulsedSensor)  # noqa: S101  # the registry's `kinds`
     net = known_net_readings(task)
     r0 = task.sensor.r0
-    scale = task.known.unit * r0 / (task.sensor.gain * task.known.get("object.c2"))
+    scale = task.known.unit * r0 / (task.sensor.known_gain * task.known.get("object.c2"))
     light = (net.first, net.var1, scale)
     return range_from_light("intensity_w1", task, intensity_w1.CURVE, r0, net, light)
 

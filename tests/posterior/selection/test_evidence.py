@@ -171,7 +171,7 @@ def test_scale_of_readings_shifts_the_evidence_by_its_jacobian_alone() -> None:
     scene = SCENES[name] | {"crosstalk": [{"prior": "normal", "mean": 0.0, "sd": 0.02 * unit}] * 2}
     small = sensor.model_copy(
         update={
-            "gain": sensor.gain * unit,
+            "gain": sensor.known_gain * unit,
             "noise": sensor.noise.model_copy(
                 update={"read": tuple(read * unit for read in sensor.noise.read)}
             ),
