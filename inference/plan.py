@@ -59,9 +59,6 @@ def obstacle(
     """
     if sensor.kind not in technique.kinds:
         return "a sine wave has no late window"
-    of_sensor = _sensor_obstacle(technique, sensor)
-    if of_sensor is not None:
-        return of_sensor
     if technique.differential:
         if technique.uses_background and scene.motion == "tangential":
             return "needs radial motion: a range that does not change leaves the background alone"
@@ -90,6 +87,9 @@ def obstacle(
                 f"the background lies {turns:.3g} half turns of phase away, and a frame may have "
                 "as many roots; a lower frequency would tell them apart"
             )
+    of_sensor = _sensor_obstacle(technique, sensor)
+    if of_sensor is not None:
+        return of_sensor
     missing = [path for path in technique.needs if not known.has(path)]
     if missing:
         return f"needs {listed(missing)} as known numbers"

@@ -255,7 +255,9 @@ def sensitivity(
         by_term = slopes[:, : Value.LOG_RANGE, :2].transpose(0, 2, 1) * scales
         if of_sensor:
             light = slopes[:, Value.READINGS, :2] - values[Value.CROSSTALK_1 : Value.STRENGTH]
-            lag = _by_lag(sensor, light, signal, np.exp(log_r), values[Value.DISTANCE])
+            lag = np.zeros_like(light)
+            if terms.lag is not None:
+                lag = _by_lag(sensor, light, signal, np.exp(log_r), values[Value.DISTANCE])
             by_term = np.concatenate([by_term, np.stack([signal, lag], axis=2)], axis=2)
     return Sensitivity(slopes[:, Value.READINGS, :2], signal, by_term, by_range)
 
