@@ -23,8 +23,8 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-# object 3, crosstalk 2, background 2, its shadow 2, the sensor 2, centre and spread of a stroke 2
-MOST_UNKNOWNS = 13
+# object 3, crosstalk 2, background 2, its shadow 2, centre and spread of a stroke 2
+MOST_UNKNOWNS = 11
 MOST_FRAMES = 100_000
 # whose likelihoods do not add up frame by frame, or are taken out one by one
 MOST_COUPLED = 2000

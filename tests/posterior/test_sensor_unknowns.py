@@ -51,7 +51,7 @@ def _told(sensor: dict[str, Any], name: str, value: float) -> tuple[Sensor, Sens
 
 
 def _means(sensor: dict[str, Any], name: str, value: float, r: Array) -> Array:
-    """Return mean readings by the equations of docs/model.md, shape (n, 2)."""
+    """Return mean readings, shape (n, 2), by the equations themselves."""
     gain = value if name == "gain" else 1.0
     c0, c1, c2 = (OBJECT[key] for key in ("c0", "c1", "c2"))
     flux = gain * c0 * c2 / (r**2 * (r**2 + c1 * r + c0))

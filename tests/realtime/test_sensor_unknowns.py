@@ -103,10 +103,12 @@ def test_a_calibrated_offset_is_a_shared_part_of_the_error(kind: str) -> None:
     frames = _frames(known, stated)
     (result,) = estimate(sensor, scene, frames, ["conventional"]).results
     assert result.roots_m[:, 0] == pytest.approx(RANGES, rel=1e-9)
+    assert result.sd_parts_m is not None
     assert result.sd_parts_m.scene[:, 0] == pytest.approx(np.full(9, shared), rel=1e-6)
     both = np.hypot(result.sd_parts_m.noise[:, 0], shared)
     assert result.roots_sd_m[:, 0] == pytest.approx(both, rel=1e-6)
     (of_flux,) = estimate(sensor, scene, frames, ["intensity"]).results
+    assert of_flux.sd_parts_m is not None
     assert of_flux.sd_parts_m.scene[:, 0] == pytest.approx(np.zeros(9), abs=1e-12)
     tracked = track(sensor, scene, frames, TrackingSettings())
     alone = track(known, parse_scene(stated), frames, TrackingSettings())
