@@ -33,6 +33,9 @@ _GROUPS = {
     "background.shadow": "the shadow's c0 and c1",
     "object.c": "the object",
     "object.c2": "the object's c2",
+    "sensor.gain": "the sensor's gain",
+    "sensor.phase_offset_rad": "the sensor's phase offset",
+    "sensor.timing_offset_s": "the sensor's timing offset",
 }
 
 

@@ -10,6 +10,7 @@ from inference.identifiability.before_data import Foresight, identifiability
 from inference.identifiability.status import Identifiability, status_of
 from simulator.errors import InvalidInputError
 from simulator.scene import parse_scene
+from simulator.sensor import parse_sensor
 from tests.posterior.scenes import OBJECT, UNKNOWN_CROSSTALK, sensor_of
 
 BACKGROUND: dict[str, Any] = {
@@ -254,3 +255,26 @@ def test_what_helps_enough_is_named_even_if_more_helps_more() -> None:
     assert (
         "5 frames with the object at 0.3 and 0.6 m each, known to 1 mm" in found["object.c1"].reason
     )
+
+
+def test_a_gain_hides_behind_the_reflectance_and_an_offset_behind_the_object() -> None:
+    """Readings depend on gain c2 alone; of an offset the flux tells little, and a ruler all."""
+    noise = {"read": [1e-4, 1e-4]}
+    pulse = {"kind": "pulsed", "pulse_width_s": 2e-8, "noise": noise}
+    gain = {"prior": "lognormal", "median": 1.0, "sigma": 0.2}
+    offset = {"prior": "normal", "mean": 0.0, "sd": 3e-10}
+    ranges = np.geomspace(0.3, 1.5, 12).tolist()
+    exact = parse_scene({"discrepancy": 0})
+    found = rows(identifiability(parse_sensor(pulse | {"gain": gain}), exact, ranges))
+    row = found["sensor.gain"]
+    assert row.status == "not_identified"
+    assert "when it and object.c2 change together" in row.reason
+    assert "knowing the object's c2 would bring the bound down" in row.reason
+    sensor = parse_sensor(pulse | {"timing_offset_s": offset})
+    before = identifiability(sensor, parse_scene({}), ranges)
+    assert rows(before)["sensor.timing_offset_s"].status == "not_identified"
+    kinds = {offer.kind: offer.bound for offer in before.remedies["sensor.timing_offset_s"]}
+    assert kinds["distance"] < 2e-3  # a millimetre of a typical range of 0.67 m, and the noise
+    told = [1e-3, *[None] * 10, 1e-3]
+    after = identifiability(sensor, parse_scene({}), ranges, known_range_sd_m=told)
+    assert rows(after)["sensor.timing_offset_s"].status == "identified"
