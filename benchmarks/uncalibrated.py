@@ -1,12 +1,12 @@
-"""Sensors that are not calibrated: what a posterior learns of their offset, and whether it is right.
+"""Sensors that are not calibrated: what a posterior learns of their offset, and if it is right.
 
     python -m benchmarks.uncalibrated [--sets 8] [--seconds 60] [--told "two distances"]
 
 Readings are exactly the model's. Object and the sensor's offset are drawn from the priors that
 inference has: a phase of 0.1 rad of a sine wave of 20 MHz, a timing of 0.3 ns of a pulse of 20 ns.
-Told is in turn nothing more than the readings; the nearest and the farthest distance, by a ruler of
-a millimetre; and these with five frames without the object, where crosstalk is unknown as well. Only
-ranges that were told by nothing are counted.
+Told is in turn nothing more than the readings; the nearest and the farthest distance, by a ruler
+of a millimetre; and these with five frames without the object, where crosstalk is unknown as well.
+Only ranges that were told by nothing are counted.
 """
 
 import argparse
