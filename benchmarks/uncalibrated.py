@@ -120,8 +120,8 @@ def _status(found: Posterior) -> str:
 def _row(kind: str, told: str, outcomes: list[Outcome]) -> str:
     """Return a row of the table."""
     good = [each for each in outcomes if each.converged]
-    parameters = np.concatenate([each.parameters for each in good] or [np.empty(0)])
-    ranges = np.concatenate([each.ranges for each in good] or [np.empty(0)])
+    parameters = np.concatenate([each.parameters for each in good] or [np.empty(0, dtype=bool)])
+    ranges = np.concatenate([each.ranges for each in good] or [np.empty(0, dtype=bool)])
     statuses = [each.offset for each in good]
     said = ", ".join(f"{statuses.count(s)} {s.replace('_', ' ')}" for s in sorted(set(statuses)))
     width = np.median([each.width_m for each in good]) if good else np.nan
