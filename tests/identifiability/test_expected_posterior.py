@@ -50,6 +50,12 @@ def test_noise_without_bound_leaves_the_prior(name: str) -> None:
     assert (found.range_sd <= wide * (1 + 1e-12)).all()
 
 
+def test_a_range_that_nothing_tells_is_known_as_well_as_from_its_ends() -> None:
+    """Evenly spread in log r from 0.05 to 5 m: the width over the root of 12, counted once."""
+    found = expected_posterior(experiment_of(SCENES["reference"], snr=1e-9))
+    assert found.range_sd == pytest.approx(math.log(100.0) / math.sqrt(12.0), rel=1e-9)
+
+
 @pytest.mark.parametrize("name", ["object", "crosstalk", "background"])
 def test_readings_without_noise_leave_the_bound(name: str) -> None:
     """The prior adds its unit information to 1 / variance: a relative part of variance / 2."""

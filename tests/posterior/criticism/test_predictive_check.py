@@ -125,6 +125,22 @@ def test_an_error_of_the_default_size_is_no_misfit_and_a_gross_one_is(kind: str)
         assert wrong is None or wrong in failed
 
 
+def test_the_limit_of_a_misfit_is_one_in_a_thousand() -> None:
+    """Of noise that is less and less what is stated; p is that of the worst of all checks."""
+    seen = []
+    for factor in (1.3, 1.5, 1.6, 1.8):
+        told, real = sensor_of("pulsed", factor * 1000.0), sensor_of("pulsed", 1000.0)
+        fit = checked(told, scene_of(False, 0), data(real, frames=40).frames)
+        least = min(check.p_value for check in fit.checks)
+        assert fit.p_value == pytest.approx(1.0 - (1.0 - least) ** len(fit.checks), rel=1e-6)
+        assert fit.misfit == (fit.p_value < 1e-3)
+        assert bool(fit.reasons) == fit.misfit
+        seen.append(fit.p_value)
+    assert seen == sorted(seen, reverse=True)
+    assert seen[0] > 1e-3
+    assert any(1e-7 < p < 1e-3 for p in seen)
+
+
 def test_noise_larger_than_stated_is_a_misfit() -> None:
     told, real = sensor_of("pulsed", 2000.0), sensor_of("pulsed", 1000.0)
     fit = checked(told, scene_of(False, 0), data(real, frames=40).frames)
