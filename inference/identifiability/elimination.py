@@ -37,9 +37,9 @@ def eliminate(
         Whitened derivatives along independent standard normal errors that all frames share.
     common_range : bool
         Whether all frames with an object have one range.
-    beside : (ndarray, ndarray), shapes (n, 2) and (n, 2, d), optional
+    beside : (ndarray, ndarray), shapes (n, 2) and (n, 2, d or d + k), optional
         Derivatives of what is known of range and displacement beside the readings, in units of its
-        noise, along log r and along the unknowns; 0 where nothing is.
+        noise, along log r and along the unknowns, and the shared errors; 0 where nothing is.
 
     Returns
     -------
@@ -79,8 +79,10 @@ def eliminate(
     if beside is not None:
         more, response, variance = _with_beside(both, along, beside, common_range)
         rows = np.concatenate([rows, more])
-        size = np.hypot(sizes, np.linalg.norm(beside[1], axis=1))
-        before = np.concatenate([before, np.repeat(size, 2, axis=0)])
+        size = np.repeat(np.hypot(sizes, np.linalg.norm(beside[1][:, :, :d], axis=1)), 2, axis=0)
+        if common_range:  # the last row is of all frames
+            size = np.concatenate([size, np.linalg.norm(size, axis=0)[None]])
+        before = np.concatenate([before, size])
     response[empty], variance[empty] = np.nan, np.nan
     return Information(
         names,
@@ -103,17 +105,20 @@ def _with_beside(
     other[:, :, : beside[1].shape[2]] = beside[1]
     told = beside[0]
     if common_range:  # one range: all that is known of it is known once, of one long frame
-        length, size = np.linalg.norm(along), np.linalg.norm(told)
+        length, size = float(np.linalg.norm(along)), float(np.linalg.norm(told))
         share = np.einsum("ni,nid->d", along, both) / max(length, 1e-300)
-        whole = math.hypot(length, size)
-        rows = np.zeros((n, 2, unknowns))
-        rows[0, 0] = size / whole * share if whole > 0 else 0.0
-        response = np.broadcast_to(-share * length / whole**2 if whole > 0 else 0.0, (n, unknowns))
-        variance = np.full(n, 1.0 / whole**2 if whole > 0 else math.inf)
-    else:
-        rows = free_of_range(along, told, both, other)
-        whole = np.square(along).sum(axis=1) + np.square(told).sum(axis=1)
-        moved = np.einsum("ni,nid->nd", along, both) + np.einsum("ni,nid->nd", told, other)
-        response = -np.divide(moved, whole[:, None], where=whole[:, None] > 0, out=0.0 * moved)
-        variance = np.divide(1.0, whole, where=whole > 0, out=np.full(n, math.inf))
+        # a displacement moves with its offset too: only what no offset makes tells the range
+        direction = told / max(size, 1e-300)
+        said = np.einsum("ni,nid->d", direction, other)
+        whole = max(math.hypot(length, size), 1e-300)
+        across = (other - direction[:, :, None] * said).reshape(2 * n, unknowns)
+        last = size / whole * share - length / whole * said
+        moved = -(share * (length / whole) + said * (size / whole)) / whole
+        variance = np.full(n, 1.0 / whole**2 if length + size > 0 else math.inf)
+        return np.vstack([across, last]), np.tile(moved, (n, 1)), variance
+    rows = free_of_range(along, told, both, other)
+    whole = np.square(along).sum(axis=1) + np.square(told).sum(axis=1)
+    moved = np.einsum("ni,nid->nd", along, both) + np.einsum("ni,nid->nd", told, other)
+    response = -np.divide(moved, whole[:, None], where=whole[:, None] > 0, out=0.0 * moved)
+    variance = np.divide(1.0, whole, where=whole > 0, out=np.full(n, math.inf))
     return rows.reshape(2 * n, unknowns), np.array(response), variance

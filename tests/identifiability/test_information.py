@@ -256,3 +256,28 @@ def test_one_range_for_all_frames() -> None:
     assert information(apart).singular_values[0] == pytest.approx(
         information(one).singular_values[0], rel=1e-9
     )
+
+
+def test_one_range_of_which_something_is_known() -> None:
+    """Displacements of a common range tell their offset, a known range the range itself."""
+    rng = np.random.default_rng(3)
+    n, d = 6, 4
+    jacobian, along = rng.standard_normal((n, 2, d)), rng.standard_normal((n, 2))
+    jacobian[:, :, -1] = 0.0  # no reading depends on the offset
+    told, other = np.zeros((n, 2)), np.zeros((n, 2, d))
+    told[2, 0] = 0.7
+    told[:, 1] = 3.0
+    other[:, 1, -1] = -3.0
+    every = np.concatenate([np.concatenate([jacobian, along[:, :, None]], axis=2),
+                            np.concatenate([other, told[:, :, None]], axis=2)])  # fmt: skip
+    sd = np.linalg.norm(np.linalg.pinv(every.reshape(4 * n, -1)), axis=1)
+    found = eliminate(("a", "b", "c", "offset"), jacobian, along, common_range=True,
+                      beside=(told, other))  # fmt: skip
+    assert found.sd == pytest.approx(sd[:d], rel=1e-9)
+    assert found.range_sd == pytest.approx(np.full(n, sd[d]), rel=1e-9)
+    # displacements alone leave the range to the readings
+    told[2, 0] = 0.0
+    found = eliminate(("a", "b", "c", "offset"), jacobian, along, common_range=True,
+                      beside=(told, other))  # fmt: skip
+    alone = eliminate(("a", "b", "c"), jacobian[:, :, :3], along, common_range=True)
+    assert found.range_sd == pytest.approx(alone.range_sd, rel=1e-9)

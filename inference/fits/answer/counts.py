@@ -7,6 +7,7 @@ scene has no range, but shows nothing but the sum of crosstalk and background.
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inference.fits.likelihood.unknowns import unknowns_of
 from inference.known import Known
@@ -122,6 +123,15 @@ def linear_obstacle(scene: Scene, unknowns: tuple[str, ...]) -> str | None:
     return None
 
 
+def _told(frames: Frames, usable: NDArray[np.bool_]) -> int:
+    """Return how many numbers are known of the ranges of frames, less the offset of odometry."""
+    known, moved = (
+        0 if column is None else int(np.count_nonzero(np.isfinite(column) & usable))
+        for column in (frames.known_range_m, frames.displacement_m)
+    )
+    return known + max(moved - 1, 0)
+
+
 def joint_obstacle(
     sensor: Sensor, scene: Scene, _known: Known, frames: Frames | None
 ) -> str | None:
@@ -159,8 +169,10 @@ def joint_obstacle(
     usable = rule_out(sensor, frames) != SATURATED
     empty = bool((usable & ~frames.present).any())
     objects = int(np.count_nonzero(usable & frames.present))
+    told = _told(frames, usable & frames.present)
     needed = frames_needed(sensor.kind, unknowns, empty)
-    if objects < needed:
+    law = parameters_of(sensor, scene).law
+    if objects + told < needed and not (law is not None and set(unknowns) <= set(law.names)):
         return (
             f"needs at least {needed} unsaturated frames with the object at different ranges for "
             f"{', '.join(unknowns)}, and has {objects}; send more, state more numbers as known, "

@@ -1,5 +1,6 @@
 """From optima of the likelihood of all frames to a result, or to a refusal."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 
@@ -18,11 +19,13 @@ from inference.fits.answer.inflation import inflation, shift_of
 from inference.fits.answer.profile_scan import profile_scan
 from inference.fits.answer.ranges import DECIDED, WITHIN, Answer, frame_ranges
 from inference.fits.answer.report import FALSE_ALARM, describe, fit_report, p_value_of, spoiled
-from inference.fits.likelihood.erring import erring_maxima, softened
+from inference.fits.likelihood.erring import contradicting, erring_maxima, softened
 from inference.fits.likelihood.information import residuals_and_information
+from inference.fits.likelihood.law_mode import law_modes
 from inference.fits.likelihood.maximum import TOP, Maximum, maximum_from
 from inference.fits.likelihood.multistart import find_maxima, find_starts
 from inference.fits.likelihood.problem import FitProblem, fit_problem
+from inference.fits.likelihood.told import known_ranges
 from inference.realtime.net import SATURATED, rule_out
 from inference.technique import Task
 from simulator.errors import RefusedError
@@ -64,6 +67,10 @@ def likelihood_answer(
     state = rule_out(task.sensor, task.frames)
     frames = task.frames.select(state != SATURATED)
     problem = fit_problem(task.sensor, task.scene, frames, exact=task.exact)
+    if not task.exact:
+        law = problem.parameters.law is not None
+        known = known_ranges(frames, problem.support)
+        problem = dataclasses.replace(problem, law=law, known=known)
     found = _found(problem) if values is None else _found_from(problem, values)
     optima = [optimum for optimum in found if np.isfinite(optimum.deviance)]
     if not optima:
@@ -152,23 +159,45 @@ def _erring_answer(
     name: str, problem: FitProblem, starts: Sequence[Maximum], state: NDArray[np.uint8]
 ) -> TechniqueResult:
     """Build the result where the model errs."""
-    found = erring_maxima(problem, starts)
+    modes = law_modes(problem.parameters.law) if problem.law else (None,)
+    found = [
+        end
+        for mode in modes
+        for end in erring_maxima(dataclasses.replace(problem, mode=mode), starts)
+    ]
     if not found:
         raise RefusedError(_NO_LIKELIHOOD)
+    found.sort(key=lambda end: end.deviance)
     top = found[0]
     _, facts = residuals_and_information(top.clean, top.x, top.positions)
-    refuse_if_undetermined(top.clean, top, facts)
-    wider = math.hypot(1.0, off_the_top(top))
-    refuse_if_open(top.clean, top, top.facts, wider, whole=top.whole)
+    if not problem.law and problem.known is None:
+        refuse_if_undetermined(top.clean, top, facts)
+    contradicted = contradicting(top, problem)
+    wider = 1.0
+    if not contradicted:
+        wider = math.hypot(1.0, off_the_top(top))
+        refuse_if_open(top.clean, top, top.facts, wider, whole=top.whole)
     near = [one for one in found[1:] if one.deviance - top.deviance <= DECIDED]
+    # another mode of the law is another answer; near in the same mode, a wider one
+    others = {id(one.clean.mode): one for one in reversed(near) if one.clean.mode is not None}
+    others.pop(id(top.clean.mode), None)
     report = fit_report(problem, found, top.chi_square, facts.rank, wider)
+    report["misfit"] |= bool(contradicted)
     parameters = describe(top.clean, top, top.facts, wider, near, top.whole)
     return frame_ranges(
         name,
         problem,
-        [Answer(top.x, 0.0, erring=top, wider=wider)],
+        [
+            Answer(one.x, one.deviance - top.deviance, erring=one, wider=wider)
+            for one in (top, *others.values())
+        ],
         state,
         spoiled(parameters, report) if report["misfit"] else parameters,
         report,
-        [(one.deviance - top.deviance, one.positions) for one in near],
+        [
+            (one.deviance - top.deviance, one.positions)
+            for one in near
+            if one.clean.mode is top.clean.mode
+        ],
+        contradicted,
     )

@@ -7,7 +7,7 @@ decides between modes and between optima of the fit. What the decision leaves st
 import dataclasses
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -37,8 +37,9 @@ _REASONS = (
     "no range explains the readings within six standard deviations",
     "the best range lies at the end of the ranges of the scene",
     "the fit does not explain the frames (misfit): something is not as the scene states it",
+    "the readings contradict what is known of the range (known_range_m, displacement_m): a misfit",
 )
-_AMBIGUOUS, _UNEXPLAINED, _EDGE, _MISFIT = range(len(COMMON_REASONS), len(_REASONS))
+_AMBIGUOUS, _UNEXPLAINED, _EDGE, _MISFIT, _CONTRADICTED = range(len(COMMON_REASONS), len(_REASONS))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -101,6 +102,8 @@ def _modes(problem: FitProblem, answers: Sequence[Answer]) -> tuple[_Modes, Arra
     for answer in answers:
         erring, factor = answer.erring, answer.covariance_factor
         u, deviance = frame_modes(problem if erring is None else erring.clean, answer.x)
+        if erring is not None and erring.clean.known is not None:
+            u = np.column_stack([erring.with_known(column) for column in u.T])
         noise, told, model, squares = np.full((4, *u.shape), np.nan)
         for k in range(MOST):
             if k > 0 and not np.isfinite(u[:, k]).any():
@@ -185,6 +188,7 @@ def frame_ranges(
     parameters: Mapping[str, Any],
     fit: Mapping[str, Any],
     points: Sequence[tuple[float, Array]] = (),
+    contradicted: Collection[int] = (),
 ) -> TechniqueResult:
     """Build the result of a technique of many frames.
 
@@ -206,6 +210,8 @@ def frame_ranges(
         the best and the log ranges there. Standard deviations of the best answer are widened until
         such ranges lie as far out as their deviance says, or in the interval of 95 % if that
         reaches them.
+    contradicted : collection of int
+        Frames of the problem whose readings and known ranges contradict one another.
 
     Returns
     -------
@@ -227,7 +233,7 @@ def frame_ranges(
         if reason[frame]:
             continue
         if fit.get("misfit"):
-            reason[frame] = _MISFIT
+            reason[frame] = _CONTRADICTED if row in contradicted else _MISFIT
             continue
         if single[row]:
             kept[frame] = [int(np.argmin(excess[row]))]

@@ -178,7 +178,10 @@ def entries(
 
 
 def _freedom(problem: FitProblem) -> int:
-    return 2 * problem.present.size - int(problem.present.sum()) - len(problem)
+    told = 0 if problem.known is None else problem.known.numbers
+    # what a joint law knows of the unknowns is held against the frames as they are
+    free = 0 if problem.law else len(problem)
+    return 2 * problem.present.size - int(problem.present.sum()) - free + told
 
 
 def p_value_of(problem: FitProblem, chi_square: float) -> float:

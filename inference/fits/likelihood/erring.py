@@ -24,17 +24,21 @@ from inference.fits.likelihood.erring_climb import (
 )
 from inference.fits.likelihood.erring_point import (
     Point,
+    columns_of,
     left_of_frames,
     linearised,
+    point_at,
     slopes_of_priors,
     whitened_of,
 )
+from inference.fits.likelihood.frame_modes import frame_modes
 from inference.fits.likelihood.maximum import Maximum
 from inference.fits.likelihood.problem import FitProblem
+from inference.fits.likelihood.told import Told, contradictions, eliminated, improbable, told_at
 from inference.identifiability.elimination import eliminate
 from inference.identifiability.information import Information
 
-__all__ = ["Erring", "erring_maxima", "softened"]
+__all__ = ["Erring", "contradicting", "erring_maxima", "softened"]
 
 Array = NDArray[np.float64]
 
@@ -43,6 +47,9 @@ _OF_LIGHT = (1e-2, 1e-3)  # of the light of a middling frame, for an error of it
 _STEPS = 60  # of the best climbs
 _KEPT = 4
 _SAME = 1e-3  # in log r and deviance
+_NAMED = 5  # frames that contradict are named, at most
+_TURNS = 6  # of a range between its readings and what is known of it
+_LONGEST = 0.3  # of log r in such a turn
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,8 +60,10 @@ class Erring(Maximum):
     ----------
     deviance : float
         Of readings, errors and unknowns together.
+    a : ndarray, shape (k,)
+        The errors.
     chi_square : float
-        Of readings and errors.
+        Of readings, errors and what is known beside them.
     clean : FitProblem
         With readings less what the errors do to them.
     facts : Information
@@ -63,6 +72,7 @@ class Erring(Maximum):
         The same, the errors unknown.
     """
 
+    a: Array
     chi_square: float
     clean: FitProblem
     facts: Information
@@ -85,19 +95,56 @@ class Erring(Maximum):
         """
         problem = self.clean
         residual, jacobian, along, errors, _ = linearised(problem, self.x, u)
-        own = eliminate(problem.names, jacobian, along)
+        told = told_at(problem.known, u, self.a)
+        own = _errors_known(problem, jacobian, along, told)
         of_x, of_errors = self.whole.factors
         free = jacobian @ of_x + errors @ of_errors
         parts = np.concatenate([jacobian, along[:, :, None], errors], axis=2)
         white, d = whitened_of(problem, u, errors, parts), self.x.size
-        seen = eliminate(problem.names, white[:, :, :d], white[:, :, d], white[:, :, d + 1 :])
+        seen = eliminated(
+            problem.names, white[:, :, :d], white[:, :, d], white[:, :, d + 1 :], told
+        )
         shared = np.linalg.norm(seen.response @ of_x + seen.error_response @ of_errors, axis=1)
+        of_x, of_offset = self.facts.factors
+        left = left_of_frames(problem, u, residual, along, errors, free)
+        if told is not None:
+            left = left + self.contradictions(u)
         return (
             np.sqrt(own.own_variance),
-            np.linalg.norm(own.response @ self.facts.factor, axis=1),
+            np.linalg.norm(own.response @ of_x + own.error_response @ of_offset, axis=1),
             np.sqrt(seen.own_variance + np.square(shared)),
-            left_of_frames(problem, u, residual, along, errors, free),
+            left,
         )
+
+    def contradictions(self, u: Array) -> Array:
+        """Return by how much readings and what is known beside them tell other ranges, (n,)."""
+        problem = self.clean
+        told = told_at(problem.known, u, self.a)
+        if told is None:
+            return np.zeros(u.size)
+        residual, jacobian, along, errors, _ = linearised(problem, self.x, u)
+        of_x, of_errors = self.whole.factors
+        free = jacobian @ of_x + errors @ of_errors
+        parts = [residual[:, :, None], along[:, :, None], free]
+        white = whitened_of(problem, u, errors, np.concatenate(parts, axis=2))
+        return contradictions(told, white[:, :, 0], white[:, :, 1], white[:, :, 2:])
+
+    def with_known(self, u: Array) -> Array:
+        """Return ranges that readings prefer, moved to where what is known beside them counts."""
+        problem = self.clean
+        for _ in range(_TURNS):
+            told = told_at(problem.known, u, self.a)
+            if told is None:
+                break
+            residual, _, along, _, _ = linearised(problem, self.x, u)
+            move = np.where(np.isfinite(along), along, 0.0)
+            size = np.square(move).sum(axis=1) + np.square(told.along).sum(axis=1)
+            pull = np.einsum("ni,ni->n", move, residual)
+            pull += np.einsum("ni,ni->n", told.along, told.residual)
+            moved = (told.along > 0).any(axis=1)
+            step = np.divide(pull, size, out=np.zeros_like(pull), where=moved & (size > 0))
+            u = np.clip(u + np.clip(step, -_LONGEST, _LONGEST), *np.log(problem.support))
+        return u
 
 
 def softened(problem: FitProblem) -> tuple[FitProblem, ...]:
@@ -137,7 +184,7 @@ def erring_maxima(problem: FitProblem, starts: Iterable[Maximum]) -> list[Erring
         Ends of the best climbs, the best first.
     """
     first = []
-    for start in starts:
+    for start in (*starts, *_of_law(problem)):
         if not (np.isfinite(start.x).all() and np.isfinite(start.deviance)):
             continue
         inward = held_within_priors(problem, start.x)
@@ -152,7 +199,46 @@ def erring_maxima(problem: FitProblem, starts: Iterable[Maximum]) -> list[Erring
         if not any(_same(at, end) for end, _ in ends):
             ends.append(climbed(problem, at, _STEPS))
     ends.sort(key=lambda end: end[0].deviance)
-    return [_told(problem, at, remaining) for at, remaining in ends]
+    return [_end(problem, at, remaining) for at, remaining in ends]
+
+
+def _of_law(problem: FitProblem) -> list[Maximum]:
+    """Return the centre of the scene's joint law, or of the mode that is taken, as a start."""
+    if not problem.law:
+        return []
+    z = np.zeros((1, len(problem.parameters)))
+    if problem.mode is not None:
+        z = problem.mode.centre[None]
+    natural = problem.parameters.natural(z)[:, columns_of(problem)]
+    x = problem.coordinates(natural)[0]
+    return [Maximum(x, 0.0, math.inf, frame_modes(problem, x)[0][:, 0])]
+
+
+def contradicting(top: Erring, problem: FitProblem) -> list[int]:
+    """Return the frames whose readings and known ranges contradict one another.
+
+    One wrong range bends everything else towards itself: the worst is left out, and the rest asked
+    again.
+
+    Parameters
+    ----------
+    top : Erring
+        The best maximum.
+    problem : FitProblem
+        Of which it is.
+    """
+    named: list[int] = []
+    known = problem.known
+    while known is not None and len(named) < _NAMED:
+        worst = improbable(top.contradictions(top.positions))
+        if not worst.size:
+            break
+        named.append(int(worst[0]))
+        known = known.without(named[-1])
+        rest = dataclasses.replace(problem, known=known, mode=top.clean.mode)
+        begin = point_at(rest, top.x, top.positions, top.a)
+        top = _end(rest, *climbed(rest, begin, _STEPS))
+    return sorted(named)
 
 
 def _same(at: Point, end: Point) -> bool:
@@ -171,12 +257,30 @@ def _with_priors(facts: Information, slopes: Array) -> Information:
     )
 
 
-def _told(problem: FitProblem, at: Point, remaining: float) -> Erring:
+def _errors_known(
+    problem: FitProblem, jacobian: Array, along: Array, told: Told | None
+) -> Information:
+    """Eliminate the ranges, the errors of the model known, the offset of displacements not."""
+    if told is None or problem.known is None:
+        return eliminate(problem.names, jacobian, along)
+    count = 1 if problem.known.offset_sd > 0.0 else 0
+    errors = np.zeros((*along.shape, count))
+    told = told._replace(errors=told.errors[:, :, told.errors.shape[2] - count :])
+    return eliminated(problem.names, jacobian, along, errors, told)
+
+
+def _end(problem: FitProblem, at: Point, remaining: float) -> Erring:
     """Return what is told at the end of a climb."""
     _, jacobian, along, errors, whitener = linearised(problem, at.x, at.u)
     slopes = slopes_of_priors(problem, at.x)
-    facts = _with_priors(eliminate(problem.names, jacobian, along), slopes)
-    whole = _with_priors(eliminate(problem.names, at.jacobian, at.along, at.errors), slopes)
+    facts = _with_priors(_errors_known(problem, jacobian, along, at.told), slopes)
+    seen = eliminated(problem.names, at.jacobian, at.along, at.errors, at.told)
+    whole = _with_priors(seen, slopes)
+    chi_square = float(np.square(at.residual).sum() + at.a @ at.a)
+    if at.told is not None:
+        chi_square += float(np.square(at.told.residual).sum())
+    if problem.law:
+        chi_square += float(at.z @ at.z)
     frames = problem.frames.copy()
     frames[:, :2] -= np.linalg.solve(whitener, (errors @ at.a)[:, :, None])[:, :, 0]
     return Erring(
@@ -184,7 +288,8 @@ def _told(problem: FitProblem, at: Point, remaining: float) -> Erring:
         deviance=at.deviance,
         remaining=remaining,
         positions=at.u,
-        chi_square=float(np.square(at.residual).sum() + at.a @ at.a),
+        a=at.a,
+        chi_square=chi_square,
         clean=dataclasses.replace(problem, frames=frames),
         facts=facts,
         whole=whole,

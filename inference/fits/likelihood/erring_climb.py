@@ -17,7 +17,7 @@ from inference.fits.likelihood.erring_point import (
 from inference.fits.likelihood.frame_modes import frame_modes
 from inference.fits.likelihood.model_error import errors_of_readings
 from inference.fits.likelihood.problem import FitProblem
-from inference.identifiability.elimination import eliminate
+from inference.fits.likelihood.told import eliminated, with_column
 from inference.identifiability.information import Information
 
 __all__ = ["FEW", "begun", "climbed", "held_within_priors", "with_other_ranges"]
@@ -40,13 +40,19 @@ def held_within_priors(problem: FitProblem, x: Array) -> Array:
     columns = columns_of(problem)
     z = np.zeros((1, len(columns)))
     z[0, columns] = np.clip(standard(problem, x[None]), -_INWARD, _INWARD)
+    if problem.mode is not None:
+        z = problem.mode.centre + z @ problem.mode.factor.T
     return np.asarray(problem.coordinates(problem.parameters.natural(z)[:, columns])[0])
 
 
 def _eliminated(problem: FitProblem, at: Point) -> Information:
     """Return rows across the ranges; of the errors, and last of the residuals."""
     errors = np.concatenate([at.errors, at.residual[:, :, None]], axis=2)
-    return eliminate(problem.names, at.jacobian, at.along, errors)
+    told = at.told
+    if told is not None:
+        of_all = np.concatenate([told.errors, told.residual[:, :, None]], axis=2)
+        told = told._replace(errors=of_all)
+    return eliminated(problem.names, at.jacobian, at.along, errors, told)
 
 
 def _ranges(problem: FitProblem, at: Point, seen: Information, dx: Array, da: Array) -> Array:
@@ -75,7 +81,11 @@ def _settled(problem: FitProblem, at: Point) -> Point:
 def begun(problem: FitProblem, x: Array, positions: Array) -> Point:
     """Return a start with errors that follow from it, and ranges that follow these."""
     u = np.where(problem.present & np.isnan(positions), math.log(problem.support[1]), positions)
-    k = errors_of_readings(problem, np.ones((u.size, 2)), u).shape[2]
+    if problem.known is not None:
+        value = np.clip(problem.known.values[:, 0], *problem.support)
+        u = np.where(problem.known.rates[:, 0] > 0, np.log(value), u)
+    errors = errors_of_readings(problem, np.ones((u.size, 2)), u)
+    k = with_column(problem.known, errors).shape[2]
     return _settled(problem, _settled(problem, point_at(problem, x, u, np.zeros(k))))
 
 

@@ -4,12 +4,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from inference.fits.likelihood.arguments import CROSSTALK, SLOTS
 from inference.fits.likelihood.linearisation import whitened_slopes
 from inference.fits.likelihood.model_error import errors_of_readings, share_left
 from inference.fits.likelihood.problem import FitProblem
+from inference.fits.likelihood.told import Told, told_at, with_column
 from inference.frame.sensitivity import Value
 from inference.identifiability.elimination import eliminate
 
@@ -43,6 +45,7 @@ class Point(NamedTuple):
     jacobian: Array
     along: Array
     errors: Array
+    told: Told | None
 
 
 def moved_by_errors(problem: FitProblem, x: Array, u: Array, of_x: Array) -> tuple[Array, Array]:
@@ -75,12 +78,18 @@ def columns_of(problem: FitProblem) -> list[int]:
 
 
 def standard(problem: FitProblem, points: Array) -> Array:
-    """Return coordinates as standard normal ones of the priors, shape (m, d)."""
+    """Return coordinates as standard normal ones of the priors, or of the law, shape (m, d)."""
     columns = columns_of(problem)
     natural = np.empty_like(points)
     natural[:, columns] = [problem.natural(x) for x in points]
     with np.errstate(all="ignore"):
-        z = problem.parameters.standard(natural)[:, columns]
+        z = problem.parameters.standard(natural)
+        if problem.mode is not None:
+            off = (z - problem.mode.centre).T
+            z = scipy.linalg.solve_triangular(
+                problem.mode.factor, off, lower=True, check_finite=False
+            ).T
+        z = z[:, columns]
     return np.clip(np.nan_to_num(z, nan=_FARTHEST), -_FARTHEST, _FARTHEST)
 
 
@@ -105,7 +114,7 @@ def linearised(problem: FitProblem, x: Array, u: Array) -> tuple[Array, ...]:
     signal = by_value[:, :, Value.C2] * values[Value.C2]
     light = np.linalg.solve(whitener, signal[:, :, None])[:, :, 0]
     errors = whitener @ errors_of_readings(problem, light, u)
-    errors = np.where(np.isnan(errors), 0.0, errors)
+    errors = with_column(problem.known, np.where(np.isnan(errors), 0.0, errors))
     return residual, by_value @ problem.chain(x), along, errors, whitener
 
 
@@ -149,8 +158,13 @@ def point_at(problem: FitProblem, x: Array, u: Array, a: Array, z: Array | None 
     d = x.size
     residual, z = white[:, :, 0], standard(problem, x[None])[0] if z is None else z
     at = white[:, :, 1 : d + 1], white[:, :, d + 1], white[:, :, d + 2 :]
+    told = told_at(problem.known, u, a)
     with np.errstate(over="ignore", invalid="ignore"):
         deviance = float(np.square(residual).sum() + a @ a + z @ z)
+        if told is not None:
+            deviance += float(np.square(told.residual).sum())
+        if problem.mode is not None:
+            deviance += problem.mode.deviance
         known = math.isfinite(deviance + float(np.abs(at[0]).sum() + np.abs(at[2]).sum()))
     deviance = deviance if known else math.inf
-    return Point(x, u, a, z, deviance, residual, *at)
+    return Point(x, u, a, z, deviance, residual, *at, told)

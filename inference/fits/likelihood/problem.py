@@ -15,7 +15,9 @@ from inference.fits.likelihood.coordinates import (
     chain,
     physical,
 )
+from inference.fits.likelihood.law_mode import LawMode
 from inference.fits.likelihood.supports import supports_of
+from inference.fits.likelihood.told import KnownRanges
 from inference.fits.likelihood.unknowns import paths_of
 from inference.frame.arguments import Instrument, Rows
 from inference.frame.blocks import own_blocks
@@ -67,6 +69,13 @@ class FitProblem:
         The scene's priors, from which starting points are drawn.
     error : ModelError
         What the model may be wrong by; the likelihood knows nothing of it.
+    known : KnownRanges or None
+        What the frames know of their ranges beside the readings; the likelihood knows nothing of
+        that either.
+    law : bool
+        Whether the scene's joint law counts as what is known of the unknowns.
+    mode : LawMode or None
+        That of its modes which is taken; None where it has but one.
     """
 
     names: tuple[str, ...]
@@ -81,14 +90,18 @@ class FitProblem:
     support: tuple[float, float]
     parameters: Parameters
     error: ModelError
+    known: KnownRanges | None = None
+    law: bool = False
+    mode: LawMode | None = None
 
     def __len__(self) -> int:
         return len(self.names)
 
     @property
     def erring(self) -> bool:
-        """Whether the model errs, of any object."""
-        return bool(self.present.any()) and (self.error.flux > 0 or self.error.range_m > 0)
+        """Whether an object's model errs, or something is known of it or of ranges."""
+        errs = self.error.flux > 0 or self.error.range_m > 0
+        return bool(self.present.any()) and (errs or self.law or self.known is not None)
 
     @property
     def logarithms(self) -> NDArray[np.bool_]:
@@ -179,6 +192,7 @@ class FitProblem:
             self,
             frames=np.ascontiguousarray(self.frames[index]),
             present=np.ascontiguousarray(self.present[index]),
+            known=None if self.known is None else self.known.select(index),
         )
 
 
