@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report readme api docs picture notebook notebook-data calibrate coverage kills fuzz stress mutations test check lint format types fast lock clean
+.PHONY: help setup demo report readme api docs picture notebook notebook-data calibrate coverage kills fuzz stress mutations test check lint format types fast container-test lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -90,6 +90,9 @@ check: lint types fast ## Lint, types, fast tests
 
 clean: ## Remove what the targets made
 	rm -rf $(VENV) build dist out *.egg-info .mypy_cache .ruff_cache .pytest_cache
+
+container-test: $(READY) ## Build the image, run the suite inside it, and ask it for a first answer (docker, podman or buildah)
+	$(BIN)/python -m benchmarks.container $(CONTAINER)
 
 lock: ## Resolve the dependencies anew into requirements/ (needs uv)
 	uv pip compile pyproject.toml --extra postgres --extra cluster --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate --output-file requirements/runtime.txt
