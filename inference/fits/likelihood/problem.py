@@ -1,7 +1,6 @@
 """What a fit over frames works on: unknowns of a scene as coordinates, usable frames, sensor."""
 
 import dataclasses
-import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +51,7 @@ class FitProblem:
     layout : Layout
         As the kernels take it; readings in ``unit``.
     unit : float
-        A power of two near the read noise [reading units].
+        The read noise of the second reading [reading units].
     frames : ndarray, shape (n, 3)
         Readings in ``unit`` and gain factor; saturated frames left out.
     present : ndarray of bool, shape (n,)
@@ -251,7 +250,8 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames, *, exact: bool = F
     """
     parameters = parameters_of(sensor, scene)
     noise = sensor.noise
-    unit = 2.0 ** round(math.log2(noise.read[1]))
+    # no power of two: where a walk strides must not depend on the unit of the readings
+    unit = noise.read[1]
     r0, wave = instrument(sensor)
     varies = noise.shot > 0 or noise.relative > 0
     near, far = parameters.range_prior.low, min(parameters.range_prior.high, sensor.max_range_m)
