@@ -11,6 +11,7 @@ from service.routes import (
     simulations,
     streams,
     techniques,
+    umbridge,
 )
 
 __all__ = ["ROUTERS"]
@@ -24,4 +25,5 @@ ROUTERS: tuple[APIRouter, ...] = (
     techniques.router,
     health.router,
     metrics.router,
+    umbridge.router,
 )
