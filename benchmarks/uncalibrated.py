@@ -137,14 +137,18 @@ def main() -> None:
     parser.add_argument("--sets", type=int, default=8, help="of each row")
     parser.add_argument("--first", type=int, default=0, help="seed of the first set")
     parser.add_argument("--seconds", type=float, default=60.0, help="of each posterior")
-    parser.add_argument("--told", choices=TOLD, help="only this row; left out, all")
+    parser.add_argument("--told", choices=TOLD, help="only these rows; left out, all")
+    parser.add_argument("--kind", choices=KINDS, help="only this sensor; left out, both")
     given = parser.parse_args()
     settings = SamplerSettings(
         method="auto", ensembles=2, target_ess=100, max_seconds=given.seconds
     )
     print("| sensor | told | converged | parameters held | ranges held | width | offset | misfit |")
     print("|---|---|---|---|---|---|---|---|")
-    for told, kind in itertools.product([given.told] if given.told else TOLD, KINDS):
+    rows = itertools.product(
+        [given.told] if given.told else TOLD, [given.kind] if given.kind else KINDS
+    )
+    for told, kind in rows:
         seeds = range(given.first, given.first + given.sets)
         print(_row(kind, told, [outcome_of(kind, told, s, settings) for s in seeds]), flush=True)
 

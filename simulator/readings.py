@@ -27,34 +27,56 @@ __all__ = [
 Pair = tuple[float, float]
 
 
+def _share(r: float, r0: float) -> float:
+    return min(r / r0, 1.0)
+
+
+def _delayed_share(r: float, r0: Pair) -> float:
+    return min(max((r + r0[1]) / r0[0], 0.0), 1.0)
+
+
+def _rate(r: float, r0: float) -> float:
+    return 1.0 / r0 if r < r0 else 0.0
+
+
+def _delayed_rate(r: float, r0: Pair) -> float:
+    return 1.0 / r0[0] if 0.0 < r + r0[1] < r0[0] else 0.0
+
+
+def _slopes(flux: float, slope: float, r: float, r0: float) -> Pair:
+    if r < r0:
+        return flux * (slope + 1.0) * (r / r0), flux * slope
+    return flux * slope, flux * slope
+
+
+def _delayed_slopes(flux: float, slope: float, r: float, r0: Pair) -> Pair:
+    share = (r + r0[1]) / r0[0]
+    if 0.0 < share < 1.0:
+        return flux * (slope * share + r / r0[0]), flux * slope
+    if share > 0.0:
+        return flux * slope, flux * slope
+    return 0.0 * flux, flux * slope
+
+
 def late_share(r: float, r0: Reach) -> float:
     """Return the share of an echo from r [m] that is late, min(r / r0, 1) (docs/model.md, 2.33).
 
     With a timing offset of length s, (r + s) / r0 within 0 and 1 (docs/model.md, sensor-unknowns).
     The machine code is chosen by the type of ``r0``: of sensors without one it has nothing of it.
     """
-    if isinstance(r0, tuple):
-        return min(max((r + r0[1]) / r0[0], 0.0), 1.0)
-    return min(r / r0, 1.0)
+    return _delayed_share(r, r0) if isinstance(r0, tuple) else _share(r, r0)
+
+
+def late_rate(r: float, r0: Reach) -> float:
+    """Return how `late_share` changes with r [1/m]."""
+    return _delayed_rate(r, r0) if isinstance(r0, tuple) else _rate(r, r0)
 
 
 def _late_slopes(flux: float, slope: float, r: float, r0: Reach) -> Pair:
     """Return r d/dr of both windows of an echo; ``slope`` is that of the log of its flux."""
     if isinstance(r0, tuple):
-        share = (r + r0[1]) / r0[0]
-        if 0.0 < share < 1.0:
-            return flux * (slope * share + r / r0[0]), flux * slope
-        return (flux * slope if share > 0.0 else 0.0), flux * slope
-    if r < r0:
-        return flux * (slope + 1.0) * (r / r0), flux * slope
-    return flux * slope, flux * slope
-
-
-def late_rate(r: float, r0: Reach) -> float:
-    """Return how `late_share` changes with r [1/m]."""
-    if isinstance(r0, tuple):
-        return 1.0 / r0[0] if 0.0 < r + r0[1] < r0[0] else 0.0
-    return 1.0 / r0 if r < r0 else 0.0
+        return _delayed_slopes(flux, slope, r, r0)
+    return _slopes(flux, slope, r, r0)
 
 
 @when_compiling
@@ -62,33 +84,16 @@ def _overload_pulses() -> None:
     from simulator.machine_code import is_number, overload
 
     @overload(late_share)
-    def _share(r: Any, r0: Any) -> Callable[..., Any]:  # noqa: ARG001
-        if is_number(r0):
-            return lambda r, r0: min(r / r0, 1.0)
-        return lambda r, r0: min(max((r + r0[1]) / r0[0], 0.0), 1.0)
+    def _of_share(r: Any, r0: Any) -> Callable[..., Any]:  # noqa: ARG001
+        return _share if is_number(r0) else _delayed_share
 
     @overload(late_rate)
-    def _rate(r: Any, r0: Any) -> Callable[..., Any]:  # noqa: ARG001
-        if is_number(r0):
-            return lambda r, r0: 1.0 / r0 if r < r0 else 0.0
-        return lambda r, r0: 1.0 / r0[0] if 0.0 < r + r0[1] < r0[0] else 0.0
+    def _of_rate(r: Any, r0: Any) -> Callable[..., Any]:  # noqa: ARG001
+        return _rate if is_number(r0) else _delayed_rate
 
     @overload(_late_slopes)
-    def _slopes(flux: Any, slope: Any, r: Any, r0: Any) -> Callable[..., Any]:  # noqa: ARG001
-        def plain(flux: Any, slope: Any, r: Any, r0: Any) -> Any:
-            if r < r0:
-                return flux * (slope + 1.0) * (r / r0), flux * slope
-            return flux * slope, flux * slope
-
-        def delayed(flux: Any, slope: Any, r: Any, r0: Any) -> Any:
-            share = (r + r0[1]) / r0[0]
-            if 0.0 < share < 1.0:
-                return flux * (slope * share + r / r0[0]), flux * slope
-            if share > 0.0:
-                return flux * slope, flux * slope
-            return 0.0 * flux, flux * slope
-
-        return plain if is_number(r0) else delayed
+    def _of_slopes(flux: Any, slope: Any, r: Any, r0: Any) -> Callable[..., Any]:  # noqa: ARG001
+        return _slopes if is_number(r0) else _delayed_slopes
 
 
 @compiled

@@ -167,6 +167,8 @@ def on_time(sensor: Sensor, net: Net) -> Net:
     """
     if not isinstance(sensor, PulsedSensor) or sensor.timing_offset_s is None:
         return net
+    if not isinstance(sensor.timing_offset_s, float | int):
+        return net  # the plan lets nothing but w2 be read of such a sensor
     share = sensor.known_shift_m / sensor.r0
     return net._replace(
         first=net.first - share * net.second,

@@ -117,6 +117,15 @@ def test_a_calibrated_offset_is_a_shared_part_of_the_error(kind: str) -> None:
     assert (tracked.sd_m[1:] > alone.sd_m[1:]).all()
 
 
+def test_w2_needs_no_timing() -> None:
+    stated = {"object": OBJECT, "discrepancy": 0}
+    sensor = parse_sensor(PULSE | {"timing_offset_s": {"prior": "normal", "mean": 0.0, "sd": 1e-9}})
+    frames = _frames(parse_sensor(PULSE | {"timing_offset_s": 1e-9}), stated)
+    found = estimate(sensor, parse_scene(stated), frames)
+    assert found.chosen == "intensity"
+    assert found.results[0].roots_m[:, 0] == pytest.approx(RANGES, rel=1e-9)
+
+
 def test_an_unknown_offset_leaves_out_what_needs_it() -> None:
     phase = {"prior": "normal", "mean": 0.0, "sd": 0.1}
     gain = {"prior": "lognormal", "median": 1.0, "sigma": 0.1}

@@ -137,3 +137,30 @@ def test_command(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
         out, err = capsys.readouterr()
         assert (code, out) == (2, "")
         assert bad[0] in err
+
+
+@pytest.mark.anyio
+async def test_a_sensor_that_is_not_calibrated_over_http(
+    client: httpx.AsyncClient, body: dict[str, Any]
+) -> None:
+    offset = {"prior": "normal", "mean": 0.0, "sd": 3e-10}
+    body["sensor"] = SENSOR | {"timing_offset_s": offset}
+    found = (await client.post("/v1/identifiability", json=body)).json()
+    assert "sensor.timing_offset_s" in [row["parameter"] for row in found["identifiability"]]
+    scene = {"object": {"c0": 0.08, "c1": 0.0, "c2": 0.1}}
+    stated = {"sensor": body["sensor"], "scene": scene}
+    path = {"range_m": [0.5, 0.7], "time_s": [0.0, 0.1]}
+    made = await client.post("/v1/simulations", json={**stated, "trajectory": path, "seed": 1})
+    assert made.status_code == 200, made.text
+    assert set(made.json()["truth"]["parameters"]) == {"sensor.timing_offset_s"}
+    asked = {**stated, "frames": made.json()["frames"]}
+    answer = (await client.post("/v1/estimates", json=asked)).json()
+    assert answer["chosen"] == "intensity"
+    (reason,) = (row["reason"] for row in answer["left_out"] if row["technique"] == "conventional")
+    assert "needs sensor.timing_offset_s as known numbers" in reason
+    wrong = changed(asked, "/sensor/timing_offset_s", offset | {"sd": 0.0})
+    assert_problem(
+        await client.post("/v1/estimates", json=wrong), 422, "/sensor/timing_offset_s/sd"
+    )
+    wrong = changed(asked, "/sensor/gain", {"prior": "uniform", "low": -2.0, "high": -1.0})
+    assert_problem(await client.post("/v1/estimates", json=wrong), 422, "/sensor/gain")
