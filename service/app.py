@@ -27,6 +27,7 @@ from service.store.database import default_url
 from service.store.retention import Retention
 from service.store.sql_store import SqlJobStore
 from service.store.stream_store import StreamStore
+from service.streams.calibrations import Calibrations
 from service.streams.lines import WINDOW
 from service.streams.streams import Streams
 from service.warm.warming import Warming
@@ -71,7 +72,7 @@ def create_app(
     processes = Processes(settings.threads, settings.queue, settings.request_s)
     kept_s = settings.keep_days * 86_400
     kept = StreamStore(store.database, settings.max_streams, settings.stream_idle_s, kept_s, WINDOW)
-    streams = Streams(kept, traces, settings.threads)
+    streams = Streams(kept, traces, settings.threads, Calibrations(jobs, settings))
     shared = Shared(settings, jobs, parsing, threads, processes, traces, streams, warming)
     keys = None if settings.api_keys is None else KeyRing(settings.api_keys)
 
@@ -85,6 +86,7 @@ def create_app(
         finally:
             if warming is not None:
                 warming.end()
+            await streams.close()
             await asyncio.to_thread(processes.close)
             await jobs.close()
 

@@ -115,6 +115,7 @@ class Jobs(Generic[J, C, T, P]):
         key: str | None = None,
         digest: str = "",
         client: str = "",
+        job_id: str | None = None,
     ) -> JobRecord:
         """Prepare a job and let it run.
 
@@ -128,6 +129,8 @@ class Jobs(Generic[J, C, T, P]):
             Idempotency key and a digest of the request.
         client : str
             To whom the job belongs.
+        job_id : str, optional
+            Its name; one that is there already is that job. Left out: a new one.
 
         Returns
         -------
@@ -152,7 +155,7 @@ class Jobs(Generic[J, C, T, P]):
         if seed is None:
             raise ValueError("`Fold.prepare` resolves the seed")
         new = NewJob(
-            id=uuid.uuid4().hex,
+            id=job_id or uuid.uuid4().hex,
             job=await asyncio.to_thread(job.to_bytes),
             format=self._version,
             method=job.settings.method,

@@ -26,7 +26,7 @@ from inference.self_calibration.state import CalibrationState, Switch
 from inference.tracking.track import Track, step
 from simulator.frames import Frames
 
-__all__ = ["Conclude", "Piece", "conclude", "follow"]
+__all__ = ["Conclude", "Piece", "conclude", "follow", "wanted"]
 
 _RECENT = 120  # frames: those that a new tracker begins with, and those since the last look
 

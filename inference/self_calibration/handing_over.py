@@ -20,7 +20,7 @@ from simulator.scene import Scene
 __all__ = ["hand_over"]
 
 _BEGUN_WITH = 90  # frames that a new tracker has seen when it answers its first
-_EVENTS = 32  # that are kept
+_EVENTS = 8  # that are kept
 _AGAIN = 10 * EVERY  # frames before the next calibration, doubled by each that is not taken
 _MOST_DOUBLED = 6
 
@@ -105,7 +105,9 @@ def _next(
     if outcome.scene is not None:
         of_ranges = outcome.statuses.get("range_m", "identified")
         crosstalk = [s for name, s in outcome.statuses.items() if name.startswith("crosstalk.")]
-        known = of_ranges != "not_identified"
+        # frames without the object tell no range, and may tell all that is unknown
+        rest = [s for name, s in outcome.statuses.items() if name != "range_m"]
+        known = of_ranges != "not_identified" or all(s == "identified" for s in rest)
         return outcome.scene, {
             "calibrated": True,
             "known": known,

@@ -6,15 +6,73 @@ import orjson
 import pydantic
 
 from service.store.stream_record import StreamRecord
+from service.streams.calibrations import posterior_id
 
 __all__ = ["StreamLine", "StreamPage", "StreamResponse", "stream_of"]
+
+
+class Quantiles(pydantic.BaseModel):
+    """What is known of one unknown."""
+
+    q05: float
+    q50: float
+    q95: float
+
+
+class SceneKnown(pydantic.BaseModel):
+    """What is known of a scene, and what it says of one frame."""
+
+    scene: dict[str, Quantiles]
+    status: Literal["unique", "ambiguous", "none", "saturated"]
+    range_m: float | None
+    sd_m: float | None
+
+
+class CalibrationEvent(pydantic.BaseModel):
+    """What changed at a line of a stream that calibrates itself (docs/streams.md)."""
+
+    kind: Literal["taken", "not_taken", "doubted"]
+    reason: str
+    sequence: int
+    applies_at: int
+    number: int | None = None
+    seed: int | None = None
+    decided_at: int | None = None
+    from_sequence: int | None = None
+    to_sequence: int | None = None
+    frames: int | None = None
+    frames_without_object: int | None = None
+    misfit: bool | None = None
+    before: SceneKnown
+    after: SceneKnown
+    posterior: str | None = None
+
+
+class AskedCalibration(pydantic.BaseModel):
+    """A calibration that is under way."""
+
+    number: int
+    seed: int
+    reason: str
+    decided_at: int
+    posterior: str
+
+
+class StreamCalibration(pydantic.BaseModel):
+    """How a stream calibrates itself: with which seed, from how many frames, and what changed."""
+
+    seed: int
+    known: bool
+    gathered: int
+    asked: AskedCalibration | None
+    events: list[CalibrationEvent]
 
 
 class StreamResponse(pydantic.BaseModel):
     """Answer of ``GET /v1/streams/{id}``: how a stream stands."""
 
     id: str
-    status: Literal["tracking", "expired"]
+    status: Literal["calibrating", "tracking", "expired"]
     sequence: int | None
     answered: int
     errors: int
@@ -22,6 +80,7 @@ class StreamResponse(pydantic.BaseModel):
     gaps: int
     surprise: float | None
     misfit: bool
+    calibration: StreamCalibration | None
     last: dict[str, Any] | None
 
 
@@ -70,6 +129,7 @@ class StreamLine(pydantic.BaseModel):
     rate_m_s: float | None = None
     misfit: bool | None = None
     latency_s: float | None = None
+    calibration: CalibrationEvent | None = None
     error: _Error | None = None
 
 
@@ -88,4 +148,19 @@ def stream_of(record: StreamRecord, status: str) -> dict[str, Any]:
     sequence = None if record.sequence < 0 else record.sequence
     head = {"id": record.id, "status": status, "sequence": sequence}
     counts = {name: record.counts.get(name, none) for name, none in _NONE_YET.items()}
-    return head | counts | {"last": orjson.loads(record.last or b"null")}
+    last = orjson.loads(record.last or b"null")
+    return head | counts | {"calibration": _calibration(record), "last": last}
+
+
+def _calibration(record: StreamRecord) -> dict[str, Any] | None:
+    """Return what is told of calibrations, with the posteriors behind them."""
+    told: dict[str, Any] | None = record.counts.get("calibration")
+    if told is None:
+        return None
+
+    def linked(entry: dict[str, Any]) -> dict[str, Any]:
+        number = entry.get("number")
+        return entry if number is None else entry | {"posterior": posterior_id(record.id, number)}
+
+    asked = None if told["asked"] is None else linked(told["asked"])
+    return told | {"asked": asked, "events": [linked(event) for event in told["events"]]}

@@ -67,7 +67,14 @@ class StreamStore:
         """Tell whether a client goes on sending to it, by what the row says."""
         return record.holder is not None and record.held_until > self._clock()
 
-    def add(self, stream_id: str, client: str, request: bytes, state: bytes) -> StreamRecord:
+    def add(
+        self,
+        stream_id: str,
+        client: str,
+        request: bytes,
+        state: bytes,
+        counts: dict[str, Any] | None = None,
+    ) -> StreamRecord:
         """Keep a new stream.
 
         Raises
@@ -78,7 +85,8 @@ class StreamStore:
         now = self._clock()
         row = {
             "id": stream_id, "client": client, "request": request, "state": state, "number": 1,
-            "sequence": -1, "counts": "{}", "last": b"", "kept_bytes": 0, "touched": now,
+            "sequence": -1, "counts": json.dumps(counts or {}), "last": b"",
+            "kept_bytes": 0, "touched": now,
             "held_until": 0.0,
         }  # fmt: skip
         with self._database.write() as connection:

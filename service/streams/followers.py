@@ -44,6 +44,10 @@ class Follower(Protocol):
         """Return the time of the last frame [s]; nan before the first."""
         ...
 
+    def told(self, state: Any) -> dict[str, Any] | None:
+        """Return what clients are told of calibrations, as plain JSON data; None without any."""
+        ...
+
     def to_bytes(self, state: Any) -> bytes:
         """Return a state for a store."""
         ...
@@ -89,6 +93,9 @@ class Plain:
     def time_of(self, state: TrackState) -> float:
         """See `Follower`."""
         return float(state.hypotheses.numbers[TIME])
+
+    def told(self, state: TrackState) -> None:
+        """See `Follower`."""
 
     def to_bytes(self, state: TrackState) -> bytes:
         """See `Follower`."""
@@ -140,6 +147,20 @@ class Calibrating:
         if recent is None or recent.time_s is None:
             return float("nan")
         return float(recent.time_s[-1])
+
+    def told(self, state: CalibrationState) -> dict[str, Any]:
+        """See `Follower`."""
+        asked = None
+        if (of := state.asked) is not None:
+            asked = {"number": of.number, "seed": of.seed, "reason": of.reason,
+                     "decided_at": of.decided_at}  # fmt: skip
+        return {
+            "seed": self.plan.seed,
+            "known": state.known,
+            "gathered": len(state.gathered),
+            "asked": asked,
+            "events": list(state.events),
+        }
 
     def to_bytes(self, state: CalibrationState) -> bytes:
         """See `Follower`."""

@@ -1,7 +1,7 @@
 """Lines of a stream, where it stands, and what was answered."""
 
 import dataclasses
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from inference.self_calibration.state import CalibrationState
 from inference.tracking.state import TrackState
@@ -54,6 +54,8 @@ class Place:
         Whether that is more than chance allows.
     last : bytes
         The last answer; empty before the first.
+    calibration : dict or None
+        What is told of a stream that calibrates itself.
     """
 
     state: TrackState | CalibrationState
@@ -66,6 +68,7 @@ class Place:
     surprise: float | None = None
     misfit: bool = False
     last: bytes = b""
+    calibration: dict[str, Any] | None = None
 
 
 class Earlier(Protocol):

@@ -1,6 +1,9 @@
 """From the request that made a stream to what follows it."""
 
 import functools
+import json
+
+import numpy as np
 
 from inference.self_calibration.plan import plan_of
 from inference.tracking.tracker import tracker
@@ -11,12 +14,23 @@ from service.strict_json import decode
 from simulator.errors import InvalidInputError, Problem
 from simulator.validated import parse
 
-__all__ = ["model_of", "request_of"]
+__all__ = ["model_of", "request_of", "seeded"]
 
 
 def request_of(raw: bytes) -> StreamRequest:
     """Return the request that made a stream, from its bytes."""
     return parse(StreamRequest, decode(raw))
+
+
+def seeded(raw: bytes) -> bytes:
+    """Return a request with a seed, where it asks for calibrations and has none."""
+    asked = request_of(raw)
+    if not asked.calibrate or asked.seed is not None:
+        return raw
+    document = decode(raw)
+    # of 53 bits, which readers of JSON that know only floats do not round
+    seed = int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 11)
+    return json.dumps(document | {"seed": seed}).encode()
 
 
 @functools.lru_cache(maxsize=256)

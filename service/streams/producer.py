@@ -10,12 +10,15 @@ import anyio.to_thread
 import orjson
 from starlette.requests import ClientDisconnect
 
+from inference.self_calibration.following import conclude, wanted
+from inference.self_calibration.state import CalibrationState
 from service.border.traces import Traces
 from service.errors import ConflictError, GoneError, NotFoundError, SlowClientError
 from service.store.stream_record import StreamChange, StreamRecord
 from service.store.stream_store import StreamStore
+from service.streams.calibrations import Calibrations
 from service.streams.cutting import Cutter
-from service.streams.followers import Follower
+from service.streams.followers import Calibrating, Follower
 from service.streams.forms import JsonLines
 from service.streams.lines import COUNTS, Place, Taken
 from service.streams.model import model_of
@@ -26,7 +29,7 @@ from simulator.errors import InvalidInputError
 
 __all__ = ["Producer", "lines_of", "place_of"]
 
-_KEPT = (*COUNTS, "unnumbered", "surprise", "misfit")
+_KEPT = (*COUNTS, "unnumbered", "surprise", "misfit", "calibration")
 _BLOCK = 2**16
 _TRIES = 3
 
@@ -97,6 +100,8 @@ class Producer:
         Is called after every change.
     quiet_s : float or None
         How long a client may send nothing [s].
+    calibrations : Calibrations or None
+        Where the stream asks for them.
     """
 
     store: StreamStore
@@ -110,6 +115,7 @@ class Producer:
     holder: str | None
     changed: Callable[[], None]
     quiet_s: float | None = None
+    calibrations: Calibrations | None = None
 
     async def run(self, source: AsyncIterator[list[bytes | None]], send: Send) -> None:
         """Answer all lines.
@@ -160,16 +166,38 @@ class Producer:
     async def _turn(self, lines: list[Any]) -> Taken:
         """Answer some lines, once what they change is kept."""
         for _ in range(_TRIES):
-            taken, change = await anyio.to_thread.run_sync(self._taken, lines, limiter=self.limiter)
+            place = self._concluded()
+            taken, change = await anyio.to_thread.run_sync(
+                self._taken, place, lines, limiter=self.limiter
+            )
             if not taken.changed or await self.writer.write(change):
                 self._count(taken)
+                self._concluded()  # what is asked for from now on begins at once
                 return taken
             await asyncio.to_thread(self._reload)
         raise ConflictError("another client sends to this stream")
 
-    def _taken(self, lines: list[Any]) -> tuple[Taken, StreamChange]:
+    def _concluded(self) -> Place:
+        """Return where the stream stands, with the calibration that it waits for, where there is.
+
+        It applies from the next number on, and is kept with what is answered there.
+        """
+        model, place = self.model, self.place
+        if self.calibrations is None or not isinstance(model, Calibrating):
+            return place
+        state = place.state
+        if not isinstance(state, CalibrationState) or (asked := wanted(state)) is None:
+            return place
+        record = self.record
+        outcome = self.calibrations.outcome(record.id, record.client, model.plan, asked)
+        if outcome is None:
+            return place
+        applies_at = max(asked.decided_at, place.sequence) + 1
+        return dataclasses.replace(place, state=conclude(state, outcome, applies_at))
+
+    def _taken(self, place: Place, lines: list[Any]) -> tuple[Taken, StreamChange]:
         earlier = _Stored(self.store, self.record.id)
-        taken = take(self.model, self.place, lines, JsonLines(), earlier)
+        taken = take(self.model, place, lines, JsonLines(), earlier)
         place = taken.place
         change = StreamChange(
             self.record.id,

@@ -13,7 +13,8 @@ from service.errors import ConflictError, GoneError, NotFoundError, StoreError
 from service.store.holder import has_ended, holder_name
 from service.store.stream_record import StreamRecord
 from service.store.stream_store import StreamStore
-from service.streams.model import model_of, request_of
+from service.streams.calibrations import Calibrations
+from service.streams.model import model_of, request_of, seeded
 from service.streams.producer import Producer, place_of
 from service.streams.writer import Writer
 
@@ -34,10 +35,19 @@ class Streams:
         Counts lines.
     threads : int
         How many track at a time.
+    calibrations : Calibrations, optional
+        Where streams ask for them.
     """
 
-    def __init__(self, store: StreamStore, traces: Traces, threads: int) -> None:
+    def __init__(
+        self,
+        store: StreamStore,
+        traces: Traces,
+        threads: int,
+        calibrations: Calibrations | None = None,
+    ) -> None:
         self._store = store
+        self._calibrations = calibrations
         self._traces = traces
         self._threads = threads
         self._writer = Writer(store)
@@ -66,9 +76,13 @@ class Streams:
         BusyError
             Where there is no room.
         """
+        raw = seeded(raw)
         model = await asyncio.to_thread(model_of, raw)
         state = model.to_bytes(model.first)
-        return await asyncio.to_thread(self._store.add, uuid.uuid4().hex, client, raw, state)
+        told = model.told(model.first)
+        counts = {} if told is None else {"calibration": told}
+        name = uuid.uuid4().hex
+        return await asyncio.to_thread(self._store.add, name, client, raw, state, counts)
 
     async def get(self, stream_id: str, client: str) -> StreamRecord:
         """Return a stream as it stands.
@@ -85,7 +99,10 @@ class Streams:
 
     def status(self, record: StreamRecord) -> str:
         """Return what a stream is doing."""
-        return "expired" if self._store.expired(record) else "tracking"
+        if self._store.expired(record):
+            return "expired"
+        calibration = record.counts.get("calibration")
+        return "tracking" if calibration is None or calibration["known"] else "calibrating"
 
     async def page(self, after: int | None, limit: int, client: str) -> list[StreamRecord]:
         """Return streams, newest first; see `StreamStore.page`."""
@@ -102,7 +119,14 @@ class Streams:
         await self.get(stream_id, client)
         if not await asyncio.to_thread(self._store.delete, stream_id):
             raise NotFoundError("there is no stream of this id")
+        if self._calibrations is not None:
+            self._calibrations.forget(stream_id)
         self._announce(stream_id)
+
+    async def close(self) -> None:
+        """Wait for no calibration any more."""
+        if self._calibrations is not None:
+            await self._calibrations.close()
 
     async def follow(self, stream_id: str, after: int, client: str) -> AsyncIterator[StreamRecord]:
         """Yield a stream as it stands after changes, those in quick succession as one.
@@ -183,6 +207,7 @@ class Streams:
                 holder=self._holder if lasting else None,
                 changed=lambda: self._announce(stream_id),
                 quiet_s=quiet_s,
+                calibrations=self._calibrations,
             )
             try:
                 yield producer

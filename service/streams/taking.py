@@ -107,6 +107,7 @@ class _Batch:
             surprise=self._surprise,
             misfit=self._misfit,
             last=new[-1] if new else self._place.last,
+            calibration=self._follower.told(self._state),
             **{name: getattr(self._place, name) + n for name, n in self._counts.items()},
         )
         return Taken(place, self._answers, new, repeated, any(self._counts.values()))
