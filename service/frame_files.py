@@ -192,7 +192,11 @@ def check_separator(header: Sequence[str]) -> None:
             )
 
 
-def write_frames(path: Path, columns: Mapping[str, Sequence[float | bool]]) -> None:
+def _field(value: float | bool | None) -> str:
+    return "" if value is None else json.dumps(value, allow_nan=False)
+
+
+def write_frames(path: Path, columns: Mapping[str, Sequence[float | bool | None]]) -> None:
     """Write frames so that `read_frames` gives them back to the last bit.
 
     Parameters
@@ -219,7 +223,7 @@ def write_frames(path: Path, columns: Mapping[str, Sequence[float | bool]]) -> N
             frames = (dict(zip(columns, row, strict=True)) for row in rows)
             text = "".join(json.dumps(frame, allow_nan=False) + "\n" for frame in frames)
         else:
-            lines = (",".join(json.dumps(value, allow_nan=False) for value in row) for row in rows)
+            lines = (",".join(map(_field, row)) for row in rows)
             text = "\n".join([",".join(columns), *lines]) + "\n"
     path.write_text(text, encoding="utf-8")
 

@@ -215,9 +215,33 @@ def simulate(
     if sensor.full_scale is not None:
         limit = np.asarray(sensor.full_scale)
         readings = np.clip(readings, -limit, limit)
-    frames = Frames(readings, time_s=trajectory.times(), object_present=present)
+    known, sds = _known_ranges(rng, trajectory, ranges, sensor.max_range_m)
+    frames = Frames(
+        readings,
+        time_s=trajectory.times(),
+        object_present=present,
+        known_range_m=known,
+        known_range_sd_m=sds,
+    )
     truth = np.where(np.isfinite(ranges), ranges, np.nan)
     return Simulation(frames, truth, drawn)
+
+
+def _known_ranges(
+    rng: np.random.Generator,
+    trajectory: RadialTrajectory | SampledTrajectory,
+    ranges: Array,
+    farthest: float,
+) -> tuple[Array | None, Array | None]:
+    """Draw what is known of ranges, last of all; nan where that is nothing or cannot be."""
+    sds = trajectory.known_range_sds()
+    if sds is None:
+        return None, None
+    known = ranges + sds * rng.standard_normal(ranges.size)
+    told = np.isfinite(known) & (known > 0) & (known <= farthest)
+    if not told.any():
+        return None, None
+    return np.where(told, known, np.nan), np.where(told, sds, np.nan)
 
 
 def _noise(

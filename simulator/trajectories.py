@@ -15,7 +15,7 @@ MAX_FRAMES = 1_000_000
 # of columns, which are long: their sizes are judged by what comes of them
 _Entry = Annotated[float, pydantic.Field(gt=0)]
 _BOUNDS = pydantic.Field(min_length=1, max_length=MAX_FRAMES, fail_fast=True)
-T = TypeVar("T", list[float] | None, list[bool] | None)
+T = TypeVar("T", list[float] | None, list[bool] | None, list[float | None] | None)
 
 
 class SampledTrajectory(Validated):
@@ -32,14 +32,18 @@ class SampledTrajectory(Validated):
         view at a fixed range.
     object_present : list of bool, optional
         False where the scene is empty.
+    known_range_sd_m : list of float or None, optional
+        Standard deviation to which the range of every frame is known beside the readings [m]; None
+        where it is not.
     """
 
     range_m: Annotated[list[_Entry], _BOUNDS]
     time_s: Annotated[list[float], _BOUNDS] | None = None
     amplitude: Annotated[list[_Entry], _BOUNDS] | None = None
     object_present: Annotated[list[bool], _BOUNDS] | None = None
+    known_range_sd_m: Annotated[list[_Entry | None], _BOUNDS] | None = None
 
-    @pydantic.field_validator("time_s", "amplitude", "object_present")
+    @pydantic.field_validator("time_s", "amplitude", "object_present", "known_range_sd_m")
     @classmethod
     def _as_long_as_the_ranges(cls, column: T, info: pydantic.ValidationInfo) -> T:
         ranges = info.data.get("range_m")  # missing where it is wrong itself
@@ -55,6 +59,11 @@ class SampledTrajectory(Validated):
         """Return the times [s], shape (n,), or None."""
         return None if self.time_s is None else np.asarray(self.time_s)
 
+    def known_range_sds(self) -> NDArray[np.float64] | None:
+        """Return to what the ranges are known [m], nan where they are not, shape (n,), or None."""
+        sds = self.known_range_sd_m
+        return None if sds is None else np.array(sds, dtype=np.float64)
+
 
 class RadialTrajectory(Validated):
     """Straight towards the sensor or away from it.
@@ -69,6 +78,8 @@ class RadialTrajectory(Validated):
         Whether the range or its logarithm grows evenly.
     duration_s : float, optional
         Time from the first to the last frame [s]; left out: 0.01 s a frame.
+    known_range_sd_m : float, optional
+        Standard deviation to which every range is known beside the readings [m].
     """
 
     kind: Literal["radial"] = "radial"
@@ -77,6 +88,7 @@ class RadialTrajectory(Validated):
     frames: Annotated[int, pydantic.Field(ge=1, le=MAX_FRAMES)]
     spacing: Literal["linear", "log"] = "linear"
     duration_s: Positive | None = None
+    known_range_sd_m: Positive | None = None
 
     def ranges(self) -> NDArray[np.float64]:
         """Return the ranges [m], shape (n,)."""
@@ -89,6 +101,11 @@ class RadialTrajectory(Validated):
         """Return the times [s], shape (n,)."""
         duration = 0.01 * (self.frames - 1) if self.duration_s is None else self.duration_s
         return np.linspace(0.0, duration, self.frames)
+
+    def known_range_sds(self) -> NDArray[np.float64] | None:
+        """Return to what the ranges are known [m], shape (n,), or None."""
+        sd = self.known_range_sd_m
+        return None if sd is None else np.full(self.frames, sd)
 
 
 def _kind(value: object) -> str:

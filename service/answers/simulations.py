@@ -15,7 +15,7 @@ __all__ = ["SimulationResponse", "simulation_of"]
 class SimulationResponse(pydantic.BaseModel):
     """Answer of ``POST /v1/simulations``."""
 
-    frames: dict[str, list[float] | list[bool]]
+    frames: dict[str, list[float] | list[bool] | list[float | None]]
     truth: dict[str, Any]
     seed: int
 

@@ -1,6 +1,7 @@
 """``hybridtof calibrate``: a scene file of what the frames in a file tell."""
 
 import argparse
+import json
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -52,8 +53,25 @@ def _run(args: argparse.Namespace) -> int:
     )
     if document is not None:
         write_whole(args.output, document + b"\n", private=False)
+        for line in _learnt(document):
+            note(args, line)
     elif record.result is not None:
         note(args, f"{args.output} is not written: nothing was drawn")
     if record.result is not None and record.result["fit"]["misfit"]:
         note(args, f"misfit: {'; '.join(record.result['fit']['reasons'])}")
     return exit_code_of(args, record)
+
+
+def _learnt(document: bytes) -> list[str]:
+    """Return a line for every unknown: what was stated of it, and what is known now."""
+    calibration = json.loads(document)["scene"]["calibration"]
+    lines = []
+    for now in calibration["unknowns"]:
+        prior = now.get("prior") or "default"
+        stated = {} if isinstance(prior, str) else dict(prior)
+        name = stated.pop("prior", "default")
+        before = " ".join([name, *(f"{key} {value:.4g}" for key, value in stated.items())])
+        after = f"{now['mean']:.4g} +- {now['sd']:.2g} (90 %: {now['q05']:.4g} to {now['q95']:.4g})"
+        lines.append(f"{now['unknown']}: {before} -> {after}")
+    verdict = "converged" if calibration["converged"] else "not converged"
+    return [*lines, f"verdict: {verdict}, {'misfit' if calibration['misfit'] else 'no misfit'}"]

@@ -32,6 +32,9 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     parser.add_argument("--frames", type=int, help="number of frames")
     parser.add_argument("--spacing", choices=("linear", "log"), help="of the ranges (linear)")
     parser.add_argument("--duration-s", type=float, help="from the first to the last frame [s]")
+    parser.add_argument(
+        "--known-range-sd-m", type=float, help="have frames tell their range to this sd [m]"
+    )
     parser.add_argument("--seed", type=int, help="left out: drawn and printed")
     parser.add_argument(
         "--output", type=Path, help="write the frames here too, as .csv, .ndjson or .json"
@@ -40,7 +43,7 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
 
 def _radial(args: argparse.Namespace) -> dict[str, Any]:
     """Trajectory from the options that were given."""
-    names = ("from_m", "to_m", "frames", "spacing", "duration_s")
+    names = ("from_m", "to_m", "frames", "spacing", "duration_s", "known_range_sd_m")
     given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
     return {"kind": "radial"} | given
 

@@ -12,7 +12,7 @@ from service.answers.encoding import encode_estimates
 from service.answers.estimates import AnswerShape, ColumnarEstimatesResponse, EstimatesResponse
 from service.bodies import BodyOf
 from service.checked_system import aliases_of, checked_frames
-from service.errors import OverdueError
+from service.errors import NotAcceptableError, OverdueError
 from service.exports.negotiation import accepted_type
 from service.messages import MESSAGES
 from service.messages.answering import message_answer
@@ -22,7 +22,7 @@ from service.routes.direct import DirectRoute
 from service.service_settings import ServiceSettings
 from service.shared import SMALL, TINY, TINY_BYTES, shared_of
 from simulator.compiled import NotReadyError, ready_only
-from simulator.errors import InvalidInputError
+from simulator.errors import InvalidInputError, listed
 
 __all__ = ["answer", "quick_answer", "router"]
 
@@ -135,7 +135,7 @@ def tiny_answer(
             "model": EstimatesResponse | ColumnarEstimatesResponse,
             "content": {message.media_type: {} for message in MESSAGES},
         },
-        **problem_responses(400, 413, 415, 422, 503),
+        **problem_responses(400, 406, 413, 415, 422, 503),
     },
 )
 async def create(
@@ -149,9 +149,13 @@ async def create(
     """
     shared, asked = shared_of(request), body[0]
     accept = ",".join(request.headers.getlist("accept"))
-    if accept not in _ANY and (form := accepted_type(accept, _FORMS) or _FORMS[0]) != _FORMS[0]:
-        messages = await shared.processes.run(request, message_answer, asked, form)
-        return Response(messages, headers={"Vary": "Accept"}, media_type=form)
+    if accept not in _ANY:
+        form = accepted_type(accept, _FORMS)
+        if form is None:
+            raise NotAcceptableError(f"estimates come as {listed(_FORMS)}")
+        if form != _FORMS[0]:
+            messages = await shared.processes.run(request, message_answer, asked, form)
+            return Response(messages, headers={"Vary": "Accept"}, media_type=form)
     tiny = len(body[1]) <= TINY_BYTES
     content = tiny_answer(asked, shared.settings, shape) if tiny else None
     if content is None:

@@ -80,6 +80,13 @@ async def test_estimates_as_messages(
         body = response.json()
         assert body["technique"] == plain["chosen"]
         assert len(body["messages"]) == len(plain["results"][0]["frames"])
+    unknown = {"Accept": "text/csv, application/xml;q=0.5"}
+    refused = await client.post("/v1/estimates", json=request_body, headers=unknown)
+    assert_problem(refused, 406)
+    assert "application/json" in refused.json()["detail"]
+    for anything in ("application/*", "text/csv, */*;q=0.1"):
+        taken = await client.post("/v1/estimates", json=request_body, headers={"Accept": anything})
+        assert taken.headers["content-type"] == "application/json"
     request_body["scene"] = {
         "crosstalk": [{"prior": "halfnormal", "sd": 1.0}] * 2,
         "motion": "static",
