@@ -140,7 +140,7 @@ def test_frames_that_tell_nothing_are_refused(fit: Fit) -> None:
 @pytest.mark.parametrize("snr", [1e3, 1e4])
 @pytest.mark.parametrize("unit", [3.0, 1e30, 1e-30])
 def test_how_far_a_valley_is_walked_does_not_depend_on_the_unit(unit: float, snr: float) -> None:
-    """Crosstalk was walked in strides of a power of two: widths changed by up to 1.9."""
+    """Crosstalk was walked in strides of a power of two: widths changed by up to 1.7."""
     fit = next(fit for fit in FITS if fit.technique == "iterative_differential")
     read = SIGNAL_AT_1M / snr
     frames = frames_of(fit, sensor_of(fit.kind, snr))
