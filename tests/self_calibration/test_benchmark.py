@@ -1,0 +1,40 @@
+"""The benchmark of streams that calibrate themselves, half a minute long, on its own arithmetic."""
+
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.self_calibration import HZ, course, draw, figures, followed, longest_s, wrong_of
+from inference.self_calibration.calibration import Asked, Outcome
+from simulator.sensor import Sensor
+
+
+def test_the_longest_stretch() -> None:
+    wrong = np.zeros(100, dtype=bool)
+    assert longest_s(wrong) == 0.0
+    wrong[[3, 10, 11, 12, 99]] = True
+    assert longest_s(wrong) == 3 / HZ
+
+
+def test_a_short_course_is_followed_counted_and_drawn(tmp_path: Path) -> None:
+    asked: list[int] = []
+
+    def refused(_: Sensor, of: Asked) -> Outcome:
+        asked.append(of.number)
+        return Outcome(None, "nothing is computed here")
+
+    of = course(40.0, 0, cold=False)
+    there = np.isfinite(of.range_m)
+    assert 0.8 < there.mean() < 0.9
+    assert not there[: 2 * HZ].any()
+    said = followed(of, 0, compute=refused)
+    found = figures(of, said)
+    assert asked == list(range(1, len(asked) + 1))
+    assert (found["asked"], found["taken"], found["given up"]) == (len(asked), 0, 0)
+    assert [event["kind"] for event in said.events] == ["not_taken"]
+    # what priors alone say is wide: never sure and wrong for a second
+    assert wrong_of(of, said).shape == there.shape
+    assert found["wrong s"] < 1.0
+    assert found["width"] > 0.1
+    draw(tmp_path / "picture.png", [("warm", of, said)])
+    assert (tmp_path / "picture.png").stat().st_size > 10_000
