@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report readme api docs picture notebook notebook-data calibrate coverage kills fuzz stress mutations test check lint format types fast container-test lock clean
+.PHONY: help setup demo report readme api docs picture notebook notebook-data calibrate coverage kills fuzz stress mutations test check lint format types fast lowest container-test lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -91,6 +91,13 @@ check: lint types fast ## Lint, types, fast tests
 
 clean: ## Remove what the targets made
 	rm -rf $(VENV) build dist out *.egg-info .mypy_cache .ruff_cache .pytest_cache
+
+lowest: ## Run the tests that take seconds with the lowest versions that pyproject.toml states (needs uv)
+	uv venv --quiet --clear --python $(PYTHON) out/lowest
+	uv pip compile pyproject.toml --all-extras --resolution lowest-direct --quiet --no-header --no-annotate --output-file out/lowest.txt
+	uv pip install --quiet --python out/lowest/bin/python --requirements out/lowest.txt
+	uv pip install --quiet --python out/lowest/bin/python --no-deps --no-build-isolation --editable .
+	NUMBA_CACHE_DIR=out/lowest/kernels out/lowest/bin/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow" $(LOWEST)
 
 container-test: $(READY) ## Build the image, run the suite inside it, and ask it for a first answer (docker, podman or buildah)
 	$(BIN)/python -m benchmarks.container $(CONTAINER)
