@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from inference.identifiability import status
 from inference.posterior.criticism import predictive_check
 from inference.posterior.sampling import importance
 
@@ -17,14 +16,6 @@ GLOSSARY = (Path(__file__).parents[1] / "docs" / "glossary.md").read_text(encodi
     [
         (r"readings \(false-alarm rate at most ([\d.e-]+)\)", (predictive_check._MISFIT,)),
         (r"trusted up to a Pareto k-hat of ([\d.]+\d)", (importance.MAX_K_HAT,)),
-        (
-            r"\| `identified` \| below ([\d.]+)[:|].* below ([\d.]+):",
-            (status.NARROW_SPREAD, status.NARROW_SCALE),
-        ),
-        (
-            r"\| `weak` \| [\d.]+ to below ([\d.]+) \| [\d.]+ to below ([\d.]+) \|",
-            (status.WIDE_SPREAD, status.WIDE_SCALE),
-        ),
     ],
 )
 def test_the_glossary_states_what_the_code_does(words: str, limits: tuple[float, ...]) -> None:

@@ -109,7 +109,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"without a fault: {by or 'all pass'}")
         return 0 if by is None else 1
     if asked.only:
-        faults = tuple(fault for fault in faults if fault.name in asked.only)
+        named = {fault.name: fault for fault in faults}
+        faults = tuple(named[name] for name in asked.only if name in named)
         if missing := set(asked.only) - {fault.name for fault in faults}:
             parser.error(f"no such faults: {', '.join(sorted(missing))}")
         for fault in faults:

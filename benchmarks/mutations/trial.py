@@ -18,7 +18,7 @@ from benchmarks.mutations.faults import Fault, planted
 __all__ = ["LONGEST_S", "Result", "copied", "failing_of", "result_of", "try_fault"]
 
 _LEFT_OUT = (".git", ".venv", "__pycache__", "out", "build", "dist", ".*_cache", ".hypothesis")
-# seconds of a process, after which a fault counts as hanging it
+# seconds after which a fault counts as hanging what it was planted in
 LONGEST_S = 900
 # of pytest: what the tests need; to load all that is installed takes longer than most tests
 _PLUGINS = ("anyio", "hypothesispytest", "xdist")
@@ -81,18 +81,23 @@ def _failing(tree: Path, arguments: Sequence[str], cache: Path) -> str | None:
     }
     plugins = [part for name in (*_PLUGINS, "no:cacheprovider") for part in ("-p", name)]
     command = [sys.executable, "-m", "pytest", "-x", "-q", "--tb=line", *plugins, *arguments]
-    done = subprocess.run(  # noqa: S603
-        command,
-        cwd=tree,
-        env={**os.environ, **own},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    hangs = f"hangs: more than {LONGEST_S} s"
+    try:
+        done = subprocess.run(  # noqa: S603
+            command,
+            cwd=tree,
+            env={**os.environ, **own},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=4 * LONGEST_S,  # what waits uses no processor time, and others may use it all
+        )
+    except subprocess.TimeoutExpired:
+        return hangs
     if done.returncode == _PASSED:
         return None
     if done.returncode in _KILLED:
-        return f"hangs: more than {LONGEST_S} s of processor time"
+        return hangs
     found = _FAILED.search(done.stdout)
     if done.returncode not in _NOTICED or found is None:
         raise RuntimeError(f"pytest ended with {done.returncode}: {done.stdout[-2000:]}")

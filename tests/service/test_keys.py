@@ -152,6 +152,8 @@ def test_a_file_that_is_no_secret_ends_the_start(
         file.unlink()
     else:
         file.write_text({"text": "{", "shape": '{"keys": [{"x": 1}]}'}[spoil])
+    with pytest.raises(InvalidInputError, match="/HYBRIDTOF_API_KEYS"):
+        KeyRing(file)  # before a server starts, which would not end
     assert main(["serve", "--port", "0"]) == 2
     said = capsys.readouterr().err
     assert said.startswith("hybridtof: error: /HYBRIDTOF_API_KEYS: ")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal, stats
 
+from inference.posterior.sampling.diagnostics import autocorrelation_time
 from inference.posterior.sampling.verdict import Chains, judge
 
 NAMES = ("a", "b", "c")
@@ -36,6 +37,16 @@ def test_false_alarms_are_rare(runs: int) -> None:
     """
     alarms = sum(not judge(healthy(seed), 400).converged for seed in range(runs))
     assert alarms <= int(stats.binom.isf(1e-3, runs, 1e-3))
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.8])
+def test_the_autocorrelation_time_is_that_of_the_process(rho: float) -> None:
+    """(1 + rho) / (1 - rho), summed over a window of five of them: of n steps in all its relative
+    sd is sqrt(2 (2 window + 1) / n) (Sokal 1997), here up to 3.5 %; bands of five sd."""
+    series = healthy(5, steps=1200, rho=rho).z[..., 0].reshape(-1, 1200).T
+    wanted = (1 + rho) / (1 - rho)
+    error = np.sqrt(2 * (2 * 5 * wanted + 1) / series.size)
+    assert autocorrelation_time(series) == pytest.approx(wanted, rel=5 * error)
 
 
 def test_shared_stream_is_named() -> None:
@@ -86,6 +97,15 @@ def test_one_ensemble_in_a_wrong_mode_is_named(shift: float) -> None:
     chains = healthy(1)
     z = chains.z.copy()
     z[3, ..., 2] += shift
+    reasons = judge(with_z(chains, z), 400).reasons
+    assert any("R-hat of c" in reason for reason in reasons)
+
+
+def test_ensembles_that_drift_together_are_named() -> None:
+    """Halves that differ by half a standard deviation: R-hat 1.035, though ensembles agree."""
+    chains = healthy(1)
+    z = chains.z.copy()
+    z[..., 2] += np.linspace(-0.5, 0.5, z.shape[2])
     reasons = judge(with_z(chains, z), 400).reasons
     assert any("R-hat of c" in reason for reason in reasons)
 
