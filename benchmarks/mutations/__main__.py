@@ -91,6 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--named-only", action="store_true", help="not the fast suite where the named tests pass"
     )
+    parser.add_argument("--table", action="store_true", help="what is known by now, no more runs")
     parser.add_argument("--nice", type=int, default=19, help="how low the priority is")
     parser.add_argument("--clean", action="store_true", help="run the named tests without a fault")
     asked = parser.parse_args(arguments)
@@ -115,18 +116,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
             parser.error(f"no such faults: {', '.join(sorted(missing))}")
         for fault in faults:
             (out / f"{fault.name}.json").unlink(missing_ok=True)
-    results = run(faults, ROOT, out, asked.workers, named_only=asked.named_only)
-    print(table(faults, results))
-    if not (asked.only or asked.named_only):
-        with TABLE.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(COLUMNS)
-            for fault in faults:
-                said = results[fault.name]
-                word = "yes" if said.noticed else "no"
-                writer.writerow((fault.name, fault.kind, fault.file, word, said.by))
+    if not asked.table:
+        run(faults, ROOT, out, asked.workers, named_only=asked.named_only)
+    results = {f.name: found for f in faults if (found := result_of(f, out)) is not None}
+    tried = [fault for fault in faults if fault.name in results]
+    print(table(tried, results))
+    if len(tried) < len(faults):
+        print(f"without a result: {len(faults) - len(tried)} of {len(faults)}")
+    if not asked.only:
+        _write(faults, results)
         print(f"at commit {code_version()}")
     return 0
+
+
+def _write(faults: Sequence[Fault], results: Mapping[str, Result]) -> None:
+    """Write the table of all faults, of those without a result as well."""
+    with TABLE.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for fault in faults:
+            said = results.get(fault.name)
+            word = "not tried" if said is None else "yes" if said.noticed else "no"
+            by = "" if said is None else said.by
+            writer.writerow((fault.name, fault.kind, fault.file, word, by))
 
 
 if __name__ == "__main__":
