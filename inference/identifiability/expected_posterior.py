@@ -61,8 +61,10 @@ def log_range_spread(parameters: Parameters) -> float:
     return 0.5 * math.log(high / low)
 
 
-def _limited(sd: Array, limit: float) -> Array:
-    """Combine a standard deviation with that of a prior which has no curvature to add."""
+def _limited(sd: Array, limit: float, curved: bool) -> Array:
+    """Combine a standard deviation with that of the ranges' prior, once."""
+    if curved:  # it was one of the rows
+        return np.minimum(sd, limit)
     if limit == 0.0:  # a law so narrow that its ends are one number
         return np.zeros_like(sd)
     with np.errstate(divide="ignore"):
@@ -85,6 +87,9 @@ def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
         except that no range is known worse than by its prior.
     """
     p, present = experiment.parameters, np.isfinite(experiment.log_r)
+    law = experiment.range_prior
+    curved = law.inverse_sd > 0 or law.log_inverse_sd > 0
+    curved = curved and not isinstance(p.range_prior, Stroke)  # whose support is no row
     jacobian, along, extra = rows_of(experiment)
     across, response, variance = without_ranges(experiment, jacobian, along)
     independent = 1 if experiment.common_range else int(present.sum())
@@ -101,14 +106,14 @@ def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
         factor = np.asarray(linalg.solve_triangular(triangle, np.eye(unknowns)))
     sd = np.linalg.norm(p.marginal(factor[:d].T), axis=0)
     range_sd = np.sqrt(variance + np.linalg.norm(response @ factor, axis=1) ** 2)
-    range_sd = np.where(present, _limited(range_sd, log_range_spread(p)), np.nan)
+    range_sd = np.where(present, _limited(range_sd, log_range_spread(p), curved), np.nan)
     if not present.any():
         return ExpectedPosterior(factor[:d], sd, range_sd, math.nan)
     own = float(variance[present].mean()) / independent
     shared = np.linalg.norm(response[present].mean(axis=0) @ factor)
     scale = np.array([math.sqrt(own + shared**2)])
     limit = min(room, log_range_spread(p))
-    return ExpectedPosterior(factor[:d], sd, range_sd, float(_limited(scale, limit)[0]))
+    return ExpectedPosterior(factor[:d], sd, range_sd, float(_limited(scale, limit, curved)[0]))
 
 
 def rows_of(experiment: Experiment) -> tuple[Array, Array, list[Array]]:

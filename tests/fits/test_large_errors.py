@@ -81,3 +81,17 @@ def test_a_frame_without_late_light_beside_frames_of_little_noise_is_answered() 
     answer = hybridtof.estimate(sensor, scene, frames, names)
     refused = {each.name for each in answer.left_out}
     assert {each.technique for each in answer.results} | refused >= set(names)
+
+
+def test_of_a_stroke_a_fit_takes_the_support_alone() -> None:
+    """A stroke has two unknowns more, which a fit does not have: it is what `reference` is."""
+    one = random_set("crosstalk", "pulsed", 7, "default", None, (3.0, 3.0))
+    found = []
+    for prior in ("stroke", "reference"):
+        law = type(one.scene).model_validate(
+            one.scene.model_dump(exclude_unset=True)
+            | {"range_m": {"prior": prior, "low": 0.05, "high": 3.0}}
+        )
+        answer = hybridtof.estimate(one.sensor, law, one.simulation.frames, ["joint_fit"])
+        found.append(answer.results[0].range_m)
+    np.testing.assert_array_equal(*found)

@@ -50,6 +50,15 @@ def test_noise_without_bound_leaves_the_prior(name: str) -> None:
     assert (found.range_sd <= wide * (1 + 1e-12)).all()
 
 
+def test_a_stated_law_of_the_ranges_counts_once() -> None:
+    """Log-normal with 0.7: that is what stands where no reading tells.
+
+    The sensor's domain cuts off the last 1e-6 of it.
+    """
+    found = expected_posterior(experiment_of(SCENES["known law"], snr=1e-9))
+    assert found.range_sd == pytest.approx(0.7, rel=1e-5)
+
+
 def test_a_range_that_nothing_tells_is_known_as_well_as_from_its_ends() -> None:
     """Evenly spread in log r from 0.05 to 5 m: the width over the root of 12, counted once."""
     found = expected_posterior(experiment_of(SCENES["reference"], snr=1e-9))

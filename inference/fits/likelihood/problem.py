@@ -15,7 +15,7 @@ from inference.fits.likelihood.coordinates import (
     physical,
 )
 from inference.fits.likelihood.law_mode import LawMode
-from inference.fits.likelihood.supports import supports_of
+from inference.fits.likelihood.supports import supports_of, with_support_alone
 from inference.fits.likelihood.told import KnownRanges
 from inference.fits.likelihood.unknowns import paths_of
 from inference.frame.arguments import Instrument, Rows
@@ -248,7 +248,7 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames, *, exact: bool = F
     RefusedError
         Where squares of a reading in units of its noise would overflow.
     """
-    parameters = parameters_of(sensor, scene)
+    parameters = parameters_of(sensor, with_support_alone(scene))
     noise = sensor.noise
     # no power of two: where a walk strides must not depend on the unit of the readings
     unit = noise.read[1]

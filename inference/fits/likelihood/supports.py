@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from inference.fits.likelihood.arguments import CROSSTALK, SLOTS
 from inference.frame.sensitivity import Value
-from simulator.scene import Quantity, Scene
+from simulator.scene import Quantity, Reference, Scene, Stroke
 from simulator.sensor import PulsedSensor, Sensor
 
-__all__ = ["supports_of"]
+__all__ = ["supports_of", "with_support_alone"]
 
 Array = NDArray[np.float64]
 
@@ -86,3 +86,12 @@ def supports_of(
         if isinstance(stated, float | int) and stated < 0.0:
             low[c0] = max(low[c0], 0.25 * stated * stated * (1 + 1e-9))
     return low, high
+
+
+def with_support_alone(scene: Scene) -> Scene:
+    """Return the scene with the support of its ranges alone: no fit has a law of them to learn."""
+    law = scene.range_m
+    if not isinstance(law, Stroke):
+        return scene
+    support = Reference(prior="reference", low=law.low, high=law.high)
+    return scene.model_copy(update={"range_m": support})
