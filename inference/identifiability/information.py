@@ -182,17 +182,20 @@ class Information:
             inf where a function has a part that the readings do not tell.
         """
         columns, values, vectors = self._equilibrated
-        scaled = functionals / columns
-        size = np.linalg.norm(scaled, axis=1)
-        size = np.where(size > 0, size, 1.0)
-        part = np.linalg.norm(scaled @ vectors[:, self.rank :], axis=1) / size
+        # what overflows is no number here, and a function that is none is not told
+        with np.errstate(over="ignore", invalid="ignore"):
+            scaled = functionals / columns
+            size = np.linalg.norm(scaled, axis=1)
+            size = np.where(size > 0, size, 1.0)
+            part = np.linalg.norm(scaled @ vectors[:, self.rank :], axis=1) / size
+            product = functionals @ self.factors[0]
+            if of_errors is not None:
+                product = product + of_errors @ self.factors[1]
+            bound = np.linalg.norm(product, axis=1)
         # rounding turns the null space by its size over the gap
         least = values[self.rank - 1] if self.rank else 1.0
         told = part <= min(1e-12 + 10 * self.resolution / least, 0.1)
-        product = functionals @ self.factors[0]
-        if of_errors is not None:
-            product = product + of_errors @ self.factors[1]
-        return np.where(told, np.linalg.norm(product, axis=1), np.inf)
+        return np.where(told & ~np.isnan(bound), bound, np.inf)
 
     def directions(self) -> list[tuple[float, dict[str, float]]]:
         """Return the directions of x that the readings tell worst, and their bounds.
