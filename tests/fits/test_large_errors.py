@@ -94,4 +94,4 @@ def test_of_a_stroke_a_fit_takes_the_support_alone() -> None:
         )
         answer = hybridtof.estimate(one.sensor, law, one.simulation.frames, ["joint_fit"])
         found.append(answer.results[0].range_m)
-    np.testing.assert_array_equal(*found)
+    np.testing.assert_array_equal(found[0], found[1])
