@@ -1,6 +1,7 @@
 """Notebooks run, hold their truth, keep their outputs, and their data can be made anew."""
 
 import re
+import sys
 from pathlib import Path
 
 import matplotlib as mpl
@@ -15,8 +16,8 @@ from service.frame_files import read_frames
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
 mpl.use("Agg")
 NAMES = sorted(path.name for path in NOTEBOOKS.glob("*.ipynb"))
-# what a notebook needs besides the standard library
-ALLOWED = {"hybridtof", "numpy", "matplotlib", "arviz", "json", "pathlib", "time", "warnings"}
+# what a notebook needs besides the standard library: httpx comes with the service
+ALLOWED = {"hybridtof", "numpy", "matplotlib", "arviz", "httpx"} | sys.stdlib_module_names
 DIAGNOSTICS = "posterior_diagnostics.ipynb"
 
 
