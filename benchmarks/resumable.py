@@ -9,13 +9,14 @@ import contextlib
 import csv
 import fcntl
 import io
+import multiprocessing
 import os
 import subprocess
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from pathlib import Path
 
-__all__ = ["Row", "code_version", "resume", "rows_of"]
+__all__ = ["Row", "code_version", "pool", "resume", "rows_of"]
 
 Row = Mapping[str, str | int | float]
 
@@ -38,6 +39,16 @@ def code_version() -> str:
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
     return found.stdout.strip() + ("-dirty" if changed.stdout.strip() else "")
+
+
+@contextlib.contextmanager
+def pool(workers: int) -> Iterator[Executor | None]:
+    """Give so many processes, or None where one does: this one."""
+    if workers == 1:
+        yield None
+        return
+    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as executor:
+        yield executor
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:

@@ -23,7 +23,7 @@ from service.shared import TINY_BYTES, shared_of
 from service.strict_json import SHORT, check_bulk, decode
 from simulator.validated import Validated
 
-__all__ = ["BodyOf", "check_media_type", "parse_document", "read_limited"]
+__all__ = ["BodyOf", "body_of", "check_media_type", "parse_document", "read_limited"]
 
 T = TypeVar("T", bound=Validated)
 
@@ -163,6 +163,18 @@ def check_media_type(
         raise UnsupportedMediaTypeError(message_of, name)
 
 
+async def body_of(request: Request) -> bytes:
+    """Collect the body of a request within the service's bounds; raises as `read_limited`."""
+    shared = shared_of(request)
+    return await read_limited(
+        request.stream(),
+        request.headers.get("content-length"),
+        shared.settings.max_body_bytes,
+        request.scope["hybridtof.held"],
+        shared.settings.client_s,
+    )
+
+
 class BodyOf(Generic[T]):
     """FastAPI dependency that reads a request body of one type: the request, and its bytes.
 
@@ -187,14 +199,8 @@ class BodyOf(Generic[T]):
             Each as its name says.
         """
         check_media_type(request.headers)
-        shared = shared_of(request)
-        raw = await read_limited(
-            request.stream(),
-            request.headers.get("content-length"),
-            shared.settings.max_body_bytes,
-            request.scope["hybridtof.held"],
-            shared.settings.client_s,
-        )
+        raw = await body_of(request)
         if len(raw) <= TINY_BYTES:
             return parse_document(self.model, raw), raw
-        return await shared.parsing.run(request, parse_document, self.model, raw), raw
+        parsing = shared_of(request).parsing
+        return await parsing.run(request, parse_document, self.model, raw), raw

@@ -7,16 +7,13 @@ Interrupt it at will: it goes on where it stopped. With `--sets 0` it only reads
 
 import argparse
 import functools
-import multiprocessing
-from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import ExitStack
 from pathlib import Path
 
 from benchmarks.calibration.cells import CELLS
 from benchmarks.calibration.figure import draw
 from benchmarks.calibration.ranks import columns_of, rank_row
 from benchmarks.calibration.report import cell_ranks, report
-from benchmarks.resumable import code_version, resume, rows_of
+from benchmarks.resumable import code_version, pool, resume, rows_of
 
 TABLES = Path(__file__).with_name("results")
 FIGURE = Path(__file__).parents[2] / "docs" / "calibration.png"
@@ -29,11 +26,7 @@ def main() -> None:
     parser.add_argument("--sets", type=int, help="at most so many data sets a cell")
     given = parser.parse_args()
     version = code_version()
-    with ExitStack() as stack:
-        executor: Executor | None = None
-        if given.workers > 1:
-            context = multiprocessing.get_context("spawn")
-            executor = stack.enter_context(ProcessPoolExecutor(given.workers, context))
+    with pool(given.workers) as executor:
         for slug in given.cell or CELLS:
             cell = CELLS[slug]
             count = cell.sets if given.sets is None else min(cell.sets, given.sets)

@@ -8,9 +8,6 @@ Interrupt it at will: it goes on where it stopped. With `--sets 0` it only reads
 import argparse
 import functools
 import itertools
-import multiprocessing
-from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import ExitStack
 from pathlib import Path
 
 from benchmarks.coverage.classes import CLASSES, TERMS, class_row
@@ -18,7 +15,7 @@ from benchmarks.coverage.figure import draw
 from benchmarks.coverage.intervals import COLUMNS
 from benchmarks.coverage.recorded import CELLS, recorded_row
 from benchmarks.coverage.report import SETS, coverage, recorded_report, report
-from benchmarks.resumable import code_version, resume, rows_of
+from benchmarks.resumable import code_version, pool, resume, rows_of
 from tests.recorded.experiment import PATH
 
 TABLES = Path(__file__).with_name("results")
@@ -37,11 +34,7 @@ def main() -> None:
     parser.add_argument("--sets", type=int, default=SETS, help="data sets a class")
     given = parser.parse_args()
     version = code_version()
-    with ExitStack() as stack:
-        executor: Executor | None = None
-        if given.workers > 1:
-            context = multiprocessing.get_context("spawn")
-            executor = stack.enter_context(ProcessPoolExecutor(given.workers, context))
+    with pool(given.workers) as executor:
         terms = given.term or list(TERMS)
         classes = [each for each in given.only or [*CLASSES, "recorded"] if each in CLASSES]
         for number in range(given.sets):  # the first of every class first, so that any time tells

@@ -4,7 +4,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
 from service import umbridge
-from service.bodies import read_limited
+from service.bodies import body_of
 from service.errors import OverdueError
 from service.shared import shared_of
 
@@ -26,17 +26,10 @@ async def info() -> Response:
 
 async def ask(request: Request) -> Response:
     """Answer what clients post; they do not say that it is JSON."""
-    shared = shared_of(request)
-    raw = await read_limited(
-        request.stream(),
-        request.headers.get("content-length"),
-        shared.settings.max_body_bytes,
-        request.scope["hybridtof.held"],
-        shared.settings.client_s,
-    )
+    raw = await body_of(request)
     operation = request.scope["path"].rpartition("/")[2]
     try:
-        answer = await shared.processes.run(request, umbridge.answer, operation, raw)
+        answer = await shared_of(request).processes.run(request, umbridge.answer, operation, raw)
     except OverdueError as error:
         answer = umbridge.refusal("InvalidInput", f"{error}: send fewer frames")
     return _said(*answer)

@@ -15,7 +15,7 @@ from simulator.errors import InvalidInputError
 from simulator.optics.brdf import fresnel_dielectric
 from simulator.optics.detectors import Detector
 from simulator.optics.emitters import Emitter, Narrow, intensity
-from simulator.optics.light import Light, Modulation, add
+from simulator.optics.light import Light, Modulation, add, along_one_path
 from simulator.optics.vectors import dot
 from simulator.validated import Validated
 
@@ -81,19 +81,7 @@ def _order(
     emitted = intensity(pattern, 0, table, ahead, math.sqrt(max(1.0 - ahead * ahead, 0.0)))
     flux = emitted * strength * spread / slope
     path = 0.5 * (near / cosine + inside * index / inner_cosine)
-    phase = modulation.wave_number * path
-    return Light(
-        flux=flux,
-        distance_m=path,
-        late=flux * min(path / modulation.r0, 1.0) if modulation.r0 > 0 else math.nan,
-        phasor=(
-            flux * complex(math.cos(phase), math.sin(phase))
-            if modulation.wave_number > 0
-            else complex(math.nan, math.nan)
-        ),
-        error=0.0,
-        status="lit" if flux > 0 else "out_of_view",
-    )
+    return along_one_path(flux, path, modulation, "lit" if flux > 0 else "out_of_view")
 
 
 def glass_crosstalk(

@@ -7,7 +7,7 @@ from typing import Literal
 
 from scipy.constants import speed_of_light
 
-__all__ = ["Light", "Modulation", "Status", "add", "dark", "scaled"]
+__all__ = ["Light", "Modulation", "Status", "add", "along_one_path", "dark", "scaled"]
 
 Status = Literal["lit", "edge_on", "opposite_faces", "out_of_view", "dark"]
 
@@ -96,6 +96,35 @@ class Light:
 def dark(status: Status) -> Light:
     """Return no light, with its reason."""
     return Light(0.0, math.nan, 0.0, 0j, 0.0, status)
+
+
+def along_one_path(flux: float, path_m: float, modulation: Modulation, status: Status) -> Light:
+    """Return light that has come one way, without an error of quadrature.
+
+    Parameters
+    ----------
+    flux : float
+        Phi / (Phi0 A_D) [1/m^2].
+    path_m : float
+        Half the length of the way [m].
+    modulation : Modulation
+        What the sensor does to light in time.
+    status : str
+        As of `Light`.
+    """
+    phase = modulation.wave_number * path_m
+    return Light(
+        flux=flux,
+        distance_m=path_m,
+        late=flux * min(path_m / modulation.r0, 1.0) if modulation.r0 > 0 else math.nan,
+        phasor=(
+            flux * complex(math.cos(phase), math.sin(phase))
+            if modulation.wave_number > 0
+            else complex(math.nan, math.nan)
+        ),
+        error=0.0,
+        status=status,
+    )
 
 
 def add(lights: Sequence[Light]) -> Light:

@@ -15,7 +15,7 @@ from simulator.optics.brdf import pack_material
 from simulator.optics.detectors import Detector
 from simulator.optics.emitters import Emitter
 from simulator.optics.geometry import light_path
-from simulator.optics.light import Light, Modulation, Status, dark
+from simulator.optics.light import Light, Modulation, Status, along_one_path, dark
 from simulator.optics.surfaces import Disk, Plane, Rectangle, Sphere, pack_surface
 
 __all__ = ["observe_narrow"]
@@ -97,17 +97,4 @@ def observe_narrow(
     if flux == 0.0:
         status: Status = "out_of_view" if float(to_d @ head[9:12]) <= 0 else "dark"
         return dark(status)
-    path = 0.5 * (ri + ro)
-    phase = modulation.wave_number * path
-    return Light(
-        flux=flux,
-        distance_m=path,
-        late=flux * min(path / modulation.r0, 1.0) if modulation.r0 > 0 else math.nan,
-        phasor=(
-            flux * complex(math.cos(phase), math.sin(phase))
-            if modulation.wave_number > 0
-            else complex(math.nan, math.nan)
-        ),
-        error=0.0,
-        status="lit",
-    )
+    return along_one_path(flux, 0.5 * (ri + ro), modulation, "lit")

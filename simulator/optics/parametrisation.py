@@ -11,9 +11,9 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
 from simulator.errors import InvalidInputError, Problem
+from simulator.optics.least_squares import solve_scaled
 
 __all__ = [
     "ObjectFit",
@@ -102,49 +102,6 @@ class ShadowFit:
     statement: str
 
 
-@dataclass(frozen=True, slots=True)
-class _Linear:
-    x: Array
-    covariance: Array
-    residuals: Array
-    rank: int
-
-
-def _inverse(r: Array) -> Array:
-    """Return the inverse of an upper triangle of two or three columns by back-substitution."""
-    n = r.shape[0]
-    inverse = np.zeros((n, n))
-    for j in range(n):
-        inverse[j, j] = 1.0 / r[j, j]
-        for i in range(j - 1, -1, -1):
-            inverse[i, j] = -float(r[i, i + 1 : j + 1] @ inverse[i + 1 : j + 1, j]) / r[i, i]
-    return inverse
-
-
-def _solve(matrix: Array, target: Array) -> _Linear:
-    """Solve least squares by QR with columns scaled to unit length and pivoting for the rank."""
-    scale = np.linalg.norm(matrix, axis=0)
-    q, r, order = linalg.qr(matrix / scale, mode="economic", pivoting=True)
-    diagonal = np.abs(np.diag(r))
-    rank = int(np.sum(diagonal > diagonal[0] * max(matrix.shape) * np.finfo(np.float64).eps))
-    columns = matrix.shape[1]
-    solution = np.zeros(columns)
-    inverse = np.full((columns, columns), np.nan)
-    if rank == columns:
-        inverse_r = _inverse(r)
-        solution[order] = inverse_r @ (q.T @ target)
-        inverse[np.ix_(order, order)] = inverse_r @ inverse_r.T
-    residuals = matrix @ (solution / scale) - target
-    freedom = matrix.shape[0] - columns
-    variance = float(residuals @ residuals) / freedom if freedom > 0 else math.nan
-    return _Linear(
-        x=solution / scale,
-        covariance=variance * inverse / np.outer(scale, scale),
-        residuals=residuals,
-        rank=rank,
-    )
-
-
 def _check(r: Array, values: Array, name: str, least: int) -> None:
     problems = []
     if r.ndim != 1 or r.size < least:
@@ -194,7 +151,7 @@ def fit_object(range_m: Array, flux: Array, weights: Weights = "proportional") -
     s, f = r / unit, phi * unit * unit
     weight = f if weights == "proportional" else f * f / float(np.max(f))
     matrix = np.column_stack([s**2, s**3, s**4]) * weight[:, None]
-    fit = _solve(matrix, weight / f)
+    fit = solve_scaled(matrix, weight / f)
     x = fit.x / np.array([1.0, unit, unit * unit])
     scaling = np.array([1.0, unit, unit * unit])
     covariance = fit.covariance / np.outer(scaling, scaling)
@@ -278,7 +235,7 @@ def fit_shadow(range_m: Array, visible: Array) -> ShadowFit:
         raise InvalidInputError.at("/visible", "every share must be below 1: there is a shadow")
     unit = math.exp(float(np.mean(np.log(r))))
     s, hidden = r / unit, 1.0 - share
-    fit = _solve(np.column_stack([s**2, s]) * hidden[:, None], share)
+    fit = solve_scaled(np.column_stack([s**2, s]) * hidden[:, None], share)
     y2, y1 = float(fit.x[0]) / unit**2, float(fit.x[1]) / unit
     scaling = np.array([unit**2, unit])
     covariance = fit.covariance / np.outer(scaling, scaling)

@@ -102,6 +102,12 @@ def _pack_shell(shell: Shell, emitter: Emitter, detector: Detector) -> Array:
     )
 
 
+def _pack(modulation: Modulation) -> Array:
+    return np.array(
+        [modulation.wave_number, 1.0 / modulation.r0 if modulation.r0 > 0 else 0.0, 1.0]
+    )
+
+
 def _rules(points: Points | None) -> tuple[Array, Array]:
     if points is None:
         return GAUSS_KRONROD, GAUSS_KRONROD
@@ -181,12 +187,9 @@ def observe_batch(
         return [observe_narrow(s, emitter, detector, modulation) for s in surfaces]
     rows = np.vstack([pack_surface(s) for s in surfaces])
     materials = np.vstack([pack_material(s.material) for s in surfaces])
-    signal = np.array(
-        [modulation.wave_number, 1.0 / modulation.r0 if modulation.r0 > 0 else 0.0, 1.0]
-    )
     head, table = _pack_head(emitter, detector)
     values, errors, states = _observe_many(
-        rows, head, table, materials, None, signal, _rules(points), tolerance
+        rows, head, table, materials, None, _pack(modulation), _rules(points), tolerance
     )
     return _lights(values, errors, states, modulation)
 
@@ -219,13 +222,10 @@ def _backdrop_sums(
             "/emitter/pattern", "a narrow beam lights one point, not a background"
         )
     head, table = _pack_head(emitter, detector)
-    signal = np.array(
-        [modulation.wave_number, 1.0 / modulation.r0 if modulation.r0 > 0 else 0.0, 1.0]
-    )
     backdrop = _pack_shell(shell, emitter, detector)
     materials = np.tile(pack_material(shell.material), (rows.shape[0], 1))
     values, errors, states = _observe_many(
-        rows, head, table, materials, backdrop, signal, _rules(None), tolerance
+        rows, head, table, materials, backdrop, _pack(modulation), _rules(None), tolerance
     )
     return _lights(values, errors, states, modulation)
 

@@ -12,7 +12,7 @@ from inference.density.discrepant import DiscrepantDensity, with_discrepancy
 from inference.density.profile import best_ranges, linearise
 from inference.frame.gaussian import log_top
 from inference.posterior import fold
-from inference.posterior.answer.ranges import draw_ranges, replicate
+from inference.posterior.answer.replicate import replicate
 from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames
 from simulator.scene import parse_scene
@@ -54,7 +54,7 @@ def test_likelihood_and_ranges_agree_with_a_sum_over_paths(kind: str, snr: float
     # skewness of log-normal noise of this size, sd^2 a frame
     allowed = 4 * wanted.error + len(frames) * sd**2 / 12
     assert density(NOTHING)[0] == pytest.approx(wanted.log_likelihood, abs=allowed)
-    drawn = draw_ranges(density, np.empty((4000, 0)), np.random.default_rng(2))
+    drawn = density.draw_log_ranges(np.empty((4000, 0)), np.random.default_rng(2))
     error = np.hypot(wanted.mean_u_error, drawn.std(axis=0) / math.sqrt(len(drawn)))
     np.testing.assert_array_less(
         np.abs(drawn.mean(axis=0) - wanted.mean_u), 4 * error + 0.05 * drawn.std(axis=0)
@@ -140,7 +140,7 @@ def test_an_empty_frame_counts_as_without_discrepancy(kind: str) -> None:
     density = density_of(sensor, scene, both, 0.05)
     assert density.log_likelihood(NOTHING) == pytest.approx(alone + five, rel=1e-9)
     assert density_of(sensor, scene, empty, 0.05).log_likelihood(NOTHING) == pytest.approx(alone)
-    drawn = draw_ranges(density, np.empty((3, 0)), np.random.default_rng(1))
+    drawn = density.draw_log_ranges(np.empty((3, 0)), np.random.default_rng(1))
     assert np.isnan(drawn[:, 5]).all()
     assert np.isfinite(drawn[:, :5]).all()
     again = replicate(density, np.empty((3, 0)), drawn, np.random.default_rng(1))
@@ -244,7 +244,7 @@ def test_ranks_of_ranges_and_of_the_amplitude_are_uniform(kind: str) -> None:
         weight = np.exp(weight - weight.max())
         total = np.cumsum(weight) / weight.sum()
         z = np.interp(rng.random(99), total, grid[:, 0])[:, None]
-        drawn = np.exp(draw_ranges(density, z, rng))
+        drawn = np.exp(density.draw_log_ranges(z, rng))
         true_z = density.parameters.standard(np.array([[made.parameters["object.c2"]]]))[0, 0]
         ranks["amplitude"].append(float(np.interp(true_z, grid[:, 0], total)))
         for name, j in (("first", 0), ("last", n - 1)):

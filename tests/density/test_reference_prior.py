@@ -11,7 +11,6 @@ from scipy import integrate, stats
 from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.density.discrepant import with_discrepancy
 from inference.frame.range_prior import LEAST_INFORMATION
-from inference.posterior.answer.ranges import draw_ranges
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
 from simulator.errors import InvalidInputError
@@ -191,7 +190,7 @@ def test_a_range_is_drawn_from_what_is_integrated(kind: str) -> None:
     scene = {"object": OBJECT, "crosstalk": list(CROSSTALK), "range_m": SPAN}
     frames = data(sensor, {"crosstalk": list(CROSSTALK)}, 1, seed=4, span=(0.8, 0.9)).frames
     density = density_of(sensor, scene, frames)
-    drawn = draw_ranges(density, np.empty((4000, 0)), np.random.default_rng(5))[:, 0]
+    drawn = density.draw_log_ranges(np.empty((4000, 0)), np.random.default_rng(5))[:, 0]
     u = np.linspace(math.log(SPAN["low"]), math.log(SPAN["high"]), 3001)
     mass = np.exp(log_densities(sensor, scene, frames.readings[0], u))
     law = np.concatenate([[0.0], np.cumsum(mass[1:] + mass[:-1])])

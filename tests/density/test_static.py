@@ -18,7 +18,6 @@ from inference.frame.gaussian import log_top
 from inference.frame.log_density import log_density
 from inference.frame.range_prior import log_range_density
 from inference.posterior import fold
-from inference.posterior.answer.ranges import draw_ranges
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames
@@ -116,7 +115,7 @@ def test_a_single_frame_has_one_range_anyway(name: str) -> None:
 def test_drawn_ranges_are_common_and_follow_the_joint_density() -> None:
     static = with_common_range(density_of("pulsed", 6))
     z = np.zeros((1, len(static.parameters)))
-    drawn = draw_ranges(static, np.repeat(z, 4000, axis=0), np.random.default_rng(4))
+    drawn = static.draw_log_ranges(np.repeat(z, 4000, axis=0), np.random.default_rng(4))
     assert (drawn == drawn[:, :1]).all()
     width = np.ptp(drawn)
     u = np.linspace(drawn.min() - width, drawn.max() + width, 4001)

@@ -18,6 +18,7 @@ from inference.estimate import all_roots
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import PulsedSensor, parse_sensor
+from tests.extreme.scene_in_numbers import SceneInNumbers
 from tests.extreme.sturm import roots_between, value
 from tests.extreme.tally import Tally
 
@@ -30,20 +31,11 @@ EPSILON = float(np.finfo(float).eps)
 _EXCUSED = [k * EPSILON for k in (1, 2, 4, 8, 16)]
 
 
-@dataclasses.dataclass(frozen=True)
-class Extreme:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Extreme(SceneInNumbers):
     """A scene of a pulse, in numbers."""
 
-    technique: str
     pulse_width_s: float
-    gain: float
-    c0: float
-    c1: float
-    c2: float
-    distance: float
-    strength: float
-    c0s: float
-    c1s: float
 
     @property
     def sensor(self) -> PulsedSensor:
@@ -57,22 +49,6 @@ class Extreme:
         )
         assert isinstance(parsed, PulsedSensor)
         return parsed
-
-    @property
-    def document(self) -> dict[str, object]:
-        scene: dict[str, object] = {
-            "object": {"c0": self.c0, "c1": self.c1, "c2": self.c2},
-            "discrepancy": 0,
-        }
-        if self.technique.startswith("background"):
-            known = self.technique != "background_cancelling"
-            prior = {"prior": "lognormal", "median": self.strength, "sigma": 1.0}
-            scene["background"] = {
-                "strength": self.strength if known else prior,
-                "distance_m": self.distance,
-                "shadow": {"c0": self.c0s, "c1": self.c1s},
-            }
-        return scene
 
     def readings(self, r: Array) -> Array:
         """Readings of the object, and of a wall, at ranges of any size [m]."""
@@ -194,7 +170,7 @@ def extremes(technique: str, rng: np.random.Generator) -> Iterator[Extreme]:
             continue
         reach = size * 10.0 ** rng.uniform(-2, 4)
         yield Extreme(
-            technique,
+            technique=technique,
             pulse_width_s=float(2 * reach / 299792458.0),
             gain=float(10.0 ** rng.uniform(-12, 12)),
             c0=c0,

@@ -19,6 +19,7 @@ from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import SineWaveSensor, parse_sensor
 from tests.extreme.balls import BITS, Function, exact, roots_of
+from tests.extreme.scene_in_numbers import SceneInNumbers
 from tests.extreme.tally import Tally
 
 __all__ = ["WAVES", "Wave", "certified_roots", "tally_waves", "wave_error", "waves"]
@@ -30,21 +31,12 @@ _LIGHT = 299792458
 _EXCUSED = [k * EPSILON for k in (1, 4, 16)]
 
 
-@dataclasses.dataclass(frozen=True)
-class Wave:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Wave(SceneInNumbers):
     """A scene of a sine wave, in numbers."""
 
-    technique: str
     frequency_hz: float
     offset: float
-    gain: float
-    c0: float
-    c1: float
-    c2: float
-    distance: float
-    strength: float
-    c0s: float
-    c1s: float
 
     @property
     def sensor(self) -> SineWaveSensor:
@@ -59,22 +51,6 @@ class Wave:
         )
         assert isinstance(parsed, SineWaveSensor)
         return parsed
-
-    @property
-    def document(self) -> dict[str, object]:
-        scene: dict[str, object] = {
-            "object": {"c0": self.c0, "c1": self.c1, "c2": self.c2},
-            "discrepancy": 0,
-        }
-        if self.technique.startswith("background"):
-            prior = {"prior": "lognormal", "median": self.strength, "sigma": 1.0}
-            unknown = self.technique == "background_cancelling"
-            scene["background"] = {
-                "strength": prior if unknown else self.strength,
-                "distance_m": self.distance,
-                "shadow": {"c0": self.c0s, "c1": self.c1s},
-            }
-        return scene
 
     @property
     def high(self) -> arb:
@@ -276,7 +252,7 @@ def waves(technique: str, rng: np.random.Generator) -> Iterator[Wave]:
         # what the object sends from where the background stands, over 8 decades
         light = gain * c0 * c2 / (reach**2 * (reach * (reach + c1) + c0))
         yield Wave(
-            technique,
+            technique=technique,
             frequency_hz=float(frequency),
             offset=float(rng.uniform(-math.pi, math.pi)),
             gain=float(gain),

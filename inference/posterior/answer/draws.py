@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.posterior.answer.ranges import draw_ranges, replicate
+from inference.posterior.answer.replicate import replicate
 from inference.posterior.job import Job
 from inference.posterior.sample import Sample
 from inference.posterior.sampling.diagnostics import effective_sample_size
@@ -112,7 +112,7 @@ def draws_of(
     each = min(max(math.ceil(count / (ensembles * walkers)), 1), steps)
     thinned = np.linspace(0, steps - 1, each).astype(np.intp)
     z = sample.z[:, :, thinned].reshape(ensembles * walkers * each, d)
-    log_r = draw_ranges(density, z, rng)
+    log_r = density.draw_log_ranges(z, rng)
     readings = replicate(density, z, log_r, rng)
     likelihood = density.frame_log_likelihoods(z)
     usable = job.usable

@@ -12,7 +12,7 @@ from inference.density.profile import best_ranges
 from inference.density.static import StaticDensity
 from inference.density.whitened import Whitened, whitened
 from inference.frame.known_range import beside, free_of_range, rates_of
-from inference.posterior.answer.ranges import replicate_frames
+from inference.posterior.answer.replicate import replicate_frames
 from inference.posterior.job import Job
 
 __all__ = ["FitResiduals", "fit_residuals"]

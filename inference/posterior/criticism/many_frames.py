@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from inference.density.collapsed import CollapsedDensity
-from inference.posterior.answer.ranges import replicate_frames
+from inference.posterior.answer.replicate import replicate_frames
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
 
 __all__ = ["bias_of_many_frames", "following"]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import integrate, stats
 
 from inference.density.collapsed import collapsed_density
-from inference.posterior.answer.ranges import draw_ranges, replicate
+from inference.posterior.answer.replicate import replicate
 from simulator.frames import Frames
 from simulator.readings import covariance
 from simulator.scene import parse_scene
@@ -67,7 +67,7 @@ def test_draws_have_the_law_of_the_range(name: str) -> None:
     """Kolmogorov-Smirnov, each with a false-alarm rate of 1e-4 of another seed."""
     case = CASES[name]
     density = collapsed_density(case.sensor, case.scene, case.frames)
-    drawn = draw_ranges(density, np.empty((DRAWS, 0)), np.random.default_rng(90))[:, 0]
+    drawn = density.draw_log_ranges(np.empty((DRAWS, 0)), np.random.default_rng(90))[:, 0]
     low, high = math.log(case.low), math.log(case.high)
     grid = np.linspace(low, high, 400_001)
     values = log_density(case, grid)
@@ -91,7 +91,7 @@ def test_the_hard_cases_are_what_they_say() -> None:
 def test_frames_without_object_have_no_range() -> None:
     frames = Frames(np.ones((3, 2)), object_present=np.array([True, False, True]))
     density = collapsed_density(sensor_of("pulsed"), parse_scene({}), frames)
-    drawn = draw_ranges(density, np.zeros((5, 3)), np.random.default_rng(91))
+    drawn = density.draw_log_ranges(np.zeros((5, 3)), np.random.default_rng(91))
     assert np.isnan(drawn[:, 1]).all()
     assert np.isfinite(drawn[:, [0, 2]]).all()
 
@@ -100,7 +100,8 @@ def test_one_seed_gives_the_same_draws() -> None:
     case = CASES["broad"]
     density = collapsed_density(case.sensor, case.scene, case.frames)
     first, again, other = (
-        draw_ranges(density, np.empty((50, 0)), np.random.default_rng(seed)) for seed in (1, 1, 2)
+        density.draw_log_ranges(np.empty((50, 0)), np.random.default_rng(seed))
+        for seed in (1, 1, 2)
     )
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)

@@ -11,7 +11,6 @@ from inference.density.collapsed import collapsed_density
 from inference.density.discrepant import DiscrepantDensity, with_discrepancy
 from inference.identifiability.status import Identifiability
 from inference.posterior.answer.fit import Fit
-from inference.posterior.answer.ranges import draw_ranges
 from inference.posterior.criticism.discrepancy_check import (
     LargerDiscrepancy,
     judge_fit,
@@ -61,7 +60,7 @@ def test_the_bayes_factor_is_the_ratio_of_both_integrals() -> None:
     wanted = np.exp(larger(grid) - density(grid).max()).sum()
     wanted /= np.exp(density(grid) - density(grid).max()).sum()
     z = draws_of(density, 1)
-    found = larger_discrepancy(density, z, draw_ranges(density, z, np.random.default_rng(1)))
+    found = larger_discrepancy(density, z, density.draw_log_ranges(z, np.random.default_rng(1)))
     gain = np.exp(larger.log_likelihood(z) - density.log_likelihood(z))
     error = gain.std() / math.sqrt(len(z))
     assert found.bayes_factor == pytest.approx(wanted, abs=5 * error + 0.02 * wanted)
@@ -72,14 +71,14 @@ def test_an_error_of_the_stated_size_is_no_misfit() -> None:
     for seed in range(10):
         density = amplitude_density(stated=0.05, true=0.05, seed=seed)
         z = draws_of(density, seed)
-        found = larger_discrepancy(density, z, draw_ranges(density, z, np.random.default_rng(1)))
+        found = larger_discrepancy(density, z, density.draw_log_ranges(z, np.random.default_rng(1)))
         assert not judge_fit(GOOD, found).misfit
 
 
 def test_an_error_far_above_the_stated_size_is_a_misfit() -> None:
     density = amplitude_density(stated=0.01, true=0.3, seed=3)
     z = draws_of(density, 3)
-    found = larger_discrepancy(density, z, draw_ranges(density, z, np.random.default_rng(1)))
+    found = larger_discrepancy(density, z, density.draw_log_ranges(z, np.random.default_rng(1)))
     assert judge_fit(GOOD, found).misfit
 
 

@@ -1,4 +1,4 @@
-"""Draws of every range from p(r_i | theta, y_i), and readings replicated at them."""
+"""Readings replicated at draws of parameters and ranges."""
 
 import math
 
@@ -14,7 +14,7 @@ from inference.frame.noise import noise_of
 from simulator.compiled import compiled
 from simulator.readings import object_readings
 
-__all__ = ["draw_ranges", "replicate", "replicate_frames"]
+__all__ = ["replicate", "replicate_frames"]
 
 Array = NDArray[np.float64]
 
@@ -55,26 +55,6 @@ def _replicate(
             out[i, j, 0] = mean[0] + error + common + noise.common1 * normals[i, j, 3]
             error = math.sqrt(noise.own2) * normals[i, j, 1]
             out[i, j, 1] = mean[1] + error + common + noise.common2 * normals[i, j, 3]
-
-
-def draw_ranges(density: CollapsedDensity, z: Array, rng: np.random.Generator) -> Array:
-    """Draw the range of every frame given each parameter vector.
-
-    Parameters
-    ----------
-    density : CollapsedDensity
-        The density.
-    z : ndarray, shape (n, d)
-        Draws of the parameters, of positive density.
-    rng : numpy.random.Generator
-        Source of randomness.
-
-    Returns
-    -------
-    ndarray, shape (n, frames)
-        log r; nan for a frame without object.
-    """
-    return density.draw_log_ranges(z, rng)
 
 
 def replicate(
