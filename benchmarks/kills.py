@@ -11,137 +11,21 @@ times apart) and draws must be those of an undisturbed run, byte for byte.
 
 import argparse
 import contextlib
-import dataclasses
 import json
-import os
 import random
-import re
-import shutil
-import signal
-import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import httpx
+from benchmarks.cluster import Cluster
+from benchmarks.fleet import SERVE, Fleet, fleet
+from benchmarks.postgres import postgres, restart
 
-from benchmarks.cluster import Cluster, children, command_of
-
-SERVE = (sys.executable, "-m", "service.cli", "serve", "--port", "0")
 ENDED = {"done", "cancelled", "failed"}
-
-
-class Service:
-    """A service in a process of its own, on a port that the system picks."""
-
-    def __init__(self, command: Sequence[str], settings: Mapping[str, str]) -> None:
-        kept = {k: v for k, v in os.environ.items() if not k.startswith("HYBRIDTOF_")}
-        kept["HYBRIDTOF_WARM"] = "off"
-        here = {"PYTHONPATH": str(Path(__file__).parents[1])}
-        self.process = subprocess.Popen(  # noqa: S603
-            command, stderr=subprocess.PIPE, text=True, env=kept | here | dict(settings)
-        )
-        assert self.process.stderr is not None
-        said = []
-        for line in self.process.stderr:
-            said.append(line)
-            if match := re.search(r"running on (http://\S+)", line):
-                self.address = match[1]
-                break
-        else:
-            raise RuntimeError("".join(said))
-        # what it says later must not fill the pipe
-        self._drain = subprocess.Popen(("cat",), stdin=self.process.stderr, stdout=-3)  # noqa: S607
-
-    def workers(self) -> list[int]:
-        """Return its worker processes."""
-        return [pid for pid in children(self.process.pid) if "spawn_main" in command_of(pid)]
-
-    def kill(self) -> None:
-        """End it as a power cut would."""
-        self.process.kill()
-        self.process.wait()
-        self._drain.wait()
-        assert self.process.stderr is not None
-        self.process.stderr.close()
-
-
-@dataclasses.dataclass
-class Fleet:
-    """Services that share a store.
-
-    Attributes
-    ----------
-    command : sequence of str
-        Starts one.
-    settings : mapping
-        Of each, as variables of its environment.
-    services : list of Service
-        Those that live.
-    """
-
-    command: Sequence[str]
-    settings: Mapping[str, str]
-    services: list[Service]
-
-    def ask(self, method: str, path: str, **options: Any) -> httpx.Response:
-        """Ask any of the services, until one answers."""
-        while True:
-            for service in self.services:
-                with contextlib.suppress(httpx.TransportError):
-                    address = service.address + path
-                    response = httpx.request(method, address, timeout=60, **options)
-                    if response.status_code != 503:
-                        return response
-            time.sleep(0.05)
-
-    def kill(self, rng: random.Random) -> str:
-        """Kill a service or a worker, whichever comes; a service is started anew."""
-        index = rng.randrange(len(self.services))
-        workers = self.services[index].workers()
-        if (which := rng.randrange(len(workers) + 1)) == 0:
-            return self.kill_service(index)
-        return _killed(workers[which - 1])
-
-    def kill_service(self, index: int = 0) -> str:
-        """Kill a service, and start it anew."""
-        self.services[index].kill()
-        self.services[index] = Service(self.command, self.settings)
-        return "service"
-
-    def kill_worker(self, index: int = 0) -> str:
-        """Kill a worker of a service, as soon as there is one."""
-        while not (workers := self.services[index].workers()):
-            time.sleep(0.02)
-        return _killed(workers[-1])
-
-    def steps(self) -> list[int]:
-        """Return how far the jobs are, the newest first."""
-        page = self.ask("GET", "/v1/posteriors?limit=200").json()
-        return [item["progress"]["steps"] for item in page["items"]]
-
-
-def _killed(worker: int) -> str:
-    with contextlib.suppress(ProcessLookupError):
-        os.kill(worker, signal.SIGKILL)
-    return "worker"
-
-
-@contextlib.contextmanager
-def fleet(command: Sequence[str], settings: Mapping[str, str], services: int) -> Iterator[Fleet]:
-    """Start services, and kill them at the end."""
-    running = Fleet(command, settings, [])
-    try:
-        for _ in range(services):
-            running.services.append(Service(command, settings))
-        yield running
-    finally:
-        for service in running.services:
-            service.kill()
 
 
 def survived(
@@ -190,49 +74,6 @@ def _create(running: Fleet, key: str, body: Any) -> Any:
     response = running.ask("POST", "/v1/posteriors", json=body, headers={"Idempotency-Key": key})
     assert response.status_code == 202, response.text
     return response.json()
-
-
-def _postgres_binaries() -> Path | None:
-    folders = sorted(Path("/usr/lib/postgresql").glob("*/bin"))
-    found = shutil.which("initdb") or (str(folders[-1] / "initdb") if folders else None)
-    return None if found is None else Path(found).resolve().parent
-
-
-def _run_postgres(home: Path, program: str, *arguments: str) -> None:
-    binaries = _postgres_binaries()
-    assert binaries is not None
-    who: tuple[str, ...] = ()
-    if os.geteuid() == 0:  # the server refuses to run as root
-        shutil.chown(home, "postgres")
-        who = ("setpriv", "--reuid=postgres", "--regid=postgres", "--clear-groups")
-    command = (*who, str(binaries / program), "-D", str(home / "data"), *arguments)
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=home)  # noqa: S603
-
-
-@contextlib.contextmanager
-def postgres() -> Iterator[str | None]:
-    """Run a PostgreSQL of its own, reached through a socket; None where none is installed."""
-    if _postgres_binaries() is None:
-        yield None
-        return
-    home = Path(tempfile.mkdtemp(prefix="hybridtof-pg-"))
-    options = f"-k {home} -c listen_addresses= -c max_connections=60"
-    try:
-        _run_postgres(home, "initdb", "-U", "me", "-A", "trust")
-        _run_postgres(home, "pg_ctl", "-w", "-l", str(home / "log"), "-o", options, "start")
-        try:
-            yield f"postgresql://me@/postgres?host={home}"
-        finally:
-            _run_postgres(home, "pg_ctl", "-m", "immediate", "-w", "stop")
-    finally:
-        shutil.rmtree(home, ignore_errors=True)
-
-
-def restart(address: str) -> str:
-    """Crash a server that `postgres` runs, and start it anew."""
-    home = Path(address.rpartition("host=")[2])
-    _run_postgres(home, "pg_ctl", "-m", "immediate", "-w", "-l", str(home / "log"), "restart")
-    return "database"
 
 
 def requests(count: int) -> dict[str, Any]:

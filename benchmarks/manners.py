@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.kills import SERVE, Service
+from benchmarks.fleet import SERVE, Service
 
 __all__ = ["Answer", "ask", "crowd", "heaviest", "memory_mb", "probes"]
 

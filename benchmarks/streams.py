@@ -28,7 +28,7 @@ from typing import Any
 import httpx
 import numpy as np
 
-from benchmarks.kills import SERVE, Service
+from benchmarks.fleet import SERVE, Service
 from benchmarks.manners import memory_mb
 
 NDJSON = {"Content-Type": "application/x-ndjson"}

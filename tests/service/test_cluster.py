@@ -10,7 +10,8 @@ import pytest
 pytest.importorskip("distributed", reason="Dask is not installed: hybridtof[cluster]")
 
 from benchmarks.cluster import Cluster, certificate
-from benchmarks.kills import Fleet, fleet, survived
+from benchmarks.fleet import Fleet, fleet
+from benchmarks.kills import survived
 from service import cluster
 from service.cli import main
 from tests.service.conftest import FRAMES, SENSOR

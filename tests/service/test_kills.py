@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.kills import Fleet, fleet, postgres, restart, survived
+from benchmarks.fleet import Fleet, fleet
+from benchmarks.kills import survived
+from benchmarks.postgres import postgres, restart
 from tests.service.conftest import FRAMES, SENSOR
 from tests.service.fake_fold import CHUNKS, STEPS
 from tests.service.test_jobs import undisturbed

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.kills import Service
+from benchmarks.fleet import Service
 from benchmarks.manners import ask, crowd, heaviest, memory_mb, probes
 from service.app import create_app
 from service.border.held import Held, Room

@@ -16,7 +16,7 @@ import websockets
 from starlette.websockets import WebSocketDisconnect
 from websockets.exceptions import InvalidStatus
 
-from benchmarks.kills import postgres
+from benchmarks.postgres import postgres
 from benchmarks.streams import lines_of, survived, system
 from service.app import create_app
 from service.border.keys import new_key, write_keys

@@ -2,7 +2,7 @@
 
 These gates look at the draws alone. Those that ask the density itself (another branch, another way
 to the same means) are in `cross_check`; how often each alarms falsely, and what it catches, is
-measured by `benchmarks/verdict_gates.py`.
+measured by `python -m benchmarks.verdict_gates`.
 """
 
 import dataclasses
