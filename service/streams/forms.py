@@ -2,6 +2,7 @@
 
 import csv
 import math
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import orjson
@@ -29,6 +30,16 @@ class Form(Protocol):
         """
         ...
 
+    def frames_in(self, lines: Sequence[bytes]) -> list[dict[str, Any]]:
+        """Return the members of many lines, the same as of each by itself.
+
+        Raises
+        ------
+        MalformedError, InvalidInputError
+            Where any of them cannot be read.
+        """
+        ...
+
 
 class JsonLines:
     """Lines that are JSON objects.
@@ -51,6 +62,37 @@ class JsonLines:
         if len(frame) > SHORT:
             raise MalformedError(f"the line has more than {SHORT} members")
         return frame
+
+    def frames_in(self, lines: Sequence[bytes]) -> list[dict[str, Any]]:
+        """See `Form.frames_in`."""
+        return _all_at_once(lines) or [self.frame_in(line) for line in lines]
+
+
+def _all_at_once(lines: Sequence[bytes]) -> list[dict[str, Any]] | None:
+    """Read lines as one list; None where that might not be what each is by itself.
+
+    Every line begins and ends with the only braces that it has, and there are as many objects as
+    braces: no object goes on in another line, and none lies between two.
+    """
+    n, body = len(lines), b"\n".join(lines)
+    if not (
+        body.startswith(b"{")
+        and body.endswith(b"}")
+        and body.count(b"{") == n
+        and body.count(b"\n") == body.count(b"}\n{") == n - 1
+        and b"[" not in body
+    ):
+        return None
+    try:
+        frames: list[dict[str, Any]] = orjson.loads(b"[%b]" % body.replace(b"\n", b","))
+    except orjson.JSONDecodeError:
+        return None
+    # a name that came twice, or a text with a colon, has one too many; frame_in tells which
+    if len(frames) != n or set(map(type, frames)) != {dict}:
+        return None
+    if body.count(b":") != sum(map(len, frames)) or max(map(len, frames)) > SHORT:
+        return None
+    return frames
 
 
 def _plain(line: bytes, frame: dict[str, Any]) -> bool:
@@ -121,6 +163,10 @@ class CsvLines:
                 value = int(value)
             frame[name] = cell if value is None else value
         return frame
+
+    def frames_in(self, lines: Sequence[bytes]) -> list[dict[str, Any]]:
+        """See `Form.frames_in`."""
+        return [self.frame_in(line) for line in lines]
 
 
 def _fields(line: bytes) -> list[str]:

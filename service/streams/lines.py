@@ -6,10 +6,13 @@ from typing import Any, NamedTuple, Protocol
 from inference.self_calibration.state import CalibrationState
 from inference.tracking.state import TrackState
 
-__all__ = ["COUNTS", "WINDOW", "Earlier", "Line", "Place", "Taken"]
+__all__ = ["COUNTS", "LARGEST", "WINDOW", "Earlier", "Line", "Place", "Taken"]
 
 WINDOW = 4096
 """Numbers behind the last one whose answers are kept."""
+
+LARGEST = 2**53 - 1
+"""Of numbers, so that readers of JSON that know only floats do not round them."""
 
 COUNTS = ("answered", "errors", "dropped", "gaps")
 """Of lines, by what became of them: members of `Place`."""

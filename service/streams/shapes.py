@@ -107,19 +107,28 @@ def shape_of(model: Tracker, names: tuple[str, ...]) -> Shape:
     return Shape(columns, passed, pick, kinds, problem)
 
 
-def frames_of(model: Tracker, shape: Shape, rows: Sequence[tuple[Any, ...]]) -> Frames:
+def frames_of(model: Tracker, shape: Shape, columns: Sequence[Sequence[Any]]) -> Frames:
     """Return the frames of lines of one shape, whose values are sound.
+
+    Parameters
+    ----------
+    model : Tracker
+        Which follows the stream.
+    shape : Shape
+        Of the lines.
+    columns : sequence of sequence
+        The values of all lines, in the order of the shape's columns.
 
     Raises
     ------
     InvalidInputError
         Where a value breaks a rule of its own.
     """
-    if _FLAGS in shape.kinds:
-        columns: Any = map(list, zip(*rows, strict=True))
-    else:
-        columns = np.array(rows, dtype=np.float64).T
-    return frames_from_columns(model.sensor, dict(zip(shape.columns, columns, strict=True)))
+    arrays = {
+        name: np.array(column, dtype=np.bool_ if kinds is _FLAGS else np.float64)
+        for name, column, kinds in zip(shape.columns, columns, shape.kinds, strict=True)
+    }
+    return frames_from_columns(model.sensor, arrays)
 
 
 def one_frame(model: Tracker, frame: Mapping[str, Any], columns: tuple[str, ...]) -> Frames:

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from inference.self_calibration.following import Piece
 from service.errors import BodyTooLargeError, ConflictError, GoneError
 from service.streams.answered import answers_of, encoded, error_of
 from service.streams.cutting import LONGEST
 from service.streams.followers import Follower
 from service.streams.forms import Form
-from service.streams.lines import COUNTS, WINDOW, Earlier, Line, Place, Taken
+from service.streams.lines import COUNTS, LARGEST, WINDOW, Earlier, Line, Place, Taken
 from service.streams.shapes import (
     Shape,
     frames_of,
@@ -25,12 +26,11 @@ from service.streams.shapes import (
     passes,
     shape_of,
 )
+from service.streams.together import together
 from simulator.errors import HybridTofError, InvalidInputError
 from simulator.frames import Frames
 
 __all__ = ["take"]
-
-_LARGEST = 2**53 - 1
 
 # a frame that waits for the tracker, together with others of its shape: where its answer goes, its
 # number, time and arrival, its values, and what else is to be said
@@ -92,9 +92,10 @@ class _Batch:
         self._shape: Shape | None = None
 
     def take(self, lines: Sequence[Line]) -> Taken:
-        for line in lines:
-            self._take(line)
-        self._track()
+        if not self._alike(lines):
+            for line in lines:
+                self._take(line)
+            self._track()
         new = [self._answers[at] for at in self._at.values()]
         repeated = len(self._repeats)
         for at, sequence, last in self._repeats:
@@ -111,6 +112,34 @@ class _Batch:
             **{name: getattr(self._place, name) + n for name, n in self._counts.items()},
         )
         return Taken(place, self._answers, new, repeated, any(self._counts.values()))
+
+    def _alike(self, lines: Sequence[Line]) -> bool:
+        """Answer lines that are good and alike in one go; tell whether they are."""
+        if self._alone or not lines:
+            return False
+        after = max(self._sequence, 0) + 1 + self._unnumbered + lines[0].dropped
+        found = together(self._model, self._form, lines, (self._sequence, after, self._time))
+        if found is None:
+            return False
+        try:
+            state, pieces = self._follower.follow(self._state, found.frames, found.sequences)
+        except InvalidInputError:
+            return False
+        also = found.passed
+        told = _also(found.sequences[0] - after if self._sequence >= 0 else 0, lines[0])
+        if told:
+            also = also or [None] * len(lines)
+            also[0] = told | (also[0] or {})
+        self._counts["gaps"] += told.get("gap", 0)
+        self._counts["dropped"] += told.get("dropped", 0)
+        self._sequence, self._unnumbered = found.sequences[-1], 0
+        self._time = float(found.times[-1])
+        self._at = {sequence: at for at, sequence in enumerate(found.sequences)}
+        self._answers = [b""] * len(lines)
+        arrivals = [line.arrived for line in lines]
+        self._state = state
+        self._say(pieces, range(len(lines)), found.sequences, found.times, arrivals, also)
+        return True
 
     def _take(self, line: Line) -> None:
         """Answer a line, or let it wait for the tracker."""
@@ -189,25 +218,38 @@ class _Batch:
         at, sequences, times, arrivals, values, also = zip(*waiting, strict=True)
         try:
             if frames is None:
-                frames = frames_of(self._model, self._shape, values)
+                frames = frames_of(self._model, self._shape, tuple(zip(*values, strict=True)))
             self._state, pieces = self._follower.follow(self._state, frames, sequences)
         except InvalidInputError as error:
             if not self._alone:
                 raise _UnsoundError from None
             self._time = self._follower.time_of(self._state)
             raise of_one_frame(error) from None
-        now = time.perf_counter()
-        latencies, start = [now - begun for begun in arrivals], 0
+        some = also if any(also) else None
+        self._say(pieces, at, sequences, times, arrivals, some)
+
+    def _say(
+        self,
+        pieces: Sequence[Piece],
+        at: Sequence[int],
+        sequences: Sequence[int],
+        times: Sequence[float],
+        arrivals: Sequence[float],
+        also: Sequence[dict[str, Any] | None] | None,
+    ) -> None:
+        """Answer frames by what follows the stream said of them."""
+        latencies, start = time.perf_counter() - np.array(arrivals), 0
         for track, event in pieces:
             part = slice(start, start + len(track))
-            more = also[part]
+            more = None if also is None else also[part]
             if event is not None:
-                more = ({**(more[0] or {}), "calibration": event}, *more[1:])
+                first, *others = more or [None] * len(track)
+                more = [{**(first or {}), "calibration": event}, *others]
             said = answers_of(track, sequences[part], times[part], latencies[part], more)
             for place, answer in zip(at[part], said, strict=True):
                 self._answers[place] = answer
             start += len(track)
-        self._counts["answered"] += len(waiting)
+        self._counts["answered"] += len(sequences)
         surprise = float(track.surprise[-1])
         self._surprise = surprise if np.isfinite(surprise) else None
         self._misfit = bool(track.misfit[-1])
@@ -231,7 +273,7 @@ def _number(frame: dict[str, Any], after: int) -> int:
     own = frame.get("sequence")
     if own is None:
         return after
-    if type(own) is not int or not 0 <= own <= _LARGEST:
+    if type(own) is not int or not 0 <= own <= LARGEST:
         raise InvalidInputError.at("/sequence", "must be an integer from 0 to 2^53 - 1")
     return own
 

@@ -1,0 +1,112 @@
+"""Many lines of one shape, read and checked all at once: the way of nearly all batches.
+
+What is out of the ordinary in any of them is left to `service.streams.taking`, which looks at each
+line and says what is wrong with it. The answers are the same either way.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from inference.tracking.tracker import Tracker
+from service.streams.forms import Form
+from service.streams.lines import LARGEST, Line
+from service.streams.shapes import Shape, frames_of, shape_of
+from simulator.errors import HybridTofError
+from simulator.frames import Frames
+
+__all__ = ["Together", "together"]
+
+_FEW = 4  # fewer are answered as quickly one by one
+
+
+class Together(NamedTuple):
+    """Frames of one shape with numbers one after another.
+
+    Attributes
+    ----------
+    frames : Frames
+        n of them.
+    sequences : sequence of int
+        Their numbers.
+    times : sequence of float
+        Their times as they were sent [s].
+    passed : list of dict, or None
+        What is passed through of each; None where nothing is.
+    """
+
+    frames: Frames
+    sequences: Sequence[int]
+    times: Sequence[float]
+    passed: list[dict[str, Any] | None] | None
+
+
+def together(
+    model: Tracker, form: Form, lines: Sequence[Line], where: tuple[int, int, float]
+) -> Together | None:
+    """Read lines that are good and alike.
+
+    Parameters
+    ----------
+    model : Tracker
+        Which follows the stream.
+    form : Form
+        How to read them.
+    lines : sequence of Line
+        What came.
+    where : tuple of int, int, float
+        The last number that was answered, the one that counts on, and the time of the last frame
+        [s], nan before the first.
+
+    Returns
+    -------
+    Together or None
+        None where a closer look at each line is needed.
+    """
+    raws = [line.raw for line in lines if line.raw is not None]
+    if len(lines) < _FEW or len(raws) < len(lines) or any(line.dropped for line in lines[1:]):
+        return None
+    try:
+        frames = form.frames_in(raws)
+    except HybridTofError:
+        return None
+    names = tuple(frames[0])
+    if set(map(tuple, frames)) != {names}:
+        return None
+    shape = shape_of(model, names)
+    if shape.problem is not None:
+        return None
+    last, after, time_s = where
+    sequences = _numbers(frames, names, last, after)
+    columns = {name: [frame[name] for frame in frames] for name in shape.columns}
+    kinds = dict(zip(shape.columns, shape.kinds, strict=True))
+    sound = all(set(map(type, columns[name])) <= kinds[name] for name in columns)
+    if sequences is None or not sound:
+        return None
+    times = columns["time_s"]
+    increasing = np.diff(np.array([time_s, *times], dtype=np.float64)) > 0
+    if not increasing[1:].all() or not (increasing[0] or np.isnan(time_s)):
+        return None
+    try:
+        found = frames_of(model, shape, list(columns.values()))
+    except HybridTofError:
+        return None
+    passed: list[dict[str, Any] | None] | None = None
+    if shape.passed:
+        passed = [{name: frame[name] for name in shape.passed} for frame in frames]
+    return Together(found, sequences, times, passed)
+
+
+def _numbers(
+    frames: Sequence[dict[str, Any]], names: tuple[str, ...], last: int, after: int
+) -> Sequence[int] | None:
+    """Return the numbers of frames, where they are one after another."""
+    if "sequence" not in names:
+        return range(after, after + len(frames))
+    stated = [frame["sequence"] for frame in frames]
+    first = stated[0]
+    if set(map(type, stated)) != {int} or first < 0 or not last < first <= LARGEST - len(frames):
+        return None
+    counted = list(range(first, first + len(frames)))
+    return counted if stated == counted else None
