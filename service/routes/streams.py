@@ -142,7 +142,7 @@ class _Answers(Response):
         async def answer(lines: list[bytes]) -> None:
             if not begun:
                 await begin()
-            body = b"".join(line + b"\n" for line in lines)
+            body = b"\n".join(lines) + b"\n"
             await send({"type": "http.response.body", "body": body, "more_body": True})
 
         shared = shared_of(request)

@@ -68,7 +68,7 @@ class StreamChange:
     state, sequence, counts, last
         As in `StreamRecord`, after the batch.
     answers : bytes
-        Those that are new, a line each.
+        Those that are new, in whatever form.
     holder : str or None
         Who goes on sending to it; None where the batch was all.
     """

@@ -182,17 +182,18 @@ class StreamStore:
                 holder=change.holder,
                 held_until=now + _LEASE_S if change.holder else 0.0,
             )
+            .returning(STREAM.c.kept_bytes)
         )
-        if not changed.rowcount:
+        kept = changed.scalar_one_or_none()
+        if kept is None:
             return False
         of_stream = STREAM_ANSWER.c.stream_id == change.id
         if size:
             row = {"stream_id": change.id, "sequence": change.sequence, "size": size}
             connection.execute(sa.insert(STREAM_ANSWER).values(**row, bytes=change.answers))
         old = STREAM_ANSWER.c.sequence <= change.sequence - self._window
-        self._forget(connection, change.id, of_stream, old)
-        kept = connection.scalar(sa.select(STREAM.c.kept_bytes).where(STREAM.c.id == change.id))
-        if kept is not None and kept > _MOST_KEPT:
+        kept -= self._forget(connection, change.id, of_stream, old)
+        if kept > _MOST_KEPT:
             total, first = 0, change.sequence
             sizes = sa.select(STREAM_ANSWER.c.sequence, STREAM_ANSWER.c.size).where(of_stream)
             for row_of in connection.execute(sizes.order_by(STREAM_ANSWER.c.sequence.desc())):
@@ -204,7 +205,8 @@ class StreamStore:
         return True
 
     @staticmethod
-    def _forget(connection: sa.Connection, stream_id: str, *which: sa.ColumnElement[bool]) -> None:
+    def _forget(connection: sa.Connection, stream_id: str, *which: sa.ColumnElement[bool]) -> int:
+        """Forget answers; return how many bytes they had."""
         gone = connection.scalars(
             sa.delete(STREAM_ANSWER).where(*which).returning(STREAM_ANSWER.c.size)
         ).all()
@@ -213,6 +215,7 @@ class StreamStore:
             connection.execute(
                 sa.update(STREAM).where(STREAM.c.id == stream_id).values(kept_bytes=less)
             )
+        return sum(gone)
 
     def release(self, stream_id: str, holder: str) -> None:
         """Let others send to a stream."""
@@ -221,9 +224,9 @@ class StreamStore:
             free = {"holder": None, "held_until": 0.0}
             connection.execute(sa.update(STREAM).where(*held).values(**free))
 
-    def answers(self, stream_id: str) -> bytes:
-        """Return the answers of a stream that are kept, in their order, a line each."""
+    def answers(self, stream_id: str) -> list[bytes]:
+        """Return the answers of a stream that are kept, of every change, in their order."""
         query = sa.select(STREAM_ANSWER.c.bytes).where(STREAM_ANSWER.c.stream_id == stream_id)
         with self._database.read() as connection:
             found = connection.scalars(query.order_by(STREAM_ANSWER.c.sequence)).all()
-        return b"".join(map(bytes, found))
+        return list(map(bytes, found))

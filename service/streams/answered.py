@@ -10,75 +10,49 @@ import orjson
 from numpy.typing import NDArray
 
 from inference.estimates import Status
-from inference.tracking.track import Track
 from service.problems import describe
+from service.streams.said import MARK, Said, said_from_bytes
 from simulator.errors import HybridTofError
 
-__all__ = ["answers_of", "encoded", "error_of"]
+__all__ = ["answers_in", "answers_of", "encoded", "error_of", "more_of"]
 
 Array = NDArray[np.float64]
+Texts = list[list[str]]
 
 _STATUS = {int(status): status.name.lower() for status in Status}
 
 
-def answers_of(
-    track: Track,
-    sequences: Sequence[int],
-    times: Sequence[float],
-    latencies: Array,
-    also: Sequence[dict[str, Any] | None] | None = None,
-) -> list[bytes]:
-    """Return what a track says of each frame; what is nan is null in JSON.
+def answers_of(said: Said) -> list[bytes]:
+    """Return the answers to frames as JSON, without line ends; what is nan is null.
 
     The texts of all numbers are made in one go and laid between those that answers have in common:
     an object a frame costs several times as much.
-
-    Parameters
-    ----------
-    track : Track
-        Of n frames.
-    sequences, times : sequence of int or float
-        Of each of them.
-    latencies : ndarray, shape (n,)
-        Of each of them [s].
-    also : sequence of dict or None, optional
-        What else is said of each of them.
-
-    Returns
-    -------
-    list of bytes
-        n of them, without line ends.
     """
-    sd = track.sd_m
-    parts = [np.where(np.isfinite(sd), part, np.nan) for part in track.sd_parts_m]
-    flags = np.where(track.misfit, "true", "false").tolist()
-    kinds = list(map(_STATUS.__getitem__, track.status.tolist()))
-    rest = [""] * len(track) if also is None else list(map(_more, also))
-    heads = [_texts(sequences), _texts(times), kinds]
-    ranges = [track.range_m, sd, *parts]
-    numbers = [track.present, track.outlier, track.rate_m_s]
-    counts = np.isfinite(track.hypotheses_m).sum(axis=1)
-    answers = np.empty(len(track), dtype=object)
-    for count in np.unique(counts).tolist():
-        which = np.flatnonzero(counts == count)
-        every = which.size == len(track)
-        hypotheses = [
-            column[:, k]
-            for k in range(count)
-            for column in (track.hypotheses_m, track.hypotheses_sd_m, track.hypotheses_weight)
-        ]
-        table = np.column_stack([*ranges, *hypotheses, *numbers, latencies])
-        *said, latency = _columns(table if every else table[which])
-        texts = [*heads, flags, rest]
-        if not every:
-            at = which.tolist()
-            texts = [[column[i] for i in at] for column in texts]
-        sequence, time_s, status, misfit, more = texts
-        laid = _laid(count, [sequence, time_s, status, *said, misfit, latency, more])
-        if every:
-            return laid
-        answers[which] = laid
-    return answers.tolist()
+    n, table = len(said.sequence), said.table
+    flags = np.where(said.misfit, "true", "false").tolist()
+    kinds = list(map(_STATUS.__getitem__, said.status.tolist()))
+    heads = [_texts(said.sequence), _texts(said.time_s), kinds]
+    tails = [flags, list(said.more) or [""] * n]
+    counts = np.unique(said.hypotheses).tolist()
+    if len(counts) == 1:
+        return _of_one_count(counts[0], heads, table, tails)
+    answers = np.empty(n, dtype=object)
+    for count in counts:
+        which = np.flatnonzero(said.hypotheses == count)
+        at = which.tolist()
+        some = [[[column[i] for i in at] for column in texts] for texts in (heads, tails)]
+        answers[which] = _of_one_count(count, some[0], table[:, which], some[1])
+    found: list[bytes] = answers.tolist()
+    return found
+
+
+def _of_one_count(count: int, heads: Texts, table: Array, tails: Texts) -> list[bytes]:
+    """Return the answers to frames with equally many hypotheses."""
+    order = [*range(5), *range(9, 9 + 3 * count), 5, 6, 7, 8]
+    every, n = _texts(table[order].ravel()), table.shape[1]
+    *columns, latency = [every[k * n : (k + 1) * n] for k in range(len(order))]
+    misfit, more = tails
+    return _laid(count, [*heads, *columns, misfit, latency, more])
 
 
 _HEAD = '{"sequence":', ',"time_s":', ',"status":"', '","range_m":', ',"sd_m":'
@@ -87,7 +61,7 @@ _HYPOTHESIS = '{"range_m":', ',"sd_m":', ',"weight":'
 _TAIL = ',"outlier":', ',"rate_m_s":', ',"misfit":', ',"latency_s":', ""
 
 
-def _laid(count: int, columns: list[list[str]]) -> list[bytes]:
+def _laid(count: int, columns: Texts) -> list[bytes]:
     """Lay the texts of answers with ``count`` hypotheses between those that they share."""
     fixed = [*_HEAD, *_PARTS]
     opening = '},"hypotheses":['
@@ -105,21 +79,25 @@ def _laid(count: int, columns: list[list[str]]) -> list[bytes]:
     return "".join(pieces).encode().split(b"\n")[:-1]  # no JSON text has a line end of its own
 
 
-def _texts(values: Sequence[float]) -> list[str]:
+def _texts(values: NDArray[Any]) -> list[str]:
     """Return the JSON texts of numbers."""
-    return orjson.dumps(values)[1:-1].decode("ascii").split(",")
+    text = orjson.dumps(np.ascontiguousarray(values), option=orjson.OPT_SERIALIZE_NUMPY)
+    return text[1:-1].decode("ascii").split(",")
 
 
-def _columns(table: Array) -> list[list[str]]:
-    """Return the JSON texts of the columns of a table."""
-    text = orjson.dumps(np.ascontiguousarray(table.T).ravel(), option=orjson.OPT_SERIALIZE_NUMPY)
-    every, n = text[1:-1].decode("ascii").split(","), table.shape[0]
-    return [every[k * n : (k + 1) * n] for k in range(table.shape[1])]
+def more_of(also: Sequence[dict[str, Any] | None] | None) -> tuple[str, ...]:
+    """Return the texts of further members, as `Said` has them."""
+    if also is None:
+        return ()
+    return tuple("," + encoded(of)[1:-1].decode() if of else "" for of in also)
 
 
-def _more(also: dict[str, Any] | None) -> str:
-    """Return the JSON text of further members."""
-    return "" if not also else "," + encoded(also)[1:-1].decode()
+def answers_in(kept: bytes) -> dict[int, bytes]:
+    """Return answers by their numbers, from what a store keeps of them: numbers, or lines."""
+    if kept.startswith(MARK):
+        said = said_from_bytes(kept)
+        return dict(zip(said.sequence.tolist(), answers_of(said), strict=True))
+    return {orjson.loads(line)["sequence"]: line for line in kept.splitlines()}
 
 
 def error_of(error: HybridTofError) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """The last answers of a stream, kept in memory."""
 
-import orjson
-
+from service.streams.answered import answers_in
 from service.streams.lines import WINDOW, Taken
 
 __all__ = ["Kept"]
@@ -15,8 +14,7 @@ class Kept:
 
     def add(self, taken: Taken) -> None:
         """Keep new answers, and forget what has become too old."""
-        for answer in taken.new:
-            self._answers[orjson.loads(answer)["sequence"]] = answer
+        self._answers.update(answers_in(taken.kept))
         oldest = taken.place.sequence - WINDOW
         while self._answers and (first := next(iter(self._answers))) <= oldest:
             del self._answers[first]

@@ -91,8 +91,8 @@ class Taken(NamedTuple):
         Where the stream stands after them.
     answers : list of bytes
         One a line.
-    new : list of bytes
-        Those that were not given before, which are to be kept.
+    kept : bytes
+        Those that were not given before, as `service.streams.answered.answers_in` reads them.
     repeated : int
         How many lines had come before.
     changed : bool
@@ -101,6 +101,6 @@ class Taken(NamedTuple):
 
     place: Place
     answers: list[bytes]
-    new: list[bytes]
+    kept: bytes
     repeated: int
     changed: bool

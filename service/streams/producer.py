@@ -7,7 +7,6 @@ from typing import Any
 
 import anyio
 import anyio.to_thread
-import orjson
 from starlette.requests import ClientDisconnect
 
 from inference.self_calibration.following import conclude, wanted
@@ -16,6 +15,7 @@ from service.border.traces import Traces
 from service.errors import ConflictError, GoneError, NotFoundError, SlowClientError
 from service.store.stream_record import StreamChange, StreamRecord
 from service.store.stream_store import StreamStore
+from service.streams.answered import answers_in
 from service.streams.calibrations import Calibrations
 from service.streams.cutting import Cutter
 from service.streams.followers import Calibrating, Follower
@@ -30,7 +30,7 @@ from simulator.errors import InvalidInputError
 __all__ = ["Producer", "lines_of", "place_of"]
 
 _KEPT = (*COUNTS, "unnumbered", "surprise", "misfit", "calibration")
-_BLOCK = 2**16
+_BLOCK = 2**17  # of a batch of a thousand lines, which is to be one turn
 _TRIES = 3
 
 Send = Callable[[list[bytes]], Awaitable[None]]
@@ -71,8 +71,10 @@ class _Stored:
     def answer(self, sequence: int) -> bytes | None:
         """See `Earlier.answer`."""
         if self._answers is None:
-            lines = self._store.answers(self._id).splitlines()
-            self._answers = {orjson.loads(line)["sequence"]: line for line in lines}
+            found: dict[int, bytes] = {}
+            for kept in self._store.answers(self._id):
+                found.update(answers_in(kept))
+            self._answers = found
         return self._answers.get(sequence)
 
 
@@ -206,7 +208,7 @@ class Producer:
             place.sequence,
             {name: getattr(place, name) for name in _KEPT},
             place.last,
-            b"".join(line + b"\n" for line in taken.new),
+            taken.kept,
             self.holder,
         )
         return taken, change

@@ -15,7 +15,7 @@ __all__ = ["STALE_S", "Room"]
 
 STALE_S = 0.2
 _LINES = 1000
-_BYTES = 2**17
+_BYTES = 2**18
 
 
 class Room:
@@ -46,7 +46,8 @@ class Room:
     async def put(self, raws: Iterable[bytes | None]) -> None:
         """Let lines in, in their order; return when all are."""
         now = time.perf_counter()
-        for raw in raws:
+        lines = [Line(raw, now) for raw in raws]
+        while lines:
             while self._full():
                 if self._latest:
                     self._pop()
@@ -54,8 +55,10 @@ class Room:
                 else:
                     self._space.clear()
                     await self._space.wait()
-            self._lines.append(Line(raw, now))
-            self._bytes += len(raw or b"")
+            some = lines[: _LINES - len(self._lines)]
+            del lines[: len(some)]
+            self._lines += some
+            self._bytes += sum(len(line.raw or b"") for line in some)
             self._news.set()
 
     def end(self) -> None:

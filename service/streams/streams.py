@@ -4,16 +4,20 @@ import asyncio
 import contextlib
 import uuid
 import weakref
+from collections import OrderedDict
 from collections.abc import AsyncIterator
 
 import anyio
 
+from inference.tracking.state import TrackState
 from service.border.traces import Traces
 from service.errors import ConflictError, GoneError, NotFoundError, StoreError
 from service.store.holder import has_ended, holder_name
 from service.store.stream_record import StreamRecord
 from service.store.stream_store import StreamStore
 from service.streams.calibrations import Calibrations
+from service.streams.followers import Follower
+from service.streams.lines import Place
 from service.streams.model import model_of, request_of, seeded
 from service.streams.producer import Producer, place_of
 from service.streams.writer import Writer
@@ -22,6 +26,7 @@ __all__ = ["Streams"]
 
 _LOOK_S = 1.0
 _TOGETHER_S = 0.1
+_REMEMBERED = 256
 
 
 class Streams:
@@ -57,6 +62,8 @@ class Streams:
         self._watched: weakref.WeakValueDictionary[str, asyncio.Event] = (
             weakref.WeakValueDictionary()
         )
+        # where streams stood when their last client was done, by their last change
+        self._places: OrderedDict[str, tuple[int, Place]] = OrderedDict()
         self._limiter: anyio.CapacityLimiter | None = None
 
     async def create(self, raw: bytes, client: str) -> StreamRecord:
@@ -202,7 +209,7 @@ class Streams:
                 traces=self._traces,
                 record=record,
                 model=model,
-                place=place_of(record, model),
+                place=self._place(record, model),
                 latest=request_of(record.request).policy == "latest",
                 holder=self._holder if lasting else None,
                 changed=lambda: self._announce(stream_id),
@@ -212,12 +219,24 @@ class Streams:
             try:
                 yield producer
             finally:
+                self._remember(producer)
                 if lasting:
                     with contextlib.suppress(StoreError):  # the lease runs out by itself
                         await asyncio.to_thread(self._store.release, stream_id, self._holder)
         finally:
             self._producing.discard(stream_id)
             self._traces.producers.dec()
+
+    def _place(self, record: StreamRecord, model: Follower) -> Place:
+        """Return where a stream stands: reading a state takes as long as a hundred frames."""
+        number, place = self._places.pop(record.id, (None, None))
+        return place_of(record, model) if place is None or number != record.number else place
+
+    def _remember(self, producer: Producer) -> None:
+        if isinstance(producer.place.state, TrackState):  # others have histories, and are large
+            self._places[producer.record.id] = producer.record.number, producer.place
+            while len(self._places) > _REMEMBERED:
+                self._places.popitem(last=False)
 
     def _held_elsewhere(self, record: StreamRecord) -> bool:
         if record.holder in (None, self._holder) or not self._store.held(record):

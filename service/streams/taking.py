@@ -13,11 +13,12 @@ import numpy as np
 
 from inference.self_calibration.following import Piece
 from service.errors import BodyTooLargeError, ConflictError, GoneError
-from service.streams.answered import answers_of, encoded, error_of
+from service.streams.answered import answers_of, encoded, error_of, more_of
 from service.streams.cutting import LONGEST
 from service.streams.followers import Follower
 from service.streams.forms import Form
 from service.streams.lines import COUNTS, LARGEST, WINDOW, Earlier, Line, Place, Taken
+from service.streams.said import Said, said_of, said_to_bytes
 from service.streams.shapes import (
     Shape,
     frames_of,
@@ -85,6 +86,7 @@ class _Batch:
         self._counts = dict.fromkeys(COUNTS, 0)
         self._surprise, self._misfit = place.surprise, place.misfit
         self._answers: list[bytes] = []
+        self._kept: bytes | None = None
         self._at: dict[int, int] = {}
         self._repeats: list[tuple[int, int, int]] = []
         self._waiting: list[_Waiting] = []
@@ -111,7 +113,10 @@ class _Batch:
             calibration=self._follower.told(self._state),
             **{name: getattr(self._place, name) + n for name, n in self._counts.items()},
         )
-        return Taken(place, self._answers, new, repeated, any(self._counts.values()))
+        kept = self._kept
+        if kept is None:
+            kept = b"".join(line + b"\n" for line in new)
+        return Taken(place, self._answers, kept, repeated, any(self._counts.values()))
 
     def _alike(self, lines: Sequence[Line]) -> bool:
         """Answer lines that are good and alike in one go; tell whether they are."""
@@ -138,7 +143,10 @@ class _Batch:
         self._answers = [b""] * len(lines)
         arrivals = [line.arrived for line in lines]
         self._state = state
-        self._say(pieces, range(len(lines)), found.sequences, found.times, arrivals, also)
+        every = range(len(lines))
+        said = self._say(pieces, every, found.sequences, found.times, arrivals, also)
+        if len(pieces) == 1:
+            self._kept = said_to_bytes(said)
         return True
 
     def _take(self, line: Line) -> None:
@@ -194,12 +202,14 @@ class _Batch:
             raise shape.problem
         values = shape.values(frame)
         alone = None
-        if self._alone or not shape.sound(values):
+        if not shape.sound(values):
             alone = one_frame(self._model, frame, shape.columns)
-        time_s = frame["time_s"]
+        time_s = float(frame["time_s"])
         if time_s <= self._time:
             message = f"{time_s:.9g} s is not later than the last frame, {self._time:.9g} s"
             raise InvalidInputError.at("/time_s", message)
+        if self._alone and alone is None:
+            alone = one_frame(self._model, frame, shape.columns)
         if shape is not self._shape or alone is not None:
             self._track()
         self._names, self._shape = names, shape
@@ -236,8 +246,8 @@ class _Batch:
         times: Sequence[float],
         arrivals: Sequence[float],
         also: Sequence[dict[str, Any] | None] | None,
-    ) -> None:
-        """Answer frames by what follows the stream said of them."""
+    ) -> Said:
+        """Answer frames by what follows the stream said of them; return the last piece."""
         latencies, start = time.perf_counter() - np.array(arrivals), 0
         for track, event in pieces:
             part = slice(start, start + len(track))
@@ -245,14 +255,15 @@ class _Batch:
             if event is not None:
                 first, *others = more or [None] * len(track)
                 more = [{**(first or {}), "calibration": event}, *others]
-            said = answers_of(track, sequences[part], times[part], latencies[part], more)
-            for place, answer in zip(at[part], said, strict=True):
+            said = said_of(track, sequences[part], times[part], latencies[part], more_of(more))
+            for place, answer in zip(at[part], answers_of(said), strict=True):
                 self._answers[place] = answer
             start += len(track)
         self._counts["answered"] += len(sequences)
         surprise = float(track.surprise[-1])
         self._surprise = surprise if np.isfinite(surprise) else None
         self._misfit = bool(track.misfit[-1])
+        return said
 
     def _said_before(self, sequence: int, last: int) -> bytes:
         """Return what was answered to a number, or that there is nothing to be said of it."""

@@ -12,7 +12,7 @@ import numpy as np
 from inference.tracking.tracker import Tracker
 from service.streams.forms import Form
 from service.streams.lines import LARGEST, Line
-from service.streams.shapes import Shape, frames_of, shape_of
+from service.streams.shapes import frames_of, shape_of
 from simulator.errors import HybridTofError
 from simulator.frames import Frames
 

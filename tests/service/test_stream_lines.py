@@ -13,12 +13,14 @@ from hypothesis import strategies as st
 
 from inference.tracking.tracker import Tracker, tracker
 from service.errors import MalformedError
+from service.streams.answered import answers_in
 from service.streams.cutting import LONGEST, Cutter
 from service.streams.followers import Plain
 from service.streams.forms import JsonLines
 from service.streams.kept import Kept
 from service.streams.lines import WINDOW, Line, Place
 from service.streams.room import STALE_S, Room
+from service.streams.said import MARK
 from service.streams.taking import take
 from service.strict_json import decode
 from simulator.errors import InvalidInputError
@@ -238,3 +240,69 @@ def test_known_ranges_of_lines(model: Tracker) -> None:
     assert found[1]["outlier"] > 0.5
     assert found[1]["range_m"] == pytest.approx(1.0, abs=0.05)
     assert found[1]["present"] == pytest.approx(1.0)
+
+
+_NUMBER = st.one_of(st.floats(-1.0, 3.0), st.integers(-2, 3))
+_COLUMNS = {
+    "gain": st.floats(-0.1, 2.0),
+    "object_present": st.booleans(),
+    "stamp": st.one_of(st.integers(), st.text(max_size=3), st.just({"sec": 1}), st.none()),
+    "known_range_m": st.one_of(st.none(), st.floats(0.3, 2.0)),
+}
+
+
+@st.composite
+def _alike(draw: st.DrawFn) -> list[bytes]:
+    """Lines of one shape that count on, but for what a draw spoils."""
+    names = draw(st.sets(st.sampled_from(sorted(_COLUMNS))))
+    numbered, start = draw(st.booleans()), draw(st.integers(0, 3))
+    lines, time_s = [], 0.0
+    for n in range(draw(st.integers(4, 12))):
+        time_s += draw(st.sampled_from([1.0, 0.125, 0.3] * 5 + [0.0]))
+        members: dict[str, Any] = {"sequence": start + n} if numbered else {}
+        members |= {"time_s": time_s, "w1": draw(_NUMBER), "w2": draw(_NUMBER)}
+        members |= {name: draw(_COLUMNS[name]) for name in names}
+        if "known_range_m" in names:
+            known = members["known_range_m"]
+            members["known_range_sd_m"] = None if known is None else 0.01
+        lines.append(json.dumps(members).encode())
+    return lines
+
+
+@settings(max_examples=60, deadline=None)
+@given(lines=_alike(), split=st.integers(0, 12))
+def test_all_at_once_is_one_by_one(model: Tracker, lines: list[bytes], split: int) -> None:
+    """Batches are read, tracked and written column by column, with the same bytes."""
+    alone = answered(model, [[line] for line in lines])
+    assert answered(model, [lines]) == alone
+    assert answered(model, [part for part in (lines[:split], lines[split:]) if part]) == alone
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        [b'{"a": 1}', b'{"a": 1},{"a": 2}', b'{"a": "x}', b'{", "b": 1}'],
+        [b'{"a": 1},{"a": 2}', b'{"a": [1', b"2]}"],
+        [b'{"a": 1, "a": 2}', b'{"a": "x:y"}'],
+        [b'{"a": 1}', b'{"a": 1} }'],
+        [b'{"a": 1}', b'5, {"a": 2}', b'{"a": 3}'],
+        [b'{"a": 1}', b'{"a"', b": 1}"],
+    ],
+)
+def test_lines_read_together_are_lines(lines: list[bytes]) -> None:
+    """What two lines make together is no frame."""
+    with pytest.raises((MalformedError, InvalidInputError)):
+        JsonLines().frames_in(lines)
+
+
+def test_kept_numbers_are_the_same_answers(model: Tracker) -> None:
+    """Numbers take less than half of the bytes of the text that follows from them."""
+    lines = [frame(n, stamp=None if n % 2 else {"at": "ä\n"}) for n in range(1, 40)]
+    batch = [Line(raw, time.perf_counter()) for raw in lines]
+    taken = take(Plain(model), Place(model.first), batch, JsonLines(), Kept())
+    assert taken.kept.startswith(MARK)
+    assert list(answers_in(taken.kept).values()) == taken.answers
+    assert list(answers_in(taken.kept)) == list(range(1, 40))
+    plain = [Line(frame(n), 0.0) for n in range(1, 40)]
+    small = take(Plain(model), Place(model.first), plain, JsonLines(), Kept())
+    assert 2 * len(small.kept) < sum(map(len, small.answers))
