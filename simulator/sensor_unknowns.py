@@ -5,16 +5,13 @@ calibrated, so that both may be priors; what the sensor states as numbers is no 
 """
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simulator.sensor import PulsedSensor, Sensor, shift_of
+from simulator.terms import Terms
 from simulator.unknowns import Unknown, Values, add_quantity
-
-if TYPE_CHECKING:
-    from simulator.parameters import Terms
 
 __all__ = ["GAIN", "PHASE", "TIMING", "add_sensor", "lag_path", "sensor_at", "sensor_terms"]
 
@@ -51,7 +48,7 @@ def sensor_terms(values: Values) -> tuple[Array | None, Array | None]:
     return values.get(GAIN), lag
 
 
-def sensor_at(sensor: Sensor, terms: "Terms") -> Sensor:
+def sensor_at(sensor: Sensor, terms: Terms) -> Sensor:
     """Return a sensor with the numbers of the first parameter vector in place of its priors.
 
     Parameters

@@ -2,30 +2,23 @@
 
 import dataclasses
 import functools
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.best_ranges import fill_best_ranges
+from inference.density.frame_integrals import fill_log_likelihoods
 from inference.density.range_draw import fill_range_draws
-from inference.density.range_integral import integrate_range
 from inference.frame.arguments import (
     Instrument,
     ReferencePrior,
     Rows,
     instrument_of,
     row_of,
-    scene_of,
 )
-from inference.frame.blocks import GAIN, Data, block_of, is_empty, own_blocks
+from inference.frame.blocks import GAIN, Data, own_blocks
 from inference.frame.known_range import columns_of, with_displacements
-from inference.frame.log_density import empty_log_likelihood
-from inference.frame.modes import find_modes, room_for_modes
-from inference.frame.range_prior import integration_bounds
-from inference.frame.table import tabulate
-from simulator.compiled import compiled, hot
 from simulator.frames import Frames
 from simulator.parameters import Parameters, Terms, parameters_of
 from simulator.scene import Reference, Scene
@@ -34,28 +27,6 @@ from simulator.sensor import Sensor
 __all__ = ["CollapsedDensity", "FluxBasis", "collapsed_density"]
 
 Array = NDArray[np.float64]
-
-
-@hot
-@compiled
-def _log_likelihoods(out: Array, rows: Rows, data: Data, instrument: Instrument) -> None:
-    """Fill out[i, b] with the log likelihood of block b under parameter vector i."""
-    for i in range(out.shape[0]):
-        scene = scene_of(rows, instrument, i)
-        bounds = integration_bounds(scene.range_prior)
-        if not bounds[1] > bounds[0]:
-            out[i, :] = -math.inf
-            continue
-        table = tabulate(bounds, scene, data.strongest)
-        values = np.empty(table.shape[1])
-        modes = room_for_modes(table)
-        for b in range(out.shape[1]):
-            block = block_of(data, b)
-            if is_empty(data, b):
-                out[i, b] = empty_log_likelihood(block, scene)
-                continue
-            count = find_modes(modes, values, table, block, scene)
-            out[i, b] = integrate_range(modes, count, block, scene)
 
 
 class FluxBasis(NamedTuple):
@@ -140,7 +111,7 @@ class CollapsedDensity:
     def _of_rows(self, rows: Rows, data: Data) -> Array:
         """Return log p(block of frames | vector), shape (n, blocks)."""
         out = np.empty((len(rows.shapes), data.blocks))
-        _log_likelihoods(out, rows, data, self.instrument)
+        fill_log_likelihoods(out, rows, data, self.instrument)
         return out
 
     def shared(self, values: Array) -> Array:

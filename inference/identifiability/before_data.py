@@ -77,7 +77,7 @@ class Foresight:
 
         The parameters of the ranges' prior are not among them: without it they do not exist.
         """
-        bounds = self.information.sd_of(self.experiment.in_si_units).tolist()
+        bounds = self.information.sd_of(self.experiment.unknowns.in_si_units).tolist()
         return dict(zip(self.experiment.names, bounds, strict=True))
 
     @property

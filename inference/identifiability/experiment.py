@@ -2,20 +2,19 @@
 
 import dataclasses
 import functools
-import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inference.frame.arguments import Background, RangePrior
-from inference.frame.coordinates import COORDINATES, coordinate_slopes, has_sensor
-from inference.frame.sensitivity import Sensitivity, Value, sensitivity, whiteners
+from inference.frame.coordinates import coordinate_slopes
+from inference.frame.sensitivity import Sensitivity, sensitivity, whiteners
 from inference.identifiability.elimination import eliminate
 from inference.identifiability.information import Information
+from inference.identifiability.scaled_unknowns import ScaledUnknowns
 from simulator.discrepancy import discrepancy_basis
 from simulator.parameters import OFFSET, Parameters, Terms
-from simulator.sensor import Sensor, SineWaveSensor, shift_of
-from simulator.sensor_unknowns import GAIN, PHASE, TIMING, lag_path
+from simulator.sensor import Sensor
 
 __all__ = ["Experiment", "information"]
 
@@ -106,104 +105,20 @@ class Experiment:
         return tuple(n for n in names if not n.startswith("range_m.") and n not in self.known)
 
     @functools.cached_property
-    def units(self) -> Array:
-        """Unit of each coordinate of `COORDINATES` in which it is dimensionless.
-
-        Crosstalk is measured by the light of the scene: the median over the frames of the
-        modulus of the readings without it, for both readings of a sine wave the same. The sensor's
-        lag is measured by that of a typical range.
-        """
-        units = np.ones(self._count)
-        if has_sensor(self.terms):
-            # by how much the light of a typical range would have to be late
-            wave = self.sensor.wave_number if isinstance(self.sensor, SineWaveSensor) else 1.0
-            units[-1] = wave * self._typical_m
-        if self.terms.crosstalk is not None:
-            light = np.abs(self.readings.mean - self.terms.crosstalk[0])
-            if self.sensor.kind != "pulsed":
-                light[:] = np.hypot(*light.T)[:, None]
-            typical = np.median(light, axis=0)
-            units[Value.CROSSTALK_1 : Value.STRENGTH] = np.where(
-                typical > 0, typical, self.sensor.noise.read
-            )
-        return units
-
-    @functools.cached_property
-    def directions(self) -> Array:
-        """How the coordinates of `COORDINATES` move with each of ``names``, (9 or 11, d).
-
-        Along log c0, c1 / sqrt(c0), log c2, the crosstalk in `units`, log B, log R, log c0', c1' /
-        sqrt(c0'), and the offset of displacements over a typical range, as in the tables of
-        Cramer-Rao bounds: c0 moves with c1 / sqrt(c0) held where c1 is unknown.
-        """
-        columns = dict(zip(self._paths, np.diag(self.units), strict=True))
-        columns[OFFSET] = np.zeros(self._count)  # readings do not depend on it
-        for path, (c0, c1) in self._shapes.items():
-            if f"{path}.c1" in self.names:
-                row = COORDINATES.index(f"{path}.c1")
-                columns[f"{path}.c0"][row] = 0.5 * c1 / math.sqrt(c0)
-        if self.background is not None and self.parameters.shadow_is_object:
-            # the shadow has the object's parameters and moves with them
-            for name in ("object.c0", "object.c1"):
-                columns[name][Value.SHADOW_C0 : len(COORDINATES)] = columns[name][: Value.C2]
-        if not self.names:
-            return np.empty((self._count, 0))
-        return np.stack([columns[name] for name in self.names], axis=1)
-
-    @property
-    def _shapes(self) -> dict[str, tuple[float, float]]:
-        """c0 and c1 of the object, and of a shadow that is not the object's."""
-        shapes = {"object": self.shape}
-        if self.background is not None and not self.parameters.shadow_is_object:
-            shapes["background.shadow"] = (self.background.c0, self.background.c1)
-        return shapes
-
-    @property
-    def _paths(self) -> tuple[str, ...]:
-        """Scene paths of the coordinates."""
-        first, second = self.parameters.crosstalk or ("crosstalk.0", "crosstalk.1")
-        before, after = COORDINATES[: Value.CROSSTALK_1], COORDINATES[Value.STRENGTH :]
-        of_sensor = (GAIN, lag_path(self.sensor)) if has_sensor(self.terms) else ()
-        return (*before, first, second, *after, *of_sensor)
-
-    @property
-    def _count(self) -> int:
-        """Number of coordinates."""
-        return len(self._paths)
-
-    @functools.cached_property
-    def in_si_units(self) -> Array:
-        """Derivatives of the unknowns, in SI units, along their coordinates, shape (d, d)."""
-        values = dict(
-            zip(self.parameters.names, self.parameters.natural(self.z[None])[0], strict=True)
+    def unknowns(self) -> ScaledUnknowns:
+        """The unknowns of ``names``, in units of this scene."""
+        crosstalk = self.terms.crosstalk
+        light = None if crosstalk is None else np.abs(self.readings.mean - crosstalk[0])
+        return ScaledUnknowns(
+            self.sensor, self.parameters, self.z, self.terms, self.names, self.typical_m, light
         )
-        d = len(self.names)
-        result = np.zeros((d, d))
-        for j, name in enumerate(self.names):
-            if name.endswith(".c1"):
-                path = name.removesuffix(".c1")
-                c0, c1 = self._shapes[path]
-                result[j, j] = math.sqrt(c0)
-                if f"{path}.c0" in self.names:
-                    result[j, self.names.index(f"{path}.c0")] = 0.5 * c1
-            elif name in (self.parameters.crosstalk or ()):
-                result[j, j] = self.units[self._paths.index(name)]
-            elif name == OFFSET:
-                result[j, j] = self._typical_m
-            elif name == PHASE:
-                result[j, j] = self.units[-1]
-            elif name == TIMING:
-                result[j, j] = self.units[-1] / shift_of(1.0)
-            else:
-                result[j, j] = values[name]
-        return result
 
     @functools.cached_property
     def finite(self) -> bool:
         """Whether readings, noise and derivatives are numbers that can be computed with."""
         by_term, along, by_error = self.whitened()
         along = along[np.isfinite(self.log_r)]
-        units = self.in_si_units
+        units = self.unknowns.in_si_units
         with np.errstate(over="ignore"):
             # sums of squares of all of them must not overflow either
             sizes = [float(np.square(part).sum()) for part in (by_term, along, by_error, units)]
@@ -277,11 +192,11 @@ class Experiment:
         along = self.told[:, :1] * self.rates
         by_name = np.zeros((*along.shape, len(self.names)))
         if OFFSET in self.names:
-            by_name[:, 1, self.names.index(OFFSET)] = -self._typical_m * self.rates[:, 1]
+            by_name[:, 1, self.names.index(OFFSET)] = -self.typical_m * self.rates[:, 1]
         return along, by_name
 
     @property
-    def _typical_m(self) -> float:
+    def typical_m(self) -> float:
         """A typical range [m], by which the offset of displacements is measured."""
         present = np.isfinite(self.log_r)
         return float(np.exp(self.log_r[present].mean())) if present.any() else 1.0
@@ -290,7 +205,7 @@ class Experiment:
         """Return the same with the first along ``names``, shape (n, 2, d)."""
         by_term, along, by_error = self.whitened_terms(whitener)
         with np.errstate(over="ignore", invalid="ignore"):
-            return by_term @ self.directions, along, by_error
+            return by_term @ self.unknowns.directions, along, by_error
 
 
 def information(experiment: Experiment) -> Information:
@@ -304,7 +219,7 @@ def information(experiment: Experiment) -> Information:
     Returns
     -------
     Information
-        In the dimensionless coordinates of `Experiment.directions`.
+        In the dimensionless coordinates of `ScaledUnknowns.directions`.
     """
     return eliminate(
         experiment.names,

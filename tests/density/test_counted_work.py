@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from inference.density import collapsed
+from inference.density import frame_integrals
 from inference.density.collapsed import CollapsedDensity, collapsed_density
 from simulator.scene import parse_scene
 from tests.counting import counted_calls, types_asked_for
@@ -46,7 +46,7 @@ def test_evaluations_for_an_integral_over_a_range(
     rows = density.integral_rows(density.parameters.terms(np.zeros((1, len(density.parameters)))))
     out = np.empty((1, FRAMES))
     _, calls = counted_calls(
-        collapsed._log_likelihoods, out, rows, density.data, density.instrument
+        frame_integrals.fill_log_likelihoods, out, rows, density.data, density.instrument
     )
     assert np.isfinite(out).all()
     assert calls["log_density.log_density"] <= densities * FRAMES
@@ -58,7 +58,7 @@ def test_a_scene_without_a_term_evaluates_none_of_it() -> None:
     density = density_of(1e3, {}, {})
     rows = density.integral_rows(density.parameters.terms(np.zeros((1, len(density.parameters)))))
     _, calls = counted_calls(
-        collapsed._log_likelihoods,
+        frame_integrals.fill_log_likelihoods,
         np.empty((1, FRAMES)),
         rows,
         density.data,
@@ -78,5 +78,5 @@ def test_numbers_of_frames_and_of_points_need_no_machine_code(
         density = density_of(1e3, {}, scene, frames)
         for points in (1, 3):
             density(np.zeros((points, len(density.parameters))))
-    (name,) = (name for name in asked if name.endswith("._log_likelihoods"))
+    (name,) = (name for name in asked if name.endswith(".fill_log_likelihoods"))
     assert len(asked[name]) == 1

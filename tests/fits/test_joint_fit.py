@@ -175,7 +175,7 @@ def test_bounds_are_those_of_the_identifiability_study(kind: str, noise: dict[st
     # its coordinate is the static light
     natural = facts.sd_of(problem.chain(x)[problem.slots]) * problem.unit
     own = np.where(crosstalk, natural, facts.sd)[logs]
-    scale = Experiment(sensor, parameters, z, u).units[3:5]
+    scale = Experiment(sensor, parameters, z, u).unknowns.units[3:5]
     wanted = np.array([theirs.sd[theirs.names.index(problem.names[k])] for k in logs])
     wanted *= [
         scale[0 if problem.names[k] == "crosstalk." + sensor.columns[0] else 1]

@@ -79,7 +79,7 @@ def precise_jacobian(system: System, experiment: Experiment, sds: Array) -> list
             for name in experiment.names:
                 unit = 1.0
                 if name.startswith("crosstalk"):
-                    unit = float(experiment.units[3 if name.endswith(("w1", ".i")) else 4])
+                    unit = float(experiment.unknowns.units[3 if name.endswith(("w1", ".i")) else 4])
                 there = precise_readings(
                     experiment.sensor, _moved(values, name, system.shared, unit), r
                 )
