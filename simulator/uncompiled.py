@@ -18,7 +18,7 @@ import numpy as np
 
 from simulator.by_arrays import by_arrays
 
-__all__ = ["NotSoError", "free", "kind_of", "reach", "run", "size"]
+__all__ = ["NotSoError", "free", "kind_of", "reach", "run", "size", "twin"]
 
 _Float = np.float64
 # packages whose functions are run so wherever they are used
@@ -190,7 +190,8 @@ def _used(code: CodeType) -> set[str]:
 
 
 def twin(function: Any) -> Callable[..., Any]:
-    """Return a function as the interpreter is to run it."""
+    """Return a kernel, or its function, as the interpreter is to run it."""
+    function = getattr(function, "__wrapped__", function)
     made = _twins.get(function)
     if made is None:
         module = sys.modules[function.__module__]
