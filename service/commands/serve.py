@@ -3,6 +3,7 @@
 import argparse
 import gc
 import os
+from functools import partial
 
 from service.commands.command import Subparsers, add_command
 from simulator.errors import InvalidInputError
@@ -46,6 +47,7 @@ def _run(args: argparse.Namespace) -> int:
     from service.app import create_app
     from service.border.authorities import is_loopback
     from service.border.keys import POINTER
+    from service.commands.warm import warm
     from service.logs import log_config
     from service.server import server_of
     from service.service_settings import ServiceSettings
@@ -58,7 +60,7 @@ def _run(args: argparse.Namespace) -> int:
             f"is needed to listen on {args.host}, where others can ask: hybridtof keys create NAME",
         )
     server = server_of(
-        create_app(settings, warming=Warming() if settings.warm else None),
+        create_app(settings, warming=Warming(partial(warm, args)) if settings.warm else None),
         settings,
         host=args.host,
         port=args.port,

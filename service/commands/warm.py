@@ -4,7 +4,7 @@ import argparse
 
 from service.commands.command import Subparsers, add_command, note
 
-__all__ = ["add_parser"]
+__all__ = ["add_parser", "warm"]
 
 
 def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
@@ -12,7 +12,7 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     add_command(
         subparsers,
         "warm",
-        _run,
+        warm,
         brief="make the machine code of all kernels, once",
         description="Make the machine code of all kernels and keep it in the kernel cache, "
         "$NUMBA_CACHE_DIR/hybridtof or ~/.cache/hybridtof. Nothing has to be warmed: what is asked "
@@ -25,8 +25,19 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     )
 
 
-def _run(args: argparse.Namespace) -> int:
+def warm(args: argparse.Namespace) -> int:
+    """Make the machine code of all kernels that is not there; return the command's exit code.
 
+    Parameters
+    ----------
+    args : Namespace
+        ``quiet``: whether nothing is said of how far it is.
+
+    Raises
+    ------
+    HybridTofError
+        Where it cannot be kept.
+    """
     from service.warm.warming import is_warm, mark_warm
     from simulator.compiled import compiling_at_once
     from simulator.errors import HybridTofError

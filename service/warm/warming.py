@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import platform
 import sys
+from collections.abc import Callable
 from importlib.metadata import version
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
@@ -38,22 +39,26 @@ def mark_warm() -> None:
         mark.touch()
 
 
-def _work() -> None:
+def _work(warm: Callable[[], int]) -> None:
     """Warm the cache at the lowest priority, for no longer than the service lives."""
     end_with_parent()
     os.nice(19)
-    from service.cli import main
-
-    sys.exit(main(["warm"]))
+    sys.exit(warm())
 
 
 class Warming:
     """``hybridtof warm`` beside a service, where there is a cache to be filled.
 
     Answers given meanwhile are the same, only slower.
+
+    Parameters
+    ----------
+    warm : callable
+        Fills the cache in the process; returns its exit code.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, warm: Callable[[], int]) -> None:
+        self._warm = warm
         self._process: SpawnProcess | None = None
 
     def begin(self) -> None:
@@ -63,7 +68,9 @@ class Warming:
             return
         if not is_warm():
             context = multiprocessing.get_context("spawn")
-            self._process = context.Process(target=_work, name="warm", daemon=True)
+            self._process = context.Process(
+                target=_work, args=(self._warm,), name="warm", daemon=True
+            )
             self._process.start()
 
     @property

@@ -1,5 +1,7 @@
 """Machine code ahead of the first question."""
 
+import argparse
+from functools import partial
 from pathlib import Path
 
 import httpx
@@ -7,6 +9,7 @@ import pytest
 
 from service.app import create_app
 from service.cli import main
+from service.commands.warm import warm
 from service.service_settings import ServiceSettings
 from service.warm.questions import QUESTIONS
 from service.warm.warming import Warming, is_warm
@@ -48,7 +51,7 @@ def test_no_cache_cannot_be_warmed(
 @pytest.mark.anyio
 async def test_ready_says_that_it_warms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    warming = Warming()
+    warming = Warming(partial(warm, argparse.Namespace(quiet=True)))
     app = create_app(ServiceSettings(workers=1), warming=warming)
     transport = httpx.ASGITransport(app)
     async with (
