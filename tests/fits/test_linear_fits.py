@@ -350,3 +350,17 @@ def test_weights_where_the_range_is_far_less_certain_than_the_readings(noise: fl
         # a unit of the whitened readings in the last place of the largest weight
         allowed = 100 * np.finfo(float).eps * float(max(abs(x) for x in inverse))
     assert np.abs(found.T @ found - expected).max() <= allowed
+
+
+@pytest.mark.parametrize(("p_value", "misfit"), [(1e-2, False), (1e-5, True)])
+def test_a_misfit_is_said_at_its_false_alarm_rate(p_value: float, misfit: bool) -> None:
+    """The noise is stated so that the residuals of one set have this p-value; 1e-3 parts them."""
+    frames = data(sensor_of("pulsed", 1e5), {"object": OBJECT}, path(20))
+    (healthy,) = served(sensor_of("pulsed", 1e5), {}, frames, ["object_fit"])
+    assert healthy.fit is not None
+    wanted = special.chdtri(healthy.fit["degrees_of_freedom"], p_value)
+    stated = 1e5 * float(np.sqrt(wanted / healthy.fit["chi_square"]))
+    (found,) = served(sensor_of("pulsed", stated), {}, frames, ["object_fit"])
+    assert found.fit is not None
+    assert found.fit["p_value"] == pytest.approx(p_value, rel=0.05)
+    assert found.fit["misfit"] is misfit

@@ -91,6 +91,17 @@ def test_too_few_frames() -> None:
     assert "at least 4" in refusal(sensor, CROSSTALK, data(sensor, TRUTH, path(3, 1)))
 
 
+def test_a_linear_fit_of_as_many_frames_as_unknowns_asks_for_one_more() -> None:
+    """Three unknowns of the object; that three frames do not move enough is not what is wrong."""
+    sensor = sensor_of("pulsed", 1e5)
+    frames = data(sensor, {"object": OBJECT}, path(3))
+    reason = refusal(sensor, {}, frames, "object_fit")
+    assert "at least 4 frames" in reason
+    assert "has 3" in reason
+    frames = data(sensor, {"object": OBJECT}, path(4))
+    assert estimate(sensor, exact_scene({}), frames, ["object_fit"]).results
+
+
 def test_saturated_frames_do_not_count() -> None:
     sensor = sensor_of("pulsed", 1e5).model_copy(update={"full_scale": (10.0, 10.0)})
     frames = data(sensor, TRUTH, path(7))

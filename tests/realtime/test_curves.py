@@ -220,6 +220,15 @@ def test_real_roots_finds_every_simple_root(roots: list[float], complex_pair: bo
     np.testing.assert_allclose(out[:count], roots, rtol=1e-5)
 
 
+@pytest.mark.parametrize("apart", [1e3, 1e9, 1e15])
+def test_a_small_root_beside_a_large_one_keeps_its_digits(apart: float) -> None:
+    """(x - 1/a)(x - a): the small one is a difference of two numbers of the large one's size."""
+    out = np.empty(3)
+    coefficients = np.array([1.0, -(apart + 1 / apart), 1.0])
+    assert real_roots(coefficients, 0.0, 2 * apart, out) == 2
+    np.testing.assert_allclose(out[:2], [1 / apart, apart], rtol=4 * np.finfo(float).eps)
+
+
 @given(*[st.floats(-1e6, 1e6)] * 2)
 def test_difference_of_products_is_exact(a: float, b: float) -> None:
     from fractions import Fraction
