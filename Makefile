@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report readme api docs picture notebook notebook-data calibrate coverage kills fuzz stress mutations test check lint format types fast lowest container-test lock clean
+.PHONY: help setup demo report readme api docs picture notebook notebook-data notebook-seeds calibrate coverage kills fuzz stress mutations test check lint format types fast lowest container-test lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -42,6 +42,9 @@ picture: $(READY) report ## Make the README's pictures anew
 notebook: $(READY) ## Run all notebooks and store their outputs
 	$(BIN)/jupyter-execute --inplace notebooks/*.ipynb
 
+notebook-seeds: $(READY) ## Notebooks over 20 seeds: how often their intervals hold the truth; goes on where it stopped
+	$(BIN)/python -m benchmarks.notebook_truth --out out/notebooks
+
 notebook-data: $(READY) ## Make the notebook's frames anew
 	$(BIN)/hybridtof simulate --scene notebooks/simulated.json --from-m 0.15 --to-m 1.2 --frames 30 --spacing log --seed 7 --output notebooks/frames.csv > /dev/null
 
@@ -68,7 +71,7 @@ mutations: $(READY) ## Plant faults in a copy of the source, one at a time: whic
 	$(BIN)/python -m benchmarks.mutations
 
 # two processes on two cores: a library that starts threads of its own only makes them wait
-calibrate coverage stress test fast: export OPENBLAS_NUM_THREADS = 1
+notebook-seeds calibrate coverage stress test fast: export OPENBLAS_NUM_THREADS = 1
 
 test: $(READY) ## Run every test
 	$(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder

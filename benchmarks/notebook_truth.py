@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 import hybridtof
 
-__all__ = ["HELD", "NOTEBOOKS", "executed", "held_by"]
+__all__ = ["HELD", "NOTEBOOKS", "executed", "held_by", "with_seeds"]
 
 NOTEBOOKS = Path(__file__).resolve().parents[1] / "notebooks"
 _Z = 1.6448536269514722  # of a 90 % interval
@@ -131,18 +131,31 @@ class _Moved(ast.NodeTransformer):
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         self.generic_visit(node)
-        if not isinstance(node.func, ast.Attribute):
-            return node
-        if node.func.attr == "read_frames" and self.run:
+        function = node.func
+        name = function.attr if isinstance(function, ast.Attribute) else ast.unparse(function)
+        if name == "read_frames" and self.run:
             node.func = ast.Name("simulated_anew", ast.Load())
-            return node
         seeds = [word.value for word in node.keywords if word.arg == "seed"]
-        if node.func.attr in ("simulate", "default_rng"):
+        if name in ("simulate", "default_rng"):
             seeds += node.args[-1:]
         for seed in seeds:
             if isinstance(seed, ast.Constant) and isinstance(seed.value, int):
                 seed.value += 1000 * self.run
         return node
+
+
+def with_seeds(code: str, run: int) -> str:
+    """Return code whose seeds are moved on by thousands.
+
+    Parameters
+    ----------
+    code : str
+        Of a cell. Seeds are numbers: the last argument of ``simulate`` and of ``default_rng``, and
+        whatever is named ``seed``.
+    run : int
+        By how many thousands.
+    """
+    return ast.unparse(_Moved(run).visit(ast.parse(code)))
 
 
 def executed(name: str, run: int = 0) -> tuple[dict[str, Any], str, bool]:
@@ -173,8 +186,7 @@ def executed(name: str, run: int = 0) -> tuple[dict[str, Any], str, bool]:
     with _in_folder(), mpl.rc_context(), contextlib.redirect_stdout(said):
         try:
             for code in _cells(name):
-                tree = ast.fix_missing_locations(_Moved(run).visit(ast.parse(code)))
-                exec(compile(tree, name, "exec"), names)  # noqa: S102  # our own text
+                exec(compile(with_seeds(code, run), name, "exec"), names)  # noqa: S102  # our own
         except AssertionError:
             passed = False
         finally:

@@ -98,8 +98,14 @@ def test_a_linear_fit_of_as_many_frames_as_unknowns_asks_for_one_more() -> None:
     reason = refusal(sensor, {}, frames, "object_fit")
     assert "at least 4 frames" in reason
     assert "has 3" in reason
-    frames = data(sensor, {"object": OBJECT}, path(4))
+    frames = data(sensor, {"object": OBJECT}, path(5))
     assert estimate(sensor, exact_scene({}), frames, ["object_fit"]).results
+    # two of five have no range
+    dark = frames.readings.copy()
+    dark[:2, 1] *= -1.0
+    reason = refusal(sensor, {}, dataclasses.replace(frames, readings=dark), "object_fit")
+    assert "at least 4 frames that have a range by conventional" in reason
+    assert "has 3" in reason
 
 
 def test_saturated_frames_do_not_count() -> None:

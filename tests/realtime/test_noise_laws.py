@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from inference.estimate import all_roots, estimate
 from inference.estimates import Status, TechniqueResult
-from inference.realtime.net import Net
+from inference.realtime.net import Form, Net
 from inference.realtime.windows import Windows, differences
 from simulator.frames import Frames
 from simulator.scene import parse_scene
@@ -57,13 +57,25 @@ def test_the_late_share_of_counted_photons_is_binomial() -> None:
     np.testing.assert_allclose(found.sd_m[:], expected, rtol=1e-6)
 
 
+def test_the_variance_of_a_form_is_that_of_linear_algebra() -> None:
+    one, g = np.ones(2), np.array([[3.0, -2.0], [0.5, 4.0]])
+    net = Net(one, one, 4 * one, 9 * one, 3 * one, 0.0, np.zeros(2, dtype=np.uint8))
+    matrix = np.array([[4.0, 3.0], [3.0, 9.0]])
+    expected = np.einsum("in,ij,jn->n", g, matrix, g)
+    np.testing.assert_allclose(net.variance(g[0], g[1]), expected, rtol=1e-15)
+    of_forms = net.covariance(Form(3.0, 0.5), Form(-2.0, 4.0))
+    np.testing.assert_allclose(of_forms, np.full(2, g[:, 0] @ matrix @ g[:, 1]), rtol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["conventional", "intensity"])
 @pytest.mark.parametrize("factor", [0.25, 8.0])
-def test_a_frame_of_another_gain_has_noise_less_by_that_gain(factor: float) -> None:
+def test_a_frame_of_another_gain_has_noise_less_by_that_gain(factor: float, name: str) -> None:
     sensor = pulsed(1e-6)
+    scene = {"object": OBJECT, "discrepancy": 0}
     plain = Frames(readings(sensor, RANGES))
     moved = Frames(factor * plain.readings, gain=np.full(len(plain), factor))
-    before = answer(sensor, {"discrepancy": 0}, plain, "conventional")
-    after = answer(sensor, {"discrepancy": 0}, moved, "conventional")
+    before = answer(sensor, scene, plain, name)
+    after = answer(sensor, scene, moved, name)
     np.testing.assert_allclose(after.range_m, before.range_m, rtol=1e-14)
     np.testing.assert_allclose(after.sd_m, before.sd_m / factor, rtol=1e-12)
 
@@ -86,7 +98,8 @@ def test_relative_noise_moves_the_range_of_the_light_by_the_slope() -> None:
     np.testing.assert_allclose(found.sd_m, relative * RANGES / np.abs(log_slope(RANGES)), rtol=1e-6)
 
 
-def test_a_reading_at_full_scale_is_saturated_and_one_below_is_not() -> None:
+@pytest.mark.parametrize("name", ["conventional", "intensity"])
+def test_a_reading_at_full_scale_is_saturated_and_one_below_is_not(name: str) -> None:
     sensor = pulsed(1e-6)
     pair = readings(sensor, np.array([0.5]))
     for k, reading in enumerate(pair[0]):
@@ -97,7 +110,8 @@ def test_a_reading_at_full_scale_is_saturated_and_one_below_is_not() -> None:
         ):
             scale[k] = float(limit)
             limited = sensor.model_copy(update={"full_scale": tuple(scale)})
-            (result,) = estimate(limited, parse_scene({}), Frames(pair), ["conventional"]).results
+            scene = parse_scene({"object": OBJECT})
+            (result,) = estimate(limited, scene, Frames(pair), [name]).results
             assert result.status[0] == status
 
 

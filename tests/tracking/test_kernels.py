@@ -12,9 +12,11 @@ from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import Hypotheses, scratch_for
 from inference.tracking.merging import merge, merge_equals
 from inference.tracking.motion import Motion, motion_over, presence_over
+from inference.tracking.outliers import log_outlier
 from inference.tracking.places import mass_bound
 from inference.tracking.readings_table import mean_at
 from inference.tracking.roots import Root, add_factor
+from inference.tracking.settings import Observables, TrackingSettings
 from inference.tracking.square_root import Linear, move, update
 from inference.tracking.tracker import tracker
 from simulator.parameters import parameters_of
@@ -187,3 +189,31 @@ def test_the_mass_of_a_new_object_is_bounded(read: float, gain: float) -> None:
         assert bound >= exact * (1 - 1e-6)
         if exact > 1e-6:
             assert bound < 100 * exact
+
+
+@pytest.mark.parametrize(("observables", "channels"), [("readings", 2), ("w2", 1)])
+def test_readings_that_have_nothing_to_do_with_the_scene_have_a_law(
+    observables: Observables, channels: int
+) -> None:
+    """A density, and its probabilities sum to one: else outliers weigh more or less than stated."""
+    settings = TrackingSettings(observables=observables)
+    model = tracker(sensor_of(1e-4), scene_of(FOLDED), settings).model
+    assert model.table.channels == channels
+    breadth = model.rules.breadth
+
+    def density(away: float, angle: float = 0.3) -> float:
+        first, second = math.cos(angle) * away, math.sin(angle) * away
+        frame = TrackedFrame(2.0 + first, -3.0 + second, 1.0)
+        if channels == 1:
+            frame = TrackedFrame(2.0 + away, -3.0, 1.0)
+        log = log_outlier(frame, 2.0, -3.0, model.table, model.rules)
+        return math.exp(log) * (2 * math.pi) ** (-0.5 * channels)
+
+    assert density(1.7 * breadth, 2.0) == pytest.approx(density(1.7 * breadth))
+
+    def within(share: float) -> float:
+        """Of all readings as far away as tan(share), times the breadth, or on a circle of it."""
+        away, stretch = breadth * math.tan(share), breadth / math.cos(share) ** 2
+        return density(away) * stretch * (2.0 if channels == 1 else 2 * math.pi * away)
+
+    assert integrate.quad(within, 0.0, 0.5 * math.pi, limit=10)[0] == pytest.approx(1.0, rel=1e-6)
