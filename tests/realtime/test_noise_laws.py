@@ -84,6 +84,7 @@ def test_parts_of_an_error_add_in_squares() -> None:
     sensor = pulsed(2e-7)
     frames = Frames(readings(sensor, RANGES))
     found = answer(sensor, {"object": OBJECT}, frames, "intensity")
+    assert found.sd_parts_m is not None
     noise, model = found.sd_parts_m.noise[:, 0], found.sd_parts_m.model[:, 0]
     assert (noise > 0).all()
     assert (model > 0).all()
@@ -152,12 +153,12 @@ def test_noise_of_a_derivative_counts_the_frames_own_reading(at: int) -> None:
         3: (-1 / 12, 1 / 2, -3 / 2, 5 / 6, 1 / 4),
         4: (1 / 4, -4 / 3, 3, -4, 25 / 12),
     }[at]
-    t = 0.1 * np.arange(5)
+    t = 0.1 * np.arange(5.0)
     one = np.ones(5)
     line = np.arange(5.0)  # whole numbers: nothing is rounded
     net = Net(line, 2 * line, 4 * one, 9 * one, 3 * one, 0.0, np.zeros(5, dtype=np.uint8))
     out = Windows(*(np.full(5, np.nan) for _ in range(6)))
-    differences(t, net, None, out)
+    differences(np.asarray(t, dtype=np.float64), net, None, out)
     square = sum(w * w for w in weights) / 0.01
     np.testing.assert_allclose(
         [out.first[at], out.second[at], out.var1[at], out.var2[at], out.cov[at]],

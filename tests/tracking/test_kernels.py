@@ -207,7 +207,7 @@ def test_readings_that_have_nothing_to_do_with_the_scene_have_a_law(
         if channels == 1:
             frame = TrackedFrame(2.0 + away, -3.0, 1.0)
         log = log_outlier(frame, 2.0, -3.0, model.table, model.rules)
-        return math.exp(log) * (2 * math.pi) ** (-0.5 * channels)
+        return math.exp(log - 0.5 * channels * math.log(2 * math.pi))
 
     assert density(1.7 * breadth, 2.0) == pytest.approx(density(1.7 * breadth))
 
