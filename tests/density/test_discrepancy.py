@@ -281,3 +281,19 @@ def test_without_a_discrepancy_nothing_of_it_exists() -> None:
     frames = data(sensor, None, 3).frames
     job = fold.prepare(sensor, parse_scene({}), frames, SamplerSettings(seed=1))
     assert type(job.density()) is CollapsedDensity
+
+
+def test_an_error_of_the_flux_hides_the_reflectance_by_as_much() -> None:
+    """Ten frames of one place share one error of 5 %: slopes tell log c2 to that and no better.
+
+    The noise adds 3e-5 of it.
+    """
+    sensor = sensor_of("pulsed")
+    assert isinstance(sensor, PulsedSensor)
+    flux = sensor.known_gain * 0.0769 * 0.1 / (0.25 * (0.25 - 0.0615 + 0.0769))
+    frames = Frames(np.tile([flux * 0.5 / sensor.r0, flux], (10, 1)))
+    known = {"object": {"c0": 0.0769, "c1": -0.123}}
+    density = density_of(sensor, known, frames, 0.05)
+    assert density.parameters.names == ("object.c2",)  # lognormal of sigma 1: z is log c2
+    line = linearise(density, np.zeros(1), np.full(10, np.log(0.5)))
+    assert float(np.sum(line.jacobian**2)) ** -0.5 == pytest.approx(0.05, rel=0.02)
