@@ -2,8 +2,8 @@
 
 Kernels call one another across files, but numba's own cache looks at the caller's file alone: after
 an edit of the callee it would go on running the old machine code. The folder of a file is therefore
-named by a digest of it and of every file of kernels that it uses, directly or not. Times play no
-part, so that a copied cache is as good as the first.
+named by a digest of it and of every file of kernels or named tuples that it uses, directly or not.
+Times play no part, so that a copied cache is as good as the first.
 
 What lies there is run. A folder that another user owns, or that others may write to, is refused.
 """
@@ -21,7 +21,8 @@ __all__ = ["CacheFolder", "base_folder", "digest_of_all", "folder_of"]
 
 _log = logging.getLogger("hybridtof")
 _ROOT = Path(__file__).resolve().parents[1]
-_MARK = b"from simulator.compiled import compiled"
+# what kernels call, and what they take: their members are found by their places
+_MARKS = (b"from simulator.compiled import compiled", b"(NamedTuple):")
 _IMPORT = re.compile(rb"^from ((?:simulator|inference)[\w.]*) import ", re.MULTILINE)
 _OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
@@ -35,11 +36,11 @@ class CacheFolder(NamedTuple):
 
 @functools.cache
 def _read(path: Path) -> tuple[bytes, tuple[Path, ...]]:
-    """Return the source of a file of kernels and the files that it imports; neither of others."""
+    """Return the source and imports of a file of kernels or named tuples; nothing of others."""
     if not path.is_file():
         return b"", ()
     source = path.read_bytes()
-    if _MARK not in source:
+    if not any(mark in source for mark in _MARKS):
         return b"", ()
     used: list[Path] = []
     for name in _IMPORT.findall(source):
@@ -51,7 +52,7 @@ def _read(path: Path) -> tuple[bytes, tuple[Path, ...]]:
 
 @functools.cache
 def _digest(path: Path) -> str:
-    """Return a digest of a file and of every file of kernels that it uses, directly or not."""
+    """Return a digest of a file and of all that its kernels are made of."""
     seen: set[Path] = set()
     ahead = [path]
     while ahead:

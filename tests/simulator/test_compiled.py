@@ -23,6 +23,12 @@ KERNELS = sorted(
     for path in (ROOT / package).rglob("*.py")
     if "@compiled" in path.read_text() and path.name != "compiled.py"
 )
+TUPLES = {
+    path
+    for package in ("simulator", "inference")
+    for path in (ROOT / package).rglob("*.py")
+    if "(NamedTuple):" in path.read_text()
+}
 
 
 def loaded_from(root: Path) -> ModuleType:
@@ -49,7 +55,7 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return root
 
 
-TOP = Path("inference") / "density" / "collapsed.py"
+TOP = Path("inference") / "density" / "frame_integrals.py"
 """A file of kernels that use many others."""
 
 
@@ -61,12 +67,12 @@ def directory_of(root: Path, path: Path = TOP) -> str:
 
 
 def used_by(path: Path) -> set[Path]:
-    """Return every file of kernels whose names a file of kernels imports, directly or not."""
+    """Return every file of kernels or named tuples whose names a file imports, directly or not."""
     seen: set[Path] = set()
     ahead = [path]
     while ahead:
         here = ahead.pop()
-        if here in seen or here not in KERNELS:
+        if here in seen or here not in {*KERNELS, *TUPLES}:
             continue
         seen.add(here)
         ahead += [
@@ -90,6 +96,19 @@ def test_an_edit_changes_the_directory_of_all_that_use_the_file_and_of_no_other(
         copy.write_text(source + "\n# another comment\n")
         assert (directory_of(tree) != before) == (path in used), path
         copy.write_text(source)
+
+
+def test_named_tuples_that_kernels_take_count(tree: Path) -> None:
+    """Their members are found by their places: in another order old machine code would be wrong."""
+    curves = Path("inference") / "realtime" / "solving" / "curves"
+    taken = tree / curves / "curve.py"
+    source = taken.read_text()
+    assert MARK not in source
+    before = directory_of(tree, curves / "intensity.py")
+    taken.write_text(
+        source.replace("    c0: float\n    c1: float\n", "    c1: float\n    c0: float\n")
+    )
+    assert directory_of(tree, curves / "intensity.py") != before
 
 
 def test_other_files_do_not_change_it(tree: Path) -> None:
