@@ -6,30 +6,43 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 
 from service.demo.answers import Answer, Episode, Point, of_estimates, of_posterior
+from service.demo.command import RECORDINGS
+from service.demo.episodes import nearest
+from service.demo.running import Client, running_service
 from service.demo.table import table
 
 ROOT = Path(__file__).parents[1]
+RECORDINGS_HERE = (ROOT / RECORDINGS).exists()
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("recordings", ["absent", "as found"])
-def test_demo(tmp_path: Path, recordings: str) -> None:
+def test_demo(tmp_path: Path) -> None:
     """In a process of its own: it starts the real service on an unused port."""
     command = [sys.executable, "-m", "service.cli", "demo", "--out", str(tmp_path / "new" / "out")]
-    if recordings == "absent":
-        command += ["--recordings", str(tmp_path / "none.json")]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
     for word in ("90 % interval", "unique", "ambiguous", "differential", "posterior (converged"):
         assert word in done.stdout
-    if recordings == "absent":
-        assert "recorded" not in done.stdout
+    assert ("recorded" in done.stdout) == RECORDINGS_HERE
     assert (tmp_path / "new" / "out" / "demo.png").read_bytes().startswith(SIGNATURE)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not RECORDINGS_HERE, reason="no recorded photons: the whole demo is without")
+def test_without_recordings_a_plate_is_simulated(tmp_path: Path) -> None:
+    """The one scene of the demo that recordings change."""
+    with running_service() as address, httpx.Client(base_url=address, timeout=None) as http:  # noqa: S113
+        episode = nearest(Client(http), tmp_path / "none.json")
+    assert (episode.title, episode.source) == ("A plate of unknown size", "simulated")
+    text = table([episode])
+    for word in ("90 % interval", "unique", "posterior (converged"):
+        assert word in text
 
 
 def test_estimates_and_posteriors_as_answers() -> None:

@@ -19,7 +19,7 @@ from service.store.retention import Retention
 from service.store.sql_store import SqlJobStore
 from simulator.scene import parse_scene
 from tests.chunk_clock import timed
-from tests.posterior.scenes import UNKNOWN_CROSSTALK, data, example, sensor_of
+from tests.posterior.scenes import OBJECT, UNKNOWN_CROSSTALK, data, example, sensor_of
 
 R = TypeVar("R")
 OUT_OF_TIME = "stopped at the time limit of {} s"
@@ -69,8 +69,9 @@ def test_the_same_answer_from_a_call_and_from_the_service(
 ) -> None:
     crosstalk = {"values": UNKNOWN_CROSSTALK, "optional": True} if optional else UNKNOWN_CROSSTALK
     sensor = sensor_of("pulsed")
-    frames = data(sensor, {"crosstalk": [0.002, 0.01]}).frames
-    request = sensor, parse_scene({"crosstalk": crosstalk}), frames
+    frames = data(sensor, {"crosstalk": [0.002, 0.01]}, frames=8).frames
+    plate = {name: OBJECT[name] for name in ("c0", "c1")}
+    request = sensor, parse_scene({"object": plate, "crosstalk": crosstalk}), frames
     target = 1_000_000 if max_seconds < 100 else 50
     settings = SamplerSettings(seed=7, target_ess=target, max_seconds=max_seconds)
     called = inference.posterior.infer.infer(*request, settings).to_json()

@@ -30,14 +30,17 @@ from tests.service.conftest import SENSOR
 pytestmark = [pytest.mark.anyio, pytest.mark.slow]
 
 
+FRAMES = 12
+
+
 def request_body() -> dict[str, Any]:
-    """Forty frames of an object of unknown parameters before known crosstalk."""
+    """Frames of an object of unknown parameters before known crosstalk."""
     system = {
         "sensor": SENSOR | {"noise": {"read": [1e-4, 1e-4]}},
         "scene": {"crosstalk": [0.01, 0.02]},
     }
     known = {"object": {"c0": 0.0769, "c1": -0.123, "c2": 0.1}, "crosstalk": [0.01, 0.02]}
-    trajectory = {"kind": "radial", "from_m": 0.2, "to_m": 2.0, "frames": 40, "spacing": "log"}
+    trajectory = {"kind": "radial", "from_m": 0.2, "to_m": 2.0, "frames": FRAMES, "spacing": "log"}
     simulated = simulation_of(
         parse(SimulationRequest, system | {"scene": known, "trajectory": trajectory, "seed": 1})
     )
@@ -65,7 +68,7 @@ async def test_over_http() -> None:
         refused = await client.post("/v1/identifiability", json=other)
     with h5netcdf.File(io.BytesIO(netcdf), "r") as file:
         drawn = file["posterior"]["object.c0"][...].ravel()
-        assert file["posterior_predictive"]["range_m"].shape[2] == 40
+        assert file["posterior_predictive"]["range_m"].shape[2] == FRAMES
     # made anew from the checkpoint: the draws that the summary is of
     assert body["parameters"]["object.c0"]["mean"] == pytest.approx(drawn.mean(), rel=1e-12)
     assert body["status"] == "done", body
@@ -85,7 +88,7 @@ async def test_over_http() -> None:
     assert body["verdict"]["converged"], body["verdict"]
     assert body["parameters"].keys() == {"object.c0", "object.c1", "object.c2"}
     for name in ("q05", "q50", "q95", "mean", "sd", "modes"):
-        assert len(body["range_m"][name]) == 40
+        assert len(body["range_m"][name]) == FRAMES
 
 
 async def test_refusal_over_http() -> None:
@@ -105,7 +108,7 @@ async def test_refusal_over_http() -> None:
 async def posterior(path: Path, kill_workers: bool) -> dict[str, Any]:
     request = parse(PosteriorRequest, request_body())
     frames = frames_from_columns(request.sensor, request.frames)
-    settings = SamplerSettings(seed=2, target_ess=10_000, max_seconds=86_400)
+    settings = SamplerSettings(seed=2, target_ess=5_000, max_seconds=86_400)
     pool = ProcessPool(2)
     store = SqlJobStore(f"sqlite:///{path}/{kill_workers}.sqlite", Retention(1))
     jobs = Jobs(fold, store, pool, running=1)
