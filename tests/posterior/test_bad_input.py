@@ -278,8 +278,8 @@ WRONG: dict[str, Callable[[], tuple[dict[str, Any], Frames]]] = {
         data(SENSOR, {"crosstalk": [0.002, 0.01]}).frames,
     ),
     "an object far brighter than its prior": lambda: (
-        {"object": OBJECT | {"c2": {"prior": "lognormal", "median": 1e-6, "sigma": 0.01}}},
-        FRAMES,
+        {"object": OBJECT | {"c2": {"prior": "lognormal", "median": 1e-6, "sigma": 0.1}}},
+        data(SENSOR, frames=8).frames,
     ),
 }
 
