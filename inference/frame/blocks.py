@@ -119,7 +119,7 @@ class Data(NamedTuple):
 
 
 def _flags(frames: Array, present: Flags | None) -> Flags:
-    # an array without gaps in any case: kernels are compiled once, for frames with and without flags
+    # an array without gaps in any case: kernels are compiled once, with and without such flags
     return np.ones(len(frames), dtype=bool) if present is None else np.ascontiguousarray(present)
 
 
