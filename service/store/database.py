@@ -1,6 +1,7 @@
 """From the address of a database to one that is ready: of a known kind, with today's tables."""
 
 import contextlib
+import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -108,11 +109,13 @@ def _make_file(path: Path) -> None:
 
 def _on_connect(connection: Any, _: object) -> None:
     connection.isolation_level = None  # transactions begin where `_on_begin` says, not by a guess
-    cursor = connection.cursor()
-    # FULL: what was committed is there after a power cut; in WAL mode the default is less
-    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"):
-        cursor.execute(f"PRAGMA {pragma}")
-    cursor.close()
+    try:
+        # FULL: what was committed is there after a power cut; in WAL mode the default is less
+        for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"):
+            connection.execute(f"PRAGMA {pragma}").close()
+    except sqlite3.Error:  # of a file that is no database; nobody else closes it then
+        connection.close()
+        raise
 
 
 def _on_begin(connection: sa.Connection) -> None:
