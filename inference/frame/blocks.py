@@ -119,8 +119,8 @@ class Data(NamedTuple):
 
 
 def _flags(frames: Array, present: Flags | None) -> Flags:
-    # an array without gaps in any case: kernels are compiled once, with and without such flags
-    return np.ones(len(frames), dtype=bool) if present is None else np.ascontiguousarray(present)
+    # an array in any case: kernels are compiled once, for frames with and without such flags
+    return np.ones(len(frames), dtype=bool) if present is None else present
 
 
 def own_blocks(frames: Array, present: Flags | None) -> Data:

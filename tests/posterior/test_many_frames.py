@@ -51,7 +51,8 @@ def density_and_truth(sensor: Sensor, frames: Frames) -> tuple[CollapsedDensity,
 
 
 def optimum_of_some(density: CollapsedDensity, z: Array) -> Optimum:
-    present = None if density.present is None else density.present[::20]
+    # without gaps, as all flags are: others would have machine code of their own
+    present = None if density.present is None else np.ascontiguousarray(density.present[::20])
     some = dataclasses.replace(
         density, frames=np.ascontiguousarray(density.frames[::20]), present=present
     )
