@@ -66,6 +66,7 @@ fuzz: $(READY) ## 2,000 requests a route by schemathesis, 10,000 bodies a route 
 
 stress: $(READY) ## Extreme and stiff cases against exact arithmetic, 100,000 frames: the table of docs/stability.md
 	$(BIN)/python -m benchmarks.stability
+	$(BIN)/python -m benchmarks.certified_integrals
 	$(BIN)/python -m benchmarks.stress_posteriors --out out/stress
 
 mutations: $(READY) ## Plant faults in a copy of the source, one at a time: which tests notice; goes on where it stopped

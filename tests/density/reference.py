@@ -80,8 +80,8 @@ def log_density(case: Case, u: Array) -> Array:
     return np.asarray(density - constant, dtype=float)
 
 
-def reference(case: Case, points: int = 20001) -> float:
-    """Log of the frame's integral over u = log r."""
+def tops_of(case: Case, points: int = 20001) -> list[tuple[float, float]]:
+    """Where the log density over u = log r has a top, ends included, and what it is there."""
     low, high = math.log(case.low), math.log(case.high)
     grid = np.linspace(low, high, points)
     values = log_density(case, grid)
@@ -112,6 +112,13 @@ def reference(case: Case, points: int = 20001) -> float:
             options={"xatol": 1e-17},
         )
         tops.append((u + finer.x, -finer.fun) if -finer.fun > value else (u, value))
+    return tops
+
+
+def reference(case: Case, points: int = 20001) -> float:
+    """Log of the frame's integral over u = log r."""
+    low, high = math.log(case.low), math.log(case.high)
+    tops = tops_of(case, points)
     best = max(value for _, value in tops)
     high_tops = [u for u, value in tops if value > best - 60]
     # valleys need not be exact: they only divide the interval
