@@ -1,6 +1,7 @@
 """Streams: frames in and ranges out, a line each, for as long as there are frames."""
 
 import asyncio
+import math
 import re
 from collections.abc import AsyncIterable, AsyncIterator
 from typing import Annotated
@@ -14,6 +15,14 @@ from starlette.types import Receive, Scope, Send
 from service.answers.streams import StreamLine, StreamPage, StreamResponse, stream_of
 from service.bodies import BodyOf, check_media_type, read_limited
 from service.errors import SlowClientError
+from service.messages.message import Message
+from service.messages.streaming import (
+    LINES,
+    as_messages,
+    limits_of_tracker,
+    lines_type,
+    message_for,
+)
 from service.problems import problem_responses, response_of
 from service.requests import StreamRequest
 from service.routes.resources import Cursor, LastEventId, answered, event_of, place_of
@@ -28,7 +37,6 @@ __all__ = ["router"]
 router = APIRouter(prefix="/v1/streams", tags=["streams"])
 Body = Annotated[tuple[StreamRequest, bytes], Depends(BodyOf(StreamRequest))]
 
-_LINES = "application/x-ndjson"
 _KINDS = re.compile(r"application/(x-ndjson|ndjson|jsonl|json-seq|json|x-jsonlines)")
 _QUIET_S = 60.0
 
@@ -124,24 +132,28 @@ async def events(
 class _Answers(Response):
     """Answers as they are made, while lines still come."""
 
-    media_type = _LINES
+    media_type = LINES
 
-    def __init__(self, request: Request, stream_id: str) -> None:
+    def __init__(self, request: Request, stream_id: str, message: Message | None) -> None:
         super().__init__()
-        self._request, self._id = request, stream_id
+        self._request, self._id, self._message = request, stream_id, message
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG002
         request, begun = self._request, False
+        limits = (0.0, math.inf)
 
         async def begin() -> None:
             nonlocal begun
             begun = True
-            headers = [(b"content-type", _LINES.encode())]
+            kind = lines_type(self._message)
+            headers = [(b"content-type", kind.encode()), (b"vary", b"accept")]
             await send({"type": "http.response.start", "status": 200, "headers": headers})
 
         async def answer(lines: list[bytes]) -> None:
             if not begun:
                 await begin()
+            if self._message is not None:
+                lines = await asyncio.to_thread(as_messages, self._message, limits, lines)
             body = b"\n".join(lines) + b"\n"
             await send({"type": "http.response.body", "body": body, "more_body": True})
 
@@ -150,6 +162,7 @@ class _Answers(Response):
         try:
             opened = shared.streams.producing(self._id, client, _QUIET_S, lasting=not at_once)
             async with opened as producer:
+                limits = limits_of_tracker(producer.model.base)
                 if at_once:
                     await producer.run(lines_of(self._whole()), answer)
                 else:
@@ -190,7 +203,7 @@ class _Answers(Response):
     response_class=_Answers,
     responses={
         200: {"description": "One answer a line, in order", "model": StreamLine},
-        **problem_responses(404, 408, 409, 410, 413, 415, 503),
+        **problem_responses(404, 406, 408, 409, 410, 413, 415, 503),
     },
     openapi_extra={
         "requestBody": {
@@ -198,14 +211,17 @@ class _Answers(Response):
             "description": "One frame a line: columns in the singular, `sequence`, and whatever is "
             "to be passed through. With a Content-Length the batch is answered when it is there; "
             "without, line by line as they come, for as long as they come.",
-            "content": {_LINES: {"schema": {"type": "object"}}},
+            "content": {LINES: {"schema": {"type": "object"}}},
         }
     },
 )
 async def frames(request: Request, stream_id: str) -> Response:
-    """Answer frames line by line; a number that was answered is answered as before."""
-    check_media_type(request.headers, _KINDS, _LINES)
-    return _Answers(request, stream_id)
+    """Answer frames line by line; a number that was answered is answered as before.
+
+    By ``Accept`` a line has a message of ROS 2 or MAVLink in place of its numbers.
+    """
+    check_media_type(request.headers, _KINDS, LINES)
+    return _Answers(request, stream_id, message_for(",".join(request.headers.getlist("accept"))))
 
 
 @router.websocket("/{stream_id}/live")

@@ -14,9 +14,23 @@ from pymavlink.dialects.v20 import common
 from inference.estimate import estimate
 from inference.fits.techniques.registry import FITS
 from inference.realtime.registry import TECHNIQUES
+from inference.tracking.tracker import tracker
+from service.errors import NotAcceptableError
 from service.messages import MESSAGES
 from service.messages.answering import encode_messages
 from service.messages.measured import SIDES, Measured, total
+from service.messages.streaming import (
+    as_messages,
+    limits_of_tracker,
+    line_as_message,
+    lines_type,
+    message_for,
+)
+from service.streams.followers import Plain
+from service.streams.forms import JsonLines
+from service.streams.kept import Kept
+from service.streams.lines import Line, Place
+from service.streams.taking import take
 from simulator.frames import frames_from_columns
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
@@ -166,3 +180,78 @@ def test_reasons_that_tell_a_side_are_reasons_of_techniques() -> None:
 
 def test_names_and_media_types_differ() -> None:
     assert len({m.name for m in MESSAGES}) == len({m.media_type for m in MESSAGES}) == len(MESSAGES)
+
+
+_STREAMED = {
+    "object": {"c0": 0.0769, "c1": -0.123, "c2": 0.0957},
+    "discrepancy": 0,
+}
+
+
+def test_lines_of_a_stream_as_messages() -> None:
+    """One range, none, an error: the message says what the line said, and never more."""
+    model = Plain(tracker(parse_sensor(SENSOR), parse_scene(_STREAMED)))
+    c0, c1, c2 = _STREAMED["object"].values()  # type: ignore[attr-defined]
+    r = 0.8
+    w2 = c0 * c2 / (r**2 * (r**2 + c1 * r + c0))
+    frames = [{"time_s": 0.1 * n, "w1": w2 * r / 14.9896, "w2": w2, "id": n} for n in range(6)]
+    frames += [{"time_s": 0.6, "w1": 0.0, "w2": 0.0, "object_present": False}, {"time_s": 0.0}]
+    lines = [Line(json.dumps(frame).encode(), 0.0) for frame in frames]
+    answers = take(model, Place(model.first), lines, JsonLines(), Kept()).answers
+    limits = limits_of_tracker(model.base)
+    every = {}
+    for form in (ROS, MAVLINK):
+        found = [json.loads(line) for line in as_messages(form, limits, answers)]
+        assert [line["sequence"] for line in found] == list(range(1, 9))
+        assert found[4]["id"] == 4
+        assert "message" not in found[7]
+        assert found[7] == json.loads(answers[7])
+        assert (found[5]["status"], found[6]["status"]) == ("unique", "none")
+        every[form.name] = [found[n]["message"] for n in (5, 6)]
+    said, empty = map(ros, every[ROS.name])
+    answer = json.loads(answers[5])
+    assert said["range"] == answer["range_m"]
+    assert said["variance"] >= answer["sd_m"] ** 2
+    assert empty["range"] == math.inf
+    near, nothing = map(mavlink, every[MAVLINK.name])
+    assert abs(near.current_distance - 80) <= 1
+    assert (near.signal_quality, nothing.signal_quality) == (100, 1)
+    assert nothing.current_distance > nothing.max_distance
+
+
+@given(
+    st.floats(0.1, 3.0), st.floats(0.1, 3.0), st.floats(0.05, 0.95),
+    st.sampled_from(["ambiguous", "saturated", "unique"]), st.booleans(),
+)  # fmt: skip
+def test_two_modes_are_never_one(
+    one: float, other: float, share: float, status: str, misfit: bool
+) -> None:
+    hypotheses = [
+        {"range_m": one, "sd_m": 0.01, "weight": share},
+        {"range_m": other, "sd_m": 0.01, "weight": 1 - share},
+    ]
+    unique = status == "unique"
+    answer = {
+        "sequence": 1, "time_s": 0.0, "status": status, "range_m": one if unique else None,
+        "sd_m": 0.01 if unique else None, "hypotheses": hypotheses, "misfit": misfit,
+    }  # fmt: skip
+    line = json.dumps(answer).encode()
+    written = [line_as_message(form, (0.02, 15.0), line) for form in (ROS, MAVLINK)]
+    range_, distance = (json.loads(text)["message"] for text in written)
+    if unique and not misfit:
+        assert range_["range"] == one
+        assert range_["variance"] >= 0.99 * (1 - share) * (one - other) ** 2
+        return
+    assert range_["range"] is None
+    assert distance["signal_quality"] == 1
+    if status == "ambiguous":
+        between = share * (1 - share) * (one - other) ** 2
+        assert range_["variance"] >= 0.99 * between
+
+
+def test_what_a_client_of_a_stream_accepts() -> None:
+    assert message_for("") is message_for("*/*") is message_for("application/json") is None
+    assert message_for(ROS.media_type) is ROS
+    assert lines_type(MAVLINK).endswith(f'profile="{MAVLINK.media_type}"')
+    with pytest.raises(NotAcceptableError):
+        message_for("text/html")
