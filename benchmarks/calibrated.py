@@ -1,6 +1,6 @@
 """A calibrated scene on frames that were not in the calibration: single frames and the tracker.
 
-    python -m benchmarks.calibrated [--sets 10] [--kinds exact optics recorded]
+    python -m benchmarks.calibrated [--sets 10] [--kinds exact optics recorded ruled]
 
 Behind a cover glass of which nothing is known, and of an object of which nothing is known, 24
 frames over a stroke and five without the object are what `calibrated_scene` is made from. Then the
@@ -13,7 +13,8 @@ stated before the calibration.
 `benchmarks.coverage` (the default error of the model), of both sensors by turns at a
 signal-to-noise ratio of 1000 in the middle of the stroke, with crosstalk of a tenth to three tenths
 of the signal there. `recorded` are the photons of `docs/recorded.md` with crosstalk of a tenth of
-their signal at 0.2 m: every fourth position calibrates, the others are asked.
+their signal at 0.2 m: every fourth position calibrates, the others are asked; `ruled` the same with
+the ranges of the former known to 0.5 mm.
 
 For every technique: frames that it gives one range, the median relative error, the share of 90 %
 intervals that hold the truth (and in the set where that share is least), their median width over
@@ -51,6 +52,8 @@ Array = NDArray[np.float64]
 
 _FITTED = 8  # every so many frames are fitted together
 _CALIBRATING, _EMPTY, _ASKED, _STEP_S, _REPEATED = 24, 5, 200, 0.05, 100
+_RULER_SD_M = 5e-4
+_PHOTONS = ("recorded", "ruled")
 _Z = 1.6448536269514722  # of a 90 % interval
 _BARE = "conventional, as if without glass"
 _UNTOLD = "joint_fit, as stated"
@@ -156,7 +159,7 @@ def optics(number: int) -> Case:
     return _case(kind, light, rng, "default")
 
 
-def recorded(number: int) -> Case:
+def recorded(number: int, ruler_sd_m: float | None = None) -> Case:
     """Recorded photons; the number says which of four positions calibrates."""
     recording = near_recording()
     truth = recording.distance_m
@@ -177,13 +180,24 @@ def recorded(number: int) -> Case:
         }
     )
     asked = Frames(readings[~mine], time_s=_STEP_S * np.arange((~mine).sum()))
-    return Case(sensor, stated, Frames(calibrating, object_present=present), asked, truth[~mine])
+    frames = Frames(calibrating, object_present=present)
+    if ruler_sd_m is not None:
+        known = np.where(present, np.append(truth[mine], np.zeros(_EMPTY)), np.nan)
+        sd = np.where(present, ruler_sd_m, np.nan)
+        frames = dataclasses.replace(frames, known_range_m=known, known_range_sd_m=sd)
+    return Case(sensor, stated, frames, asked, truth[~mine])
+
+
+def ruled(number: int) -> Case:
+    """The same, with a ruler beside the positions that calibrate."""
+    return recorded(number, _RULER_SD_M)
 
 
 KINDS_OF_DATA: dict[str, Callable[[int], Case]] = {
     "exact": exact,
     "optics": optics,
     "recorded": recorded,
+    "ruled": ruled,
 }
 
 
@@ -241,12 +255,12 @@ def main() -> None:
     args = parser.parse_args()
     print("| frames | technique | told | error | held | width | us |\n|" + "---|" * 7)
     for kind in args.kinds:
-        if kind == "recorded" and not PATH.exists():
+        if kind in _PHOTONS and not PATH.exists():
             continue
         rows: dict[str, list[Array]] = defaultdict(list)
         costs: dict[str, float] = {}
         distances, verdicts = [], []
-        count = min(args.sets, 4) if kind == "recorded" else args.sets
+        count = min(args.sets, 4) if kind in _PHOTONS else args.sets
         for number in range(count):
             case = KINDS_OF_DATA[kind](number)
             posterior = infer(
@@ -259,6 +273,7 @@ def main() -> None:
             accept = scene.calibration.model_copy(update={"accept": ("not_converged", "misfit")})
             if args.verbose:
                 print(kind, number, posterior.verdict, posterior.fit.reasons, flush=True)
+                print(scene.calibration.learnt_error, scene.discrepancy, flush=True)
             taken = scene.model_copy(update={"calibration": accept})
             for name, row in answers(case, taken):
                 rows[name].append(row)

@@ -15,6 +15,7 @@ __all__ = [
     "CalibrationFrames",
     "Joint",
     "Learnt",
+    "LearntError",
     "NormalMode",
     "Omitted",
 ]
@@ -129,6 +130,23 @@ class Omitted(Validated):
     reason: Text
 
 
+class LearntError(Validated):
+    """What frames of known range show of the model's errors.
+
+    Attributes
+    ----------
+    frames : int
+        How many there were.
+    flux, range_m : float
+        Sizes of the errors of the object's flux [1] and of the effective distance [m] that are left
+        with the unknowns as they were learnt, noise and the ruler's own error taken off.
+    """
+
+    frames: Annotated[int, pydantic.Field(ge=1)]
+    flux: NonNegative
+    range_m: NonNegative
+
+
 class Learnt(Validated):
     """One unknown after a calibration, for a reader; what is used is the `Joint`.
 
@@ -175,6 +193,9 @@ class Calibration(Validated):
         Terms that the scene does not have, or that the data did not demand.
     model_error : (float, float)
         Standard deviations of the errors of flux [1] and range [m] that are part of the joint law.
+    learnt_error : LearntError, optional
+        What frames of known range show of these errors; where either is larger than
+        ``model_error``, the scene's `discrepancy` has the larger ones.
     unknowns : tuple of Learnt
         The unknowns, for a reader.
     distance : float
@@ -192,5 +213,6 @@ class Calibration(Validated):
     frames: CalibrationFrames
     left_out: Annotated[tuple[Omitted, ...], _LOOSE, pydantic.Field(max_length=_MOST)] = ()
     model_error: Annotated[tuple[NonNegative, NonNegative], _LOOSE]
+    learnt_error: LearntError | None = None
     unknowns: Annotated[tuple[Learnt, ...], _LOOSE, pydantic.Field(max_length=_MOST)] = ()
     distance: NonNegative = 0.0

@@ -11,6 +11,7 @@ from scipy import special
 
 from inference.posterior.answer.draws import Draws
 from inference.posterior.answer.posterior import Posterior
+from inference.posterior.learnt_error import learnt_error
 from inference.posterior.selection.models import reduced
 from simulator.errors import RefusedError
 from simulator.frames import Frames
@@ -114,6 +115,17 @@ def scene_of_draws(
         priors = [priors_of(sensor, prior)[name] for name in names]
         calibration["unknowns"] = list(_learnt(names, priors, natural[:, kept]))
         calibration["distance"] = _distance(law, z)
+        heaviest = max(law.modes, key=lambda mode: mode.weight)
+        centre = np.zeros((1, len(parameters)))
+        centre[0, kept] = heaviest.mean
+        learnt = learnt_error(sensor, parameters.terms(centre), frames, len(names))
+        if learnt is not None:
+            calibration["learnt_error"] = learnt.model_dump(mode="json")
+            if learnt.flux > error.flux or learnt.range_m > error.range_m:
+                document["discrepancy"] = {
+                    "flux": max(learnt.flux, error.flux),
+                    "range_m": max(learnt.range_m, error.range_m),
+                }
     document["calibration"] = calibration
     return parse_scene(document)
 

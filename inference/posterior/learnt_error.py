@@ -1,0 +1,86 @@
+"""What frames of known range say of the model's errors, once the scene has been learnt.
+
+At a known range the readings that a scene foresees can be compared with those that came: what they
+differ by is, to first order, an error of the object's flux and one of the effective distance, two
+numbers from two readings (docs/model.md, learnt-error).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from inference.frame.delayed import delayed
+from simulator.frames import Frames
+from simulator.joint import LearntError
+from simulator.parameters import Terms
+from simulator.sensor import Sensor, instrument
+from simulator.sensor_unknowns import sensor_at
+from simulator.simulate import mean_readings
+
+__all__ = ["learnt_error"]
+
+Array = NDArray[np.float64]
+
+_SPARE = 4  # frames beyond the unknowns: fewer say next to nothing of a variance
+_STEP = 1e-5  # of a range, for slopes
+_SURE = 0.95
+
+
+def learnt_error(sensor: Sensor, terms: Terms, frames: Frames, unknowns: int) -> LearntError | None:
+    """Return the sizes of the errors that frames of known range show.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The sensor.
+    terms : Terms
+        The scene as it was learnt; the first parameter vector is used.
+    frames : Frames
+        Those of the calibration.
+    unknowns : int
+        How many numbers were fitted to them.
+
+    Returns
+    -------
+    LearntError or None
+        None where too few ranges are known: `unknowns` and four more.
+    """
+    if frames.known_range_m is None or frames.known_range_sd_m is None:
+        return None
+    used = np.isfinite(frames.known_range_m) & frames.present
+    if sensor.full_scale is not None:
+        used &= (np.abs(frames.readings) < np.asarray(sensor.full_scale)).all(axis=1)
+    spare = int(used.sum()) - unknowns
+    if spare < _SPARE:
+        return None
+    known, sd = frames.known_range_m[used], frames.known_range_sd_m[used]
+    factor = np.ones(known.size) if frames.gain is None else frames.gain[used]
+    static = np.zeros(2) if terms.crosstalk is None else terms.crosstalk[0]
+    bare = Terms(terms.object, None, None, terms.ranges, None, terms.gain, terms.lag)
+    light = factor[:, None] * mean_readings(sensor, bare, known)
+
+    def foreseen(ranges: Array) -> Array:
+        return static + factor[:, None] * (mean_readings(sensor, terms, ranges) - static)
+
+    off = frames.readings[used] - foreseen(known)
+    step = _STEP * known
+    slope = (foreseen(known + step) - foreseen(known - step)) / (2.0 * step)[:, None]
+    late = delayed(light, np.log(known), *instrument(sensor_at(sensor, terms)))
+    by_error = np.stack([light, late], axis=2)
+    usable = np.abs(np.linalg.det(by_error)) > 0.0
+    spare = int(usable.sum()) - unknowns
+    if spare < _SPARE:
+        return None
+    inverse = np.linalg.inv(by_error[usable])
+    errors = (inverse @ off[usable][:, :, None])[:, :, 0]
+    # what noise and the ruler alone would show
+    read = np.asarray(sensor.noise.read)
+    shot = sensor.noise.shot * np.abs(frames.readings[used][usable])
+    ruler = (inverse @ slope[usable][:, :, None])[:, :, 0] * sd[usable][:, None]
+    variance = (inverse**2 @ (read**2 + shot)[:, :, None])[:, :, 0] + ruler**2
+    variance[:, 0] += sensor.noise.relative**2
+    excess = np.maximum((errors**2 - variance).sum(axis=0), 0.0) / spare
+    # so that a normal law of this size holds as much as Student's t, which few frames leave
+    wider = stats.t.ppf(_SURE, spare) / stats.norm.ppf(_SURE)
+    flux, range_m = (wider * np.sqrt(excess)).tolist()
+    return LearntError(frames=int(usable.sum()), flux=flux, range_m=range_m)
