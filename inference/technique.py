@@ -78,6 +78,8 @@ class Technique:
     solve : callable
         Task -> TechniqueResult; a technique of many frames raises RefusedError where the frames
         turn out not to determine what is unknown.
+    beyond_r0 : bool
+        Whether it answers farther than a delay is told, r0 or c/2f: of light alone.
     obstacle : callable, optional
         (sensor, scene, known, frames or None) -> a further reason why it cannot serve, or None. Of
         frames it asks how many there are, which columns they have, and which of them are ruled out.
@@ -94,4 +96,5 @@ class Technique:
     equations: str
     roots: str
     solve: Callable[[Task], TechniqueResult]
+    beyond_r0: bool = False
     obstacle: Callable[[Sensor, Scene, Known, Frames | None], str | None] | None = None

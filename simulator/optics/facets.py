@@ -7,7 +7,6 @@ the one to use.
 """
 
 import math
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,6 @@ from simulator.compiled import compiled
 from simulator.optics.brdf import reflect
 
 __all__ = [
-    "Outline",
     "facet_plate",
     "facet_plate_sums",
     "facet_polar_grid",
@@ -24,7 +22,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-Outline = Literal["pulsed", "sine_wave"]
 
 ELLIPSE, STRETCHED = 0, 1
 _OUTLINES: dict[str, int] = {"pulsed": ELLIPSE, "sine_wave": STRETCHED}

@@ -18,7 +18,6 @@ from simulator.optics.least_squares import solve_scaled
 __all__ = [
     "ObjectFit",
     "ShadowFit",
-    "effective_power_law",
     "fit_object",
     "fit_shadow",
 ]
@@ -254,31 +253,3 @@ def fit_shadow(range_m: Array, visible: Array) -> ShadowFit:
         identifiable=(ok, ok),
         statement="" if ok else "c0' and c1' are not identifiable: no r^2 term over these ranges",
     )
-
-
-def effective_power_law(range_m: Array, flux: Array) -> Array:
-    """Return N(r) = -d log Phi / d log r, 2 for a square law and 4 for a fourth law.
-
-    Parameters
-    ----------
-    range_m, flux : ndarray, shape (n,)
-        Ranges in rising order [m] and positive flux, n >= 3.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Second-order differences in log r, one-sided at the ends.
-
-    Raises
-    ------
-    InvalidInputError
-        If ranges do not rise or a flux is not positive.
-    """
-    r = np.asarray(range_m, dtype=np.float64)
-    phi = np.asarray(flux, dtype=np.float64)
-    _check(r, phi, "flux", 3)
-    if np.any(np.diff(r) <= 0):
-        raise InvalidInputError.at("/range_m", "ranges must rise")
-    if np.any(phi <= 0):
-        raise InvalidInputError.at("/flux", "every flux must be positive")
-    return np.asarray(-np.gradient(np.log(phi), np.log(r), edge_order=2))

@@ -190,7 +190,6 @@ SPOILED: tuple[tuple[str, str, Any], ...] = (
     ("identifiability", "/at", {"object.c0": -1.0}),
     ("identifiability", "/scene/motion", "tangential"),
 )
-UNREADABLE = (b"", b"{", b"\xff\xfe", b"[" * 100, b"null", b"[]", b"NaN", b'{"a": 1, "a": 2}')
 JSON = {"Content-Type": "application/json"}
 
 

@@ -13,7 +13,6 @@ from simulator.optics.closed_forms import disk_distance, disk_flux, disk_shadow
 from simulator.optics.misfit import Misfit, measure, misfit_curve, model_misfit
 from simulator.optics.parametrisation import (
     Weights,
-    effective_power_law,
     fit_object,
     fit_shadow,
 )
@@ -152,16 +151,6 @@ def test_disk_object_parameters_of_the_model() -> None:
     fit = fit_object(r, np.array([disk_flux(float(x), 1.0) for x in z]))
     assert fit.c0 == pytest.approx(1.6, rel=0.05)
     assert -0.5 < fit.c1 < -0.38
-
-
-def test_power_law() -> None:
-    assert effective_power_law(RANGES, RANGES**-3.0) == pytest.approx(3.0)
-    r = np.logspace(-3, 3, 400)
-    power = effective_power_law(r, _flux(0.1, 0.0, 0.1, r))
-    assert power[0] == pytest.approx(2, abs=1e-3)
-    assert power[-1] == pytest.approx(4, abs=1e-3)
-    with pytest.raises(InvalidInputError, match="rise"):
-        effective_power_law(RANGES[::-1], RANGES)
 
 
 @pytest.mark.slow
