@@ -4,11 +4,13 @@
 
 One new process for each question, on an empty kernel cache, on one that holds all machine code
 that the question can use, and on that one made read-only. The time is that of all threads of the
-process, from its start, until the answer is there. The baseline is a process that imports numpy and
-nothing else; the first step of a posterior is `prepare`, `start` and one task.
+process, from its start, until the answer is there. Bytecode is there before, as in an installation.
+The baseline is a process that imports numpy and nothing else; the first step of a posterior is
+`prepare`, `start` and one task.
 """
 
 import argparse
+import compileall
 import json
 import os
 import shutil
@@ -51,6 +53,7 @@ def _seconds(name: str, cache: Path, **settings: str) -> float:
     command = [sys.executable, "-m", "benchmarks.cold_start", "--answer", name]
     settings |= {"NUMBA_CACHE_DIR": str(cache), "OPENBLAS_NUM_THREADS": "1"}
     environment = os.environ | settings
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     done = subprocess.run(  # noqa: S603
         command, env=environment, stdout=subprocess.PIPE, text=True, check=True
     )
@@ -91,6 +94,8 @@ def main() -> None:
         _started()[args.answer]()
         print(time.process_time(), flush=True)
         os._exit(0)  # what is still compiling is nobody's any more
+    for package in ("simulator", "inference", "service", "benchmarks"):
+        compileall.compile_dir(Path(__file__).parents[1] / package, quiet=1)
     caches = args.caches.split(",")
     print(f"{'processor time [s], cache:':<40}" + "".join(f"{cache:>11}" for cache in caches))
     for name in _started():
