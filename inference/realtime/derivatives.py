@@ -12,6 +12,7 @@ from inference.realtime.net import (
     on_time,
     rule_out,
 )
+from inference.realtime.smoothness import rough
 from inference.realtime.windows import Windows, differences
 from simulator.errors import InvalidInputError
 from simulator.frames import Frames
@@ -21,17 +22,22 @@ __all__ = ["DERIVATIVE_REASONS", "LONELY", "UNEVEN_GAIN", "derivatives_of"]
 
 Array = NDArray[np.float64]
 
-LONELY, UNEVEN_GAIN, DROWNED_CHANGE = range(3)
+LONELY, UNEVEN_GAIN, DROWNED_CHANGE, ROUGH = range(4)
 DERIVATIVE_REASONS = (
     "no other frame to form a difference with",
     "the frame's gain changes, so that unknown crosstalk does not cancel in differences",
     "the readings change by no more than their noise",
+    "the readings change too unevenly from frame to frame for a derivative",
 )
 _TOLD = 1.0 / 3.0  # uncertainty of a direction [rad] above which no bias of a wider window is seen
 
 
 def derivatives_of(
-    sensor: Sensor, crosstalk: tuple[float, float] | None, frames: Frames, first_reason: int
+    sensor: Sensor,
+    crosstalk: tuple[float, float] | None,
+    frames: Frames,
+    first_reason: int,
+    straight: bool = False,
 ) -> Net:
     """Return the derivatives of the signals of object and background with their noise.
 
@@ -45,6 +51,8 @@ def derivatives_of(
         With derivative columns, or with times.
     first_reason : int
         Place of `DERIVATIVE_REASONS` among the reasons of the technique.
+    straight : bool
+        Whether readings move along a straight line, whose direction a chord has however they jump.
 
     Returns
     -------
@@ -76,16 +84,20 @@ def derivatives_of(
     state = net.state.copy()
     if usable.size >= 2:
         part = Windows(*(np.full(usable.size, np.nan) for _ in range(6)))
-        differences(
+        of_usable = (
             frames.time_s[usable],
             net.select(usable),
             None if gain is None else gain[usable],
-            part,
         )
+        differences(*of_usable, part)
         for whole, some in zip(windows, part, strict=True):
             whole[usable] = some
         missing = np.isnan(windows.first) & np.isnan(windows.var1) & (state == 0)
         state[missing] = first_reason + UNEVEN_GAIN
+        uneven = np.zeros(n, dtype=np.bool_)
+        if not straight:
+            uneven[usable] = rough(*of_usable)
+        state[uneven & (state == 0)] = first_reason + ROUGH
         state[(windows.direction_sd > _TOLD) & (state == 0)] = first_reason + DROWNED_CHANGE
     else:
         state[usable] = first_reason + LONELY

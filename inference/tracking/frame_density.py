@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.tracking.borrowed import borrowed
+from inference.tracking.hypotheses import CROSSTALK1, CROSSTALK2, U
 from inference.tracking.readings_table import (
     FIRST,
     LOG_PRIOR,
@@ -29,9 +30,11 @@ __all__ = [
     "Prior",
     "Rate",
     "TrackedFrame",
+    "bend_at",
     "expected_at",
     "log_density",
     "log_known",
+    "spread_at",
 ]
 
 Array = NDArray[np.float64]
@@ -71,9 +74,10 @@ class Added(NamedTuple):
     # change with u of what crosstalk and nuisance parameters add
     slope1: float
     slope2: float
-    root: Root  # of the covariance that they add
-    # (2, n + p): root of the crosstalk's covariance in the empty scene; read where the prior is
-    # born, because what nuisance parameters add then depends on u
+    own: Root  # of the covariance that crosstalk adds
+    root: Root  # of that with nuisance parameters, at the prediction
+    # root of the covariance, as what nuisance parameters add depends on u: (n, n + p) of a
+    # hypothesis; (2, n + p) of the crosstalk in the empty scene where the prior is born
     spread: Array
 
 
@@ -145,10 +149,106 @@ def _add_at(root: Root, u: float, gain: float, added: Added, table: ReadingsTabl
     return root
 
 
+@compiled
+def _felt_at(
+    j: int,
+    i: int,
+    t: float,
+    gain: float,
+    slopes: tuple[float, float],
+    X: Array,
+    table: ReadingsTable,
+) -> tuple[float, float]:
+    """Return what nuisance parameter j does to the readings beyond what it has done to the range.
+
+    Parameters
+    ----------
+    j : int
+        The parameter.
+    i, t : int, float
+        Where: knot and share of the cell, as by `cell_of`.
+    gain : float
+        The frame's factor on the sensor's gain.
+    slopes : (float, float)
+        Derivatives of the readings along u there, without that factor.
+    X : ndarray, shape (n, n + p)
+        Root of a hypothesis' covariance.
+    """
+    n = X.shape[0]
+    f1, f2 = nuisance_at(i, t, j, table)
+    f1, f2 = gain * (f1 + slopes[0] * X[U, n + j]), gain * (f2 + slopes[1] * X[U, n + j])
+    if n > _WITHOUT_CROSSTALK:
+        f1, f2 = f1 + X[CROSSTALK1, n + j], f2 + X[CROSSTALK2, n + j]
+    return f1, f2
+
+
+@compiled
+def spread_at(
+    root: Root,
+    u: float,
+    gain: float,
+    slopes: tuple[float, float],
+    X: Array,
+    table: ReadingsTable,
+) -> Root:
+    """Add what nuisance parameters do to the readings of a hypothesis at one u.
+
+    The filter runs at their centre: to it that is noise.
+
+    Parameters
+    ----------
+    root : Root
+        Of the covariance without them.
+    u, gain, slopes, X, table
+        As for `_felt_at`, at u.
+    """
+    i, t = cell_of(u, table)
+    for j in range(X.shape[1] - X.shape[0]):
+        f1, f2 = _felt_at(j, i, t, gain, slopes, X, table)
+        root = add_factor(root, f1, f2)
+    return root
+
+
+@compiled
+def bend_at(
+    pulls: tuple[float, float],
+    u: float,
+    gain: float,
+    slopes: tuple[float, float],
+    X: Array,
+    table: ReadingsTable,
+) -> tuple[float, float]:
+    """Return how what nuisance parameters do to the readings changes along u.
+
+    They are where the readings say that they are, given u. Without it a range would be corrected by
+    as much too far as the readings are larger than at their centre.
+
+    Parameters
+    ----------
+    pulls : (float, float)
+        Inverse of the whole covariance times the residuals.
+    u, gain, slopes, X, table
+        As for `spread_at`.
+    """
+    i, t = cell_of(u, table)
+    bend1, bend2 = 0.0, 0.0
+    for j in range(X.shape[1] - X.shape[0]):
+        f1, f2 = _felt_at(j, i, t, gain, slopes, X, table)
+        value = f1 * pulls[0] + f2 * pulls[1]
+        here1, here2 = nuisance_at(i, 0.0, j, table)
+        next1, next2 = nuisance_at(i, 1.0, j, table)
+        bend1 += value * (next1 - here1)
+        bend2 += value * (next2 - here2)
+    return gain * bend1 / table.step, gain * bend2 / table.step
+
+
 @borrowed
 @compiled
 def log_density(u: float, frame: TrackedFrame, prior: Prior, table: ReadingsTable) -> float:
     """Return log p(readings, u), the log of 2 pi per reading left out.
+
+    What nuisance parameters add to the readings of a hypothesis is taken at its prediction
+    (`inference.tracking.mode_refinement` takes it at the mode).
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from inference.tracking.borrowed import borrowed
 from inference.tracking.candidates import TrackCandidate
-from inference.tracking.frame_density import Prior, TrackedFrame
+from inference.tracking.frame_density import Prior, TrackedFrame, bend_at, spread_at
 from inference.tracking.hypotheses import (
     ANCHOR,
     Hypotheses,
@@ -19,6 +19,7 @@ from inference.tracking.hypotheses import (
     variance_of,
 )
 from inference.tracking.known_range import take_known
+from inference.tracking.mode_refinement import bends
 from inference.tracking.readings_table import (
     FIRST,
     SECOND,
@@ -29,7 +30,7 @@ from inference.tracking.readings_table import (
     nuisance_at,
     object_at,
 )
-from inference.tracking.roots import UNIT
+from inference.tracking.roots import UNIT, add_root, solve
 from inference.tracking.shared_error import NOT_SHARED, follow, straighten
 from inference.tracking.square_root import Linear, update
 from simulator.compiled import compiled
@@ -105,9 +106,18 @@ def _of_readings(
     for j in range(nuisance.shape[1]):
         g1, g2 = nuisance_at(i, part, j, table)
         nuisance[FIRST, j], nuisance[SECOND, j] = gain * g1, gain * g2
-    e1 = frame.first - m1 - t.slope1 * (x[row, U] - t.at)
-    e2 = frame.second - m2 - t.slope2 * (x[row, U] - t.at)
-    return Linear(e1, e2, t.slope1, t.slope2, 0.0, 0.0, noise)
+    along1, along2 = t.slope1, t.slope2
+    e1, e2 = frame.first - m1, frame.second - m2
+    if bends(of.X.shape[1], table):
+        away = 0.0 if prior.position.born else t.u - prior.position.centre
+        root = add_root(noise, prior.added.own)
+        slopes = t.slope1 / gain, t.slope2 / gain
+        root = spread_at(root, t.u, gain, slopes, of.X[row], table)
+        pulls = solve(root, e1 - prior.added.slope1 * away, e2 - prior.added.slope2 * away)
+        bend1, bend2 = bend_at(pulls, t.u, gain, slopes, of.X[row], table)
+        along1, along2 = along1 + bend1, along2 + bend2
+    e1, e2 = e1 - along1 * (x[row, U] - t.at), e2 - along2 * (x[row, U] - t.at)
+    return Linear(e1, e2, along1, along2, 0.0, 0.0, noise)
 
 
 @compiled

@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from inference.tracking.candidates import TrackCandidate, TrackCandidates, add_candidate
 from inference.tracking.frame_density import Prior, TrackedFrame, log_density
+from inference.tracking.mode_refinement import PeakedMode, bends, refined
 from inference.tracking.mode_search import edge
 from inference.tracking.readings_table import ReadingsTable
 from simulator.compiled import compiled
 
-__all__ = ["Nodes", "PeakedMode", "integrate", "nodes_for"]
+__all__ = ["Nodes", "integrate", "nodes_for"]
 
 Array = NDArray[np.float64]
 
@@ -23,17 +24,6 @@ _NEGLIGIBLE_WINDOW = 1e-3  # share of a mode below which a window's part is left
 _INTERVALS = 32  # of Simpson's rule on either side of a mode
 _ROOT3 = math.sqrt(3.0)
 _LOG_ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
-
-
-class PeakedMode(NamedTuple):
-    """One mode of a density along the range."""
-
-    # its place and its scale, log range
-    u: float
-    scale: float
-    # the valleys on either side, log range
-    low: float
-    high: float
 
 
 class Nodes(NamedTuple):
@@ -185,7 +175,10 @@ def integrate(
     u, scale = mode.u, mode.scale
     once = prior.position.born and not prior.position.again
     if prior.added.spread.shape[1] > 2 and not once:
-        top = log_density(u, frame, prior, table)
+        if not prior.position.born and bends(prior.added.spread.shape[0], table):
+            u, scale, top = refined(mode, frame, prior, table)
+        else:
+            top = log_density(u, frame, prior, table)
         log_mass = top + math.log(scale) + _LOG_ROOT_2PI
         return add_candidate(to, count, TrackCandidate(log_mass, u, 0.0, u, parent))
     if u - _ROOT3 * scale >= mode.low and u + _ROOT3 * scale <= mode.high:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.tracking.borrowed import borrowed
-from inference.tracking.frame_density import Added, Position, Prior, Rate
+from inference.tracking.frame_density import Added, Position, Prior, Rate, spread_at
 from inference.tracking.hypotheses import (
     ANCHOR,
     COUNT,
@@ -22,7 +22,7 @@ from inference.tracking.hypotheses import (
 )
 from inference.tracking.merging import merge
 from inference.tracking.motion import Motion, Rules, motion_over, presence_over
-from inference.tracking.readings_table import ReadingsTable, cell_of, mean_at, nuisance_at
+from inference.tracking.readings_table import ReadingsTable, mean_at
 from inference.tracking.roots import Root, add_factor
 from inference.tracking.shared_error import certainty, shared_part
 from inference.tracking.square_root import move
@@ -113,25 +113,6 @@ def _crosstalk_given_u(of: Hypotheses, row: int, precision: float) -> tuple[floa
 
 
 @compiled
-def _add_nuisance(root: Root, of: Hypotheses, row: int, gain: float, table: ReadingsTable) -> Root:
-    """Add what nuisance parameters do to the readings beyond what they have done to the range.
-
-    The filter runs at their centre: to it that is noise.
-    """
-    x, X = of.x, of.X
-    n = X.shape[1]
-    i, t = cell_of(x[row, U], table)
-    _, _, d1, d2 = mean_at(x[row, U], table)
-    for j in range(n, X.shape[-1]):
-        f1, f2 = nuisance_at(i, t, j - n, table)
-        f1, f2 = gain * (f1 + d1 * X[row, U, j]), gain * (f2 + d2 * X[row, U, j])
-        if n > 2:
-            f1, f2 = f1 + X[row, CROSSTALK1, j], f2 + X[row, CROSSTALK2, j]
-        root = add_factor(root, f1, f2)
-    return root
-
-
-@compiled
 def _rate_given_u(of: Hypotheses, row: int, precision: float) -> Rate:
     """Return what a hypothesis says of du/dt given u."""
     X = of.X
@@ -173,14 +154,16 @@ def prior_of(
         _, _, share = shared_part(of, row)
         _, _, d1, d2 = mean_at(x[row, ANCHOR], table)
         slope1, slope2 = slope1 + gain * share * d1, slope2 + gain * share * d2
-    if of.X.shape[-1] > of.X.shape[1]:
-        root = _add_nuisance(root, of, row, gain, table)
     rate = Rate(x[row, V], 0.0, 0.0)
     if table.by_rate:
         rate = _rate_given_u(of, row, precision)
+    own = root
+    if of.X.shape[-1] > of.X.shape[1]:
+        _, _, d1, d2 = mean_at(x[row, U], table)
+        root = spread_at(root, x[row, U], gain, (d1, d2), of.X[row], table)
     return Prior(
         Position(False, False, x[row, U], precision, log_scale),
-        Added(offset1, offset2, slope1, slope2, root, of.X[0, of.X.shape[1] - 2 :]),
+        Added(offset1, offset2, slope1, slope2, own, root, of.X[row]),
         rate,
         share,
     )
@@ -212,7 +195,7 @@ def born_prior(of: Hypotheses, log_weight: float, rate_sd: float, table: Reading
             root = add_factor(root, of.X[0, CROSSTALK1, j], of.X[0, CROSSTALK2, j])
     return Prior(
         Position(True, of.numbers[LOST] > 0.0, 0.0, 0.0, log_weight),
-        Added(offset1, offset2, 0.0, 0.0, root, of.X[0, of.X.shape[1] - 2 :]),
+        Added(offset1, offset2, 0.0, 0.0, root, root, of.X[0, of.X.shape[1] - 2 :]),
         Rate(0.0, 0.0, rate_sd),
         0.0,
     )

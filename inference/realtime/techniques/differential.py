@@ -108,7 +108,8 @@ def target_of(task: Task, rate: Net) -> Targets:
 
 def _solve(task: Task) -> TechniqueResult:
     sensor, known = task.sensor, task.known
-    rate = derivatives_of(sensor, known.crosstalk, task.frames, OWN)
+    straight = task.scene.motion == "tangential"
+    rate = derivatives_of(sensor, known.crosstalk, task.frames, OWN, straight)
     targets = target_of(task, rate)
     pulsed = isinstance(sensor, PulsedSensor)
     # phases of derivatives are known modulo pi: half the unambiguous range of a sine wave

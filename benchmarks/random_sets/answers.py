@@ -1,0 +1,204 @@
+"""What each way to a range says of a random set, as a row of a table."""
+
+import dataclasses
+import time
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.random_sets.sets import RandomSet, random_set
+from benchmarks.resumable import Row
+from inference.estimate import estimate
+from inference.estimates import TechniqueResult
+from inference.fits.techniques.registry import FITS
+from inference.posterior import fold
+from inference.posterior.settings import SamplerSettings
+from inference.realtime.registry import TECHNIQUES
+from inference.tracking.track import track
+from simulator.errors import RefusedError
+from simulator.scene import parse_scene
+
+__all__ = ["COLUMNS", "WAYS", "Held", "answer_row"]
+
+Array = NDArray[np.float64]
+
+COLUMNS = (
+    "set",
+    "scene",
+    "version",
+    "answered",
+    "asked",
+    "held",
+    "parameters",
+    "parameters_held",
+    "worst",
+    "of",
+    "flags",
+    "seconds",
+    "reason",
+)
+_Z = 1.6448536269514722  # of a 90 % interval
+
+
+@dataclasses.dataclass
+class Held:
+    """Answers without a flag, and how they stand to the truth.
+
+    Attributes
+    ----------
+    answered, asked, held : int
+        Ranges that were told without a flag, that were asked for, and whose 90 % interval holds.
+    parameters, parameters_held : int
+        The same of unknowns of the scene that are called identified.
+    worst : float
+        Largest distance from the truth in standard deviations.
+    of : str
+        Of what.
+    """
+
+    answered: int = 0
+    asked: int = 0
+    held: int = 0
+    parameters: int = 0
+    parameters_held: int = 0
+    worst: float = 0.0
+    of: str = ""
+
+    def ranges(self, name: str, off: Array, asked: int, inside: NDArray[np.bool_]) -> None:
+        """Take in ranges: distances from the truth in sd, nan where nothing is told."""
+        told = np.isfinite(off)
+        self.asked += asked
+        self.answered += int(told.sum())
+        self.held += int(inside[told].sum())
+        if told.any():
+            i = int(np.nanargmax(np.abs(off)))
+            self._far(abs(float(off[i])), f"{name} frame {i}")
+
+    def parameter(self, name: str, off: float, inside: bool) -> None:
+        """Take in an unknown of the scene that is called identified."""
+        self.parameters += 1
+        self.parameters_held += int(inside)
+        self._far(abs(off), name)
+
+    def _far(self, off: float, of: str) -> None:
+        if off > self.worst:
+            self.worst, self.of = off, of
+
+
+def _normal(off: Array) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(off) < _Z)
+
+
+def _take_result(held: Held, data: RandomSet, found: TechniqueResult) -> str:
+    """Take in a technique's answer; what flags it, if anything does."""
+    asked = int(np.isfinite(data.range_m).sum())
+    fit = found.fit or {}
+    if fit.get("misfit"):
+        held.asked += asked
+        return f"{found.technique}: misfit"
+    off = (found.range_m - data.range_m) / found.sd_m
+    off[found.near_fold] = np.nan
+    held.ranges(found.technique, off, asked, _normal(off))
+    for name, told in (found.parameters or {}).items():
+        if name in data.parameters and told["status"] == "identified":
+            away = (told["value"] - data.parameters[name]) / told["sd"]
+            held.parameter(f"{found.technique} {name}", away, abs(away) < _Z)
+    return ""
+
+
+def _by_techniques(names: Mapping[str, object], data: RandomSet, held: Held) -> Row:
+    served = estimate(data.sensor, parse_scene(data.scene), data.frames, list(names))
+    flags = [_take_result(held, data, found) for found in served.results]
+    reasons = {each.name: each.reason for each in served.left_out if each.name in names}
+    return {
+        "flags": " / ".join(flag for flag in flags if flag),
+        "reason": "" if served.results else " / ".join(f"{k}: {v}" for k, v in reasons.items()),
+    }
+
+
+def _at_once(data: RandomSet, number: int, seconds: float, held: Held) -> Row:  # noqa: ARG001
+    return _by_techniques(TECHNIQUES, data, held)
+
+
+def _by_fits(data: RandomSet, number: int, seconds: float, held: Held) -> Row:  # noqa: ARG001
+    return _by_techniques(FITS, data, held)
+
+
+def _tracked(data: RandomSet, number: int, seconds: float, held: Held) -> Row:  # noqa: ARG001
+    asked = int(np.isfinite(data.range_m).sum())
+    try:
+        found = track(data.sensor, parse_scene(data.scene), data.frames)
+    except RefusedError as error:
+        held.asked += asked
+        return {"reason": f"refused: {error}"}
+    off = (found.range_m - data.range_m) / found.sd_m
+    off[found.misfit] = np.nan
+    held.ranges("tracker", off, asked, _normal(off))
+    return {"flags": f"misfit in {int(found.misfit.sum())}" if found.misfit.any() else ""}
+
+
+def _inferred(data: RandomSet, number: int, seconds: float, held: Held) -> Row:
+    settings = SamplerSettings(method="auto", seed=number, max_seconds=seconds)
+    asked = int(np.isfinite(data.range_m).sum())
+    start = time.process_time()
+    try:
+        job = fold.prepare(data.sensor, parse_scene(data.scene), data.frames, settings)
+        checkpoint = fold.start(job)
+        while tasks := fold.tasks(job, checkpoint, time.process_time() - start):
+            checkpoint = fold.merge(job, checkpoint, [fold.run(task) for task in tasks])
+    except RefusedError as error:
+        held.asked += asked
+        return {"reason": f"refused: {error}"}
+    used = time.process_time() - start
+    found = fold.summarise(job, checkpoint, used, used)
+    if not (found.drawn and found.verdict.converged) or found.fit.misfit:
+        held.asked += asked
+        flag = "misfit" if found.drawn and found.fit.misfit else "not converged"
+        return {"flags": flag, "reason": " / ".join(found.verdict.reasons)}
+    status = {each.parameter: each.status for each in found.identifiability}
+    ranges, truth = found.range_m, data.range_m
+    off = (ranges.mean - truth) / ranges.sd
+    inside = (ranges.q05 <= truth) & (truth <= ranges.q95)
+    for name, told in found.parameters.items():
+        if name in data.parameters and status[name] == "identified":
+            value = data.parameters[name]
+            held.parameter(name, (told.mean - value) / told.sd, told.q05 <= value <= told.q95)
+    held.ranges("posterior", off, asked, inside)
+    return {"flags": "" if status["range_m"] == "identified" else f"scale {status['range_m']}"}
+
+
+WAYS: Mapping[str, Callable[[RandomSet, int, float, Held], Row]] = {
+    "estimate": _at_once,
+    "fits": _by_fits,
+    "tracker": _tracked,
+    "posterior": _inferred,
+}
+
+
+def answer_row(way: str, seed: int, seconds: float, number: int, version: str = "") -> Row:
+    """Draw a set, ask one way, and hold what it says without a flag to the truth.
+
+    Parameters
+    ----------
+    way : str
+        Of `WAYS`: every technique of single frames; every fit; the tracker; a posterior.
+    seed, number : int
+        As for `random_set`.
+    seconds : float
+        Limit of a posterior [s of processor time].
+    version : str
+        Of the code, for the table.
+    """
+    data = random_set(seed, number)
+    held = Held()
+    start = time.process_time()
+    told = WAYS[way](data, number, seconds, held)
+    used = time.process_time() - start
+    return {
+        "scene": data.name,
+        "version": version,
+        **dataclasses.asdict(held),
+        "seconds": used,
+        **told,
+    }

@@ -1,0 +1,71 @@
+"""Whether readings change smoothly enough from frame to frame for a derivative in time.
+
+A window of frames tells the derivative of what a polynomial can follow. An object that jumps, or
+turns back within a frame, moves along a chord of the curve of readings; its direction is that of
+some range in between, whatever windows agree upon.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.realtime.net import Net
+
+__all__ = ["rough"]
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_UNLIKE = 1.0  # change of a rate over its mean: more than three times as fast, or back
+_TOLD = 4.0  # standard deviations above which a change is none of noise
+_SHARE = 0.2  # of the frames that tell, above which no frame is believed
+_FEWEST = 2
+_AROUND = 2  # frames on either side, whose windows hold an uneven one
+
+
+def rough(time_s: Array, net: Net, gain: Array | None) -> Flags:
+    """Tell which frames have no derivative that differences could find.
+
+    Those within two frames of one at which the rate changes threefold, or turns back, by more than
+    its noise. All, where that is so at a fifth of the frames whose rates are told at all.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (n,)
+        Times, increasing [s].
+    net : Net
+        Readings of the frames and their noise.
+    gain : ndarray, shape (n,), optional
+        Factors of the frames on the sensor's gain, where differences must not mix them.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+    """
+    n = time_s.size
+    if n < 3:
+        return np.zeros(n, dtype=np.bool_)
+    with np.errstate(all="ignore"):
+        step = np.diff(time_s)
+        sd = np.sqrt(np.column_stack([net.var1, net.var2]))
+        # in units of the noise; relative to the shortest step, so that nothing overflows
+        values = np.column_stack([net.first, net.second])
+        noise = np.maximum(sd[:-1], sd[1:])
+        rate = np.diff(values, axis=0) / noise * (step.min() / step)[:, None]
+        own = np.sqrt(2.0) * step.min() / step
+        change = np.hypot(*(rate[1:] - rate[:-1]).T)
+        mean = np.hypot(*(rate[1:] + rate[:-1]).T) / 2.0
+        blur = _TOLD * np.hypot(own[1:], own[:-1])
+        told = np.maximum(change, mean) > blur
+        uneven = told & (change - blur > _UNLIKE * mean)
+        if gain is not None:
+            same = (gain[1:-1] == gain[:-2]) & (gain[1:-1] == gain[2:])
+            told, uneven = told & same, uneven & same
+    count = int(uneven.sum())
+    if count >= _FEWEST and count > _SHARE * int(told.sum()):
+        return np.ones(n, dtype=np.bool_)
+    at = np.flatnonzero(uneven) + 1
+    near = np.zeros(n, dtype=np.bool_)
+    for away in range(-_AROUND, _AROUND + 1):
+        places = at + away
+        near[places[(places >= 0) & (places < n)]] = True
+    return near
