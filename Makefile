@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report readme api docs picture notebook notebook-data notebook-seeds calibrate coverage kills fuzz stress mutations test check lint format types fast lowest container-test lock clean
+.PHONY: help setup demo report readme api docs picture notebook notebook-data notebook-seeds calibrate coverage kills fuzz stress mutations test check lint format types fast lowest versions package container-test lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -103,6 +103,26 @@ lowest: ## Run the tests that take seconds with the lowest versions that pyproje
 	uv pip install --quiet --python out/lowest/bin/python --requirements out/lowest.txt
 	uv pip install --quiet --python out/lowest/bin/python --no-deps --no-build-isolation --editable .
 	NUMBA_CACHE_DIR=out/lowest/kernels out/lowest/bin/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow" $(LOWEST)
+
+versions: ## Run the tests that take seconds on every Python that numba knows, 3.11 to 3.13 (needs uv)
+	for version in 3.11 3.12 3.13; do \
+		made=out/python-$$version; python=$$made/bin/python; \
+		uv venv --quiet --clear --python $$version $$made && \
+		uv pip install --quiet --python $$python --require-hashes --requirements requirements/dev.txt && \
+		uv pip install --quiet --python $$python --no-deps --no-build-isolation --editable . && \
+		NUMBA_CACHE_DIR=$$made/kernels $$python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow" || exit 1; \
+	done
+
+package: ## Build wheel and sdist, install each where nothing else is, and answer from another folder (needs uv)
+	rm -rf out/package
+	uv build --quiet --python $(PYTHON) --out-dir out/package
+	cp notebooks/frames.csv notebooks/simulated.json out/package
+	for made in out/package/*.whl out/package/*.tar.gz; do \
+		uv venv --quiet --clear --python $(PYTHON) out/package/env && \
+		uv pip install --quiet --python out/package/env/bin/python $$made && \
+		(cd out/package && env/bin/python -P -c "import hybridtof; print(hybridtof.__file__)" && \
+		env/bin/hybridtof estimate frames.csv --scene simulated.json --quiet) || exit 1; \
+	done
 
 container-test: $(READY) ## Build the image, run the suite inside it, and ask it for a first answer (docker, podman or buildah)
 	$(BIN)/python -m benchmarks.container $(CONTAINER)
