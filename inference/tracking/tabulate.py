@@ -44,6 +44,7 @@ Array = NDArray[np.float64]
 # columns of `means_over`: mean readings, their slopes, the object's part of both
 MEAN, SLOPE, OBJECT, OBJECT_SLOPE = (slice(k, k + 2) for k in range(0, 8, 2))
 _VALUES, _SLOPES = [0, 1, 4, 5], [2, 3, 6, 7]
+_NARROWEST = 1e-12  # log range that a table covers
 _FEWEST = 256
 _MOST = 1 << 16
 _ERROR = 0.01  # standard deviations of a reading by which the table may be wrong
@@ -167,7 +168,8 @@ def knots_of(
     Raises
     ------
     RefusedError
-        Where the curve turns so quickly, or the noise is so small, that no table can hold it.
+        Where no range is left, or no more than a point; where the curve turns so quickly, or the
+        noise is so small, that no table can hold it.
     """
     factors = np.tile(observed.scale, 4)
     error = _ERROR / (5.0 * rate_sd) if observed.by_rate else _ERROR
@@ -176,6 +178,10 @@ def knots_of(
         raise RefusedError(
             "no range is possible: the prior of the range and the shadow exclude one another; "
             "widen range_m"
+        )
+    if not high - low > _NARROWEST:
+        raise RefusedError(
+            "the prior of the range leaves less of it than rounding does: widen range_m"
         )
     count = _FEWEST
     while count <= _MOST:
