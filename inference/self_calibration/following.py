@@ -23,12 +23,13 @@ from inference.self_calibration.handing_over import hand_over
 from inference.self_calibration.looking import EVERY, look
 from inference.self_calibration.plan import Plan
 from inference.self_calibration.state import CalibrationState, Switch
+from inference.self_calibration.withholding import withheld
 from inference.tracking.track import Track, step
 from simulator.frames import Frames
 
 __all__ = ["Conclude", "Piece", "conclude", "follow", "wanted"]
 
-_RECENT = 120  # frames: those that a new tracker begins with, and those since the last look
+_RECENT = 300  # frames: those that a new tracker begins with, and those since the last look
 
 Conclude = Callable[[CalibrationState], CalibrationState]
 
@@ -103,8 +104,10 @@ def _tracked(
     plan: Plan, state: CalibrationState, frames: Frames, numbers: Any
 ) -> tuple[CalibrationState, Track]:
     """Track frames between two looks."""
-    model = plan.tracker(state.scene, state.calibrated)
+    model = plan.tracker(state.scene)
     after, track = step(model, state.track, frames)
+    if state.calibrated:
+        track = withheld(model, frames, track)
     kinds = kinds_of(plan.sensor, frames, track, state.trusts_empty)
     recent = joined(state.recent, Kept(frames, numbers, kinds)).select(slice(-_RECENT, None))
     changed = dataclasses.replace(

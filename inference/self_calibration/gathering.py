@@ -33,7 +33,7 @@ _STEPS = 40  # of them, the last without an end: 1e4 read noises and more
 _A_STEP = 2  # frames of each that are kept, the last ones
 _EMPTY_KEPT = 24
 _SURELY_EMPTY = 0.02  # probability of an object, below which there is none
-_SURPRISING = 3.0  # of the running surprise, which is 1 where all is as modelled
+_SURPRISING = 2.0  # of the running surprise, which is 1 where all is as modelled
 _FILLED = {"gain": 1.0, "object_present": True}
 
 
@@ -155,8 +155,8 @@ def surprising(track: Track) -> NDArray[np.bool_]:
     """Tell which frames speak against a scene: more than a tracker calls a misfit.
 
     Errors that all frames share may surprise for long, by as much as one frame may, and a tracker
-    lets them. Here a surprise of 3 that stays is reason enough: under a scene that is right it
-    happens to one calibration in twenty (exp(-3)), and costs another one.
+    lets them. Here a surprise of 2 that stays is reason enough: under a scene that is right it
+    happens to one calibration in seven (exp(-2)), and costs width and another one.
 
     Returns
     -------

@@ -1,10 +1,17 @@
 """The look that is taken at a stream from time to time: gather, doubt, ask for a calibration."""
 
 import dataclasses
+import math
 
-import numpy as np
-import scipy
-
+from inference.self_calibration.ageing import (
+    EMPTY_ENOUGH,
+    further,
+    in_force,
+    last_time,
+    renewed,
+    wide_enough,
+    worn,
+)
 from inference.self_calibration.calibration import Asked, seed_of
 from inference.self_calibration.gathering import EMPTY, Worth, joined, nothing_kept, thinned
 from inference.self_calibration.plan import Plan
@@ -19,11 +26,12 @@ EVERY = 30
 _OLDEST = 5400  # numbers behind the last one that still tell of the scene as it is
 _DOUBTFUL = 2  # looks one after the other at which most frames surprise
 _LASTING = 600  # frames after which a scene that is given up was true of the object at least
-_STEPS, _STEPS_BESIDE_OBJECT, _EMPTY = 8, 6, 8
+_STEPS, _STEPS_BESIDE_OBJECT = 8, 6
+_STILL = 150  # frames without an amplitude that is new, after which more is not waited for
+_REFRESHED = 3600  # frames after which a scene that is worn is calibrated again
 _PATIENCE = 1800  # frames after which what there is has to do
 _FEWEST = 8
 _GROWTH = 1.25  # of the worth, for another calibration while the scene is not known well
-_FALSE_ALARM = 1e-6  # of the mean of empty frames, a look
 
 
 def look(plan: Plan, state: CalibrationState, sequence: int) -> CalibrationState:
@@ -43,19 +51,40 @@ def look(plan: Plan, state: CalibrationState, sequence: int) -> CalibrationState
     surprised = state.surprised + 1 if state.surprises > EVERY // 2 else 0
     new = state.recent.select(slice(-EVERY, None))
     gathered = thinned(joined(state.gathered, new), sequence - _OLDEST)
-    state = dataclasses.replace(state, gathered=gathered, surprises=0, surprised=surprised)
+    steps = gathered.worth.steps
+    state = dataclasses.replace(
+        state,
+        gathered=gathered,
+        surprises=0,
+        surprised=surprised,
+        steps=steps,
+        grew_at=state.count if steps > state.steps else state.grew_at,
+    )
     if state.calibrated and state.switch is None:
-        if surprised >= _DOUBTFUL:
-            return _doubted(plan, state, sequence, "most frames contradict the scene")
-        if _empty_moved(plan, state):
-            return _doubted(plan, state, sequence, "frames without the object have moved")
+        state, moved = renewed(plan, state, EVERY)
+        if moved is not None:
+            return _doubted(plan, state, sequence, moved)
+        if surprised >= (_DOUBTFUL if further(state.drift) is None else 1):
+            return _contradicted(plan, state, sequence)
     if state.asked is None and state.switch is None:
         return _asking(plan, state, sequence)
     return state
 
 
+def _contradicted(plan: Plan, state: CalibrationState, sequence: int) -> CalibrationState:
+    """Widen the scene in force, or give it up; both are told, further widening is not."""
+    last = state.recent.select(slice(-EVERY, None)).frames
+    wider = wide_enough(plan, further(state.drift), last, last_time(state))
+    if wider is None:
+        wider = state.drift and state.drift._replace(jump=math.inf)
+    elif state.drift is not None and state.drift.jump > 0.0:
+        return dataclasses.replace(in_force(plan, state, wider), surprised=0)
+    state = dataclasses.replace(state, drift=wider)
+    return _doubted(plan, state, sequence, "most frames contradict the scene")
+
+
 def _doubted(plan: Plan, state: CalibrationState, sequence: int, reason: str) -> CalibrationState:
-    """Give up the scene in force from the next frame on: what came before tells of another one."""
+    """Doubt the scene in force from the next frame on: what came before tells of another one."""
     stated = prior_scene(plan.stated)
     # what was given up so soon may never have been true, of the object neither
     lasted = state.count - state.taken_at >= _LASTING
@@ -75,36 +104,16 @@ def _doubted(plan: Plan, state: CalibrationState, sequence: int, reason: str) ->
     )
 
 
-def _empty_moved(plan: Plan, state: CalibrationState) -> bool:
-    """Tell whether the mean of the last empty frames is not what the scene says of it."""
-    model = plan.tracker(state.scene, state.calibrated)
-    gathered = state.gathered
-    empty = gathered.kind == EMPTY
-    if gathered.frames is None or empty.sum() < _EMPTY or model.observed.by_rate:
-        return False
-    if model.learns_crosstalk or not state.trusts_empty:
-        return False
-    used = np.asarray(model.observed.used)
-    frames = gathered.frames.select(empty)
-    values = (frames.readings * model.observed.scale)[:, used]
-    gain = 1.0 if frames.gain is None else float(frames.gain.mean())
-    table, expected = model.model.table, model.model.places.empty
-    crosstalk = np.array([table.crosstalk1, table.crosstalk2])
-    mean = (gain * expected[:, 0] + crosstalk)[used]
-    root = (gain * expected[:, 1:])[used]
-    noise = np.maximum(values.var(axis=0, ddof=1), 1.0) / len(values)
-    off = values.mean(axis=0) - mean
-    whole = root @ root.T + np.diag(noise)
-    scale = np.sqrt(np.diagonal(whole))
-    solved = np.linalg.solve(whole / scale[:, None] / scale, off / scale)
-    surprise = float((off / scale) @ solved)
-    return bool(surprise > scipy.stats.chi2.isf(_FALSE_ALARM, off.size))
-
-
 def _asking(plan: Plan, state: CalibrationState, sequence: int) -> CalibrationState:
     """Ask for a calibration, where it is wanted and may succeed."""
     worth, gathered = state.gathered.worth, state.gathered
-    if state.trusts_empty or state.count < state.not_before or gathered.frames is None:
+    if state.count < state.not_before or gathered.frames is None:
+        return state
+    refreshes = state.calibrated and state.count - state.taken_at >= _REFRESHED
+    refreshes = refreshes and worn(plan, state)
+    if refreshes:
+        state = dataclasses.replace(state, points=0)
+    elif state.trusts_empty and state.known:
         return state
     if not _promising(plan, state, worth):
         return state
@@ -115,7 +124,7 @@ def _asking(plan: Plan, state: CalibrationState, sequence: int) -> CalibrationSt
     asked = Asked(
         number=number,
         seed=seed_of(plan.seed, number),
-        reason=_reason(state),
+        reason="the crosstalk may have drifted" if refreshes else _reason(state),
         decided_at=sequence,
         sequence=tuple(gathered.sequence.tolist()),
         scene=state.before,
@@ -131,15 +140,19 @@ def _promising(plan: Plan, state: CalibrationState, worth: Worth) -> bool:
         return True
     if state.points:
         return worth.points >= _GROWTH * state.points
+    still = state.count - state.grew_at >= _STILL
     joint = state.before.joint
     told = () if joint is None else joint.unknowns
-    free = set(unknowns_of(plan.sensor, state.before)) - set(told)
-    if not any(name.startswith("object.") for name in free):
-        return worth.steps >= _STEPS_BESIDE_OBJECT or worth.empty >= _EMPTY
-    return worth.steps >= _STEPS
+    unknowns = unknowns_of(plan.sensor, state.before)
+    shaped = [name for name in unknowns if name.startswith("object.")]
+    if set(shaped) <= set(told):
+        if worth.empty >= EMPTY_ENOUGH:
+            return True
+        return (still or not shaped) and worth.steps >= _STEPS_BESIDE_OBJECT
+    return still and worth.steps >= _STEPS
 
 
 def _reason(state: CalibrationState) -> str:
-    if state.calibrated:
+    if state.known:
         return "frames tell more by now"
     return "the scene is not known" if not state.failures else "the last one was not taken"

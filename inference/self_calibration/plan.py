@@ -40,26 +40,24 @@ class Plan:
     settings: TrackingSettings
     seed: int
 
-    def tracker(self, scene: Scene, learnt: bool) -> Tracker:
+    def tracker(self, scene: Scene) -> Tracker:
         """Return the tracker of a scene.
+
+        Crosstalk that drifts widens the scene (`inference.self_calibration.drift`), and is not
+        learnt on line: what is learnt beside an object whose shape is open is sure and wrong
+        (docs/limits.md).
 
         Parameters
         ----------
         scene : Scene
             Of which every unknown has a law.
-        learnt : bool
-            Whether it comes from a calibration. Where not, drifting crosstalk is as unknown as it
-            is stated, and not followed: what is learnt beside unknowns as wide as priors is sure
-            and wrong (docs/limits.md).
         """
-        return _tracker(self.sensor, scene, self.settings, learnt)
+        return _tracker(self.sensor, scene, self.settings)
 
 
 @functools.lru_cache(maxsize=64)
-def _tracker(sensor: Sensor, scene: Scene, settings: TrackingSettings, learnt: bool) -> Tracker:
-    if not learnt:
-        settings = settings.model_copy(update={"crosstalk_drift": None})
-    return tracker(sensor, scene, settings)
+def _tracker(sensor: Sensor, scene: Scene, settings: TrackingSettings) -> Tracker:
+    return tracker(sensor, scene, settings.model_copy(update={"crosstalk_drift": None}))
 
 
 def plan_of(sensor: Sensor, scene: Scene, settings: TrackingSettings, seed: int) -> Plan:
@@ -93,7 +91,7 @@ def begin(plan: Plan) -> CalibrationState:
     known = set(unknowns_of(plan.sensor, plan.stated)) <= set(told)
     scene = trackable(plan.sensor, plan.stated)
     return CalibrationState(
-        track=plan.tracker(scene, known).first,
+        track=plan.tracker(scene).first,
         scene=scene,
         before=plan.stated if not known else prior_scene(plan.stated),
         recent=nothing_kept(),

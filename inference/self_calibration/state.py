@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.self_calibration.calibration import Asked, Outcome
+from inference.self_calibration.drift import Drift
 from inference.self_calibration.gathering import Kept
 from inference.tracking.state import BROKEN, TrackState, state_from_bytes, state_to_bytes
 from simulator.errors import InvalidInputError
@@ -81,6 +82,10 @@ class CalibrationState:
         The one that is wanted.
     switch : Switch or None
         What is to change.
+    steps, grew_at : int
+        Different amplitudes that are gathered, and how many frames had come when they grew.
+    drift : Drift or None
+        How old what is known is; None before it is known.
     events : tuple of dict
         The last changes.
     """
@@ -104,12 +109,15 @@ class CalibrationState:
     taken_at: int = 0
     asked: Asked | None = None
     switch: Switch | None = None
+    steps: int = 0
+    grew_at: int = 0
+    drift: Drift | None = None
     events: tuple[Mapping[str, Any], ...] = ()
 
 
 _PLAIN = (
     "calibrated", "known", "trusts_empty", "count", "since", "not_before", "points", "failures",
-    "surprises", "surprised", "number", "taken_at",
+    "surprises", "surprised", "number", "taken_at", "steps", "grew_at",
 )  # fmt: skip
 
 
@@ -136,6 +144,8 @@ def calibration_to_bytes(state: CalibrationState) -> bytes:
             scene = None if outcome.scene is None else _text(outcome.scene)
             said = [scene, outcome.reason, outcome.misfit, dict(outcome.statuses)]
         meta["switch"] = [state.switch.applies_at, said, state.switch.reason]
+    if state.drift is not None:
+        meta["drift"] = [_text(state.drift.law), *state.drift[1:]]
     meta["events"] = [dict(event) for event in state.events]
     return pack(meta, arrays)
 
@@ -172,6 +182,10 @@ def calibration_from_bytes(data: bytes) -> CalibrationState:
                 scene = None if said[0] is None else _scene(said[0])
                 outcome = Outcome(scene, *said[1:])
             switch = Switch(applies_at, outcome, reason)
+        drift = None
+        if "drift" in meta:
+            law, *numbers = meta["drift"]
+            drift = Drift(_scene(law), *numbers)
         return CalibrationState(
             track=state_from_bytes(arrays["track"].tobytes()),
             scene=_scene(meta["scene"]),
@@ -180,8 +194,9 @@ def calibration_from_bytes(data: bytes) -> CalibrationState:
             gathered=kept["gathered"],
             asked=asked,
             switch=switch,
+            drift=drift,
             events=tuple(meta["events"]),
-            **{name: meta[name] for name in _PLAIN},
+            **{name: meta[name] for name in _PLAIN if name in meta},
         )
     except BROKEN as error:
         raise InvalidInputError.at("/state", "is not the state of such a stream") from error

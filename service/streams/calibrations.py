@@ -118,11 +118,7 @@ class Calibrations:
         if record.status != "done" or record.result is None:
             return Outcome(None, f"the posterior was {record.status}")
         scene = await self._scene(record, client)
-        outcome = outcome_of(record.result, scene)
-        if outcome.scene is not None:
-            # made here, so that no line waits for it
-            await asyncio.to_thread(plan.tracker, outcome.scene, True)
-        return outcome
+        return outcome_of(record.result, scene)
 
     async def _ended(self, posterior: str, client: str, plan: Plan, asked: Asked) -> JobRecord:
         """Return the posterior when it has ended, asking for it where it is not there."""

@@ -128,7 +128,7 @@ class Calibrating:
     def of(cls, plan: Plan, concluding: Conclude | None = None) -> "Calibrating":
         """Make one of a plan."""
         first = begin(plan)
-        return cls(plan, plan.tracker(first.scene, first.calibrated), concluding)
+        return cls(plan, plan.tracker(first.scene), concluding)
 
     @property
     def first(self) -> CalibrationState:
@@ -169,7 +169,7 @@ class Calibrating:
     def from_bytes(self, data: bytes) -> CalibrationState:
         """See `Follower`."""
         state = calibration_from_bytes(data)
-        _of(self.plan.tracker(state.scene, state.calibrated), state.track)
+        _of(self.plan.tracker(state.scene), state.track)
         return state
 
 

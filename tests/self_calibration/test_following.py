@@ -44,7 +44,9 @@ STATED = parse_scene(
         "discrepancy": 0,
     }
 )
-PLAN = plan_of(SENSOR, STATED, TrackingSettings(rate_sd=0.5), 7)
+STILL = TrackingSettings(rate_sd=0.5, crosstalk_drift=(0.0, 0.0))
+PLAN = plan_of(SENSOR, STATED, STILL, 7)
+DRIFTING = plan_of(SENSOR, STATED, TrackingSettings(rate_sd=0.5), 7)
 TRUTH = (0.001, 0.006)
 N, CHANGE = 600, 330
 
@@ -91,15 +93,19 @@ def told(*outcomes: Outcome, lag: int = 60) -> Conclude:
 
 
 def run(
-    frames: Frames, concluding: Conclude | None, cuts: tuple[int, ...] = (), stored: bool = False
+    frames: Frames,
+    concluding: Conclude | None,
+    cuts: tuple[int, ...] = (),
+    stored: bool = False,
+    plan: Plan = PLAN,
 ) -> tuple[CalibrationState, NDArray[np.float64], list[dict[str, Any]]]:
-    state, rows, events = begin(PLAN), [], []
+    state, rows, events = begin(plan), [], []
     edges = (0, *sorted(cuts), len(frames))
     for a, b in itertools.pairwise(edges):
         if a == b:
             continue
         part = frames.select(slice(a, b))
-        state, pieces = follow(PLAN, state, part, range(a + 1, b + 1), concluding)
+        state, pieces = follow(plan, state, part, range(a + 1, b + 1), concluding)
         if stored:
             state = calibration_from_bytes(calibration_to_bytes(state))
         for piece in pieces:
@@ -152,8 +158,8 @@ def test_answers_before_a_calibration_are_honest() -> None:
 def test_cuts_and_stores_change_nothing(cuts: list[int], stored: bool) -> None:
     frames = course((0.003, 0.02))
     outcomes = told(Outcome(known(TRUTH), "", False, GOOD), Outcome(None, "no", False))
-    _, rows, events = run(frames, outcomes)
-    state, again, told_again = run(frames, outcomes, tuple(cuts), stored)
+    _, rows, events = run(frames, outcomes, plan=DRIFTING)
+    state, again, told_again = run(frames, outcomes, tuple(cuts), stored, DRIFTING)
     assert np.array_equal(rows, again, equal_nan=True)
     assert events == told_again
     assert [event["kind"] for event in state.events][:2] == ["taken", "doubted"]
@@ -189,7 +195,7 @@ def test_what_is_not_taken_changes_nothing_and_is_asked_for_again_later() -> Non
 
 
 def test_a_calibration_that_the_frames_since_contradict_is_not_taken() -> None:
-    wrong = Outcome(known((0.004, -0.01)), "", False, GOOD)
+    wrong = Outcome(known((0.0, -0.002)), "", False, GOOD)
     state, rows, events = run(course(), told(wrong))
     assert (events[0]["kind"], events[0]["reason"]) == (
         "not_taken",
@@ -197,6 +203,21 @@ def test_a_calibration_that_the_frames_since_contradict_is_not_taken() -> None:
     )
     assert not state.known
     assert np.array_equal(rows, run(course(), None)[1], equal_nan=True)
+
+
+def test_a_calibration_that_is_a_little_off_is_taken_as_wide_as_frames_demand() -> None:
+    """Crosstalk wrong by a quarter: taken, and the stream goes on calibrating."""
+    state, rows, events = run(course(), told(Outcome(known((0.0013, 0.0075)), "", False, GOOD)))
+    assert events[0]["kind"] == "taken"
+    assert not state.known
+    assert state.drift is not None
+    assert state.drift.jump > 0.0
+    truth = np.exp(np.log(0.67) + 0.8 * np.sin(2 * np.pi * np.arange(N) / 30 / 9))
+    late = slice(events[0]["sequence"], None)
+    answered = np.isfinite(rows[late, 0])
+    assert answered.mean() > 0.3
+    # 5 standard deviations of an error that frames share: false-alarm rate 1e-6
+    assert (np.abs(rows[late, 0] - truth[late]) <= 5 * rows[late, 1])[answered].all()
 
 
 def test_empty_frames_that_move_give_a_scene_up() -> None:
@@ -207,7 +228,7 @@ def test_empty_frames_that_move_give_a_scene_up() -> None:
     )
     readings[120:, 0] += 1.6e-4
     frames = Frames(readings, np.arange(n) / 30, object_present=np.zeros(n, dtype=bool))
-    plan = plan_of(SENSOR, known(TRUTH), TrackingSettings(rate_sd=0.5), 7)
+    plan = plan_of(SENSOR, known(TRUTH), STILL, 7)
     state, pieces = follow(plan, begin(plan), frames, range(1, n + 1))
     events = [piece.event for piece in pieces if piece.event is not None]
     assert [(e["kind"], e["reason"]) for e in events] == [

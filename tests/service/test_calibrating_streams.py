@@ -19,7 +19,7 @@ from service.streams.forms import JsonLines
 from service.streams.kept import Kept
 from service.streams.lines import Line, Place
 from service.streams.taking import take
-from tests.self_calibration.test_following import PLAN, SENSOR, STATED, course
+from tests.self_calibration.test_following import DRIFTING, SENSOR, STATED, course
 
 pytestmark = pytest.mark.anyio
 
@@ -109,7 +109,7 @@ async def test_a_stream_learns_its_scene_through_a_restart(tmp_path: Path) -> No
     ]
     assert [answer["sequence"] for answer in answers] == list(range(1, 601))
     # the same frames, the same seed, the same numbers: the same answers to the last bit
-    plan = plan_of(SENSOR, STATED, PLAN.settings, stands["calibration"]["seed"])
+    plan = plan_of(SENSOR, STATED, DRIFTING.settings, stands["calibration"]["seed"])
     before = concluding_as_before(plan, {event["number"]: event for event in told})
     follower = Calibrating.of(plan, before)
     taken = take(

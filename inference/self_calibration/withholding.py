@@ -1,0 +1,65 @@
+"""Ranges that are withheld: what is read may be crosstalk alone, which has walked."""
+
+import dataclasses
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from inference.estimates import Status
+from inference.tracking.track import Track
+from inference.tracking.tracker import Tracker
+from simulator.frames import Frames
+
+__all__ = ["withheld"]
+
+_MAY_BE_EMPTY = 0.05  # probability of readings as strange as these without an object
+
+
+def withheld(model: Tracker, frames: Frames, track: Track) -> Track:
+    """Return answers without the ranges of an object that may not be there.
+
+    To the tracker an error of the crosstalk that all frames share is a faint object that rests:
+    it learns the object's range, and of the empty scene nothing.
+
+    Parameters
+    ----------
+    model : Tracker
+        Of a scene whose crosstalk is known to some extent.
+    frames, track : Frames, Track
+        Frames, and what it said of them.
+
+    Returns
+    -------
+    Track
+        Where an empty scene explains the readings, `Status.AMBIGUOUS` in place of one range, and
+        an object is as likely there as not, at most.
+    """
+    one = track.status == Status.UNIQUE
+    if frames.known_range_m is not None:
+        one &= np.isnan(frames.known_range_m)
+    if not one.any() or model.observed.by_rate:
+        return track
+    empty = _surprise_of_empty(model, frames.select(one))
+    used = int(np.sum(model.observed.used))
+    may = np.zeros(len(track), dtype=bool)
+    may[one] = empty <= scipy.stats.chi2.isf(_MAY_BE_EMPTY, used)
+    if not may.any():
+        return track
+    status = np.where(may, np.uint8(Status.AMBIGUOUS), track.status)
+    present = np.where(may, np.minimum(track.present, 0.5), track.present)
+    return dataclasses.replace(track, status=status.astype(np.uint8), present=present)
+
+
+def _surprise_of_empty(model: Tracker, frames: Frames) -> NDArray[np.float64]:
+    """Return how much readings surprise the empty scene: a chi-square, shape (n,)."""
+    table, empty = model.model.table, model.model.places.empty
+    used = np.asarray(model.observed.used)
+    gain = np.ones(len(frames)) if frames.gain is None else frames.gain
+    mean = gain[:, None] * empty[:, 0] + np.array([table.crosstalk1, table.crosstalk2])
+    off = np.where(used, frames.readings * model.observed.scale - mean, 0.0)
+    root = gain[:, None, None] * (empty[:, 1:] * used[:, None])
+    own = np.broadcast_to(np.eye(2), (len(frames), 2, 2))
+    lower = np.linalg.qr(np.concatenate([root, own], axis=2).transpose(0, 2, 1), mode="r")
+    pull = np.linalg.solve(np.asarray(lower).transpose(0, 2, 1), off[:, :, None])
+    return np.asarray(np.square(pull[:, :, 0]).sum(axis=1))
