@@ -17,10 +17,17 @@ import uuid
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from tests.chunk_clock import timed
 
 _STATE = os.environ["XDG_STATE_HOME"]
+
+# a busy machine is no fault of what is tested
+settings.register_profile(
+    "busy", settings(), deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("busy")
 
 # folders whose tests compile the same kernels, and the group that they make
 _TOGETHER = {

@@ -37,7 +37,7 @@ def derivatives_of(
     crosstalk: tuple[float, float] | None,
     frames: Frames,
     first_reason: int,
-    straight: bool = False,
+    uneven_too: bool = False,
 ) -> Net:
     """Return the derivatives of the signals of object and background with their noise.
 
@@ -51,8 +51,9 @@ def derivatives_of(
         With derivative columns, or with times.
     first_reason : int
         Place of `DERIVATIVE_REASONS` among the reasons of the technique.
-    straight : bool
-        Whether readings move along a straight line, whose direction a chord has however they jump.
+    uneven_too : bool
+        Whether frames count at which readings change unevenly: a chord of a straight line has its
+        direction, and a search may begin anywhere.
 
     Returns
     -------
@@ -95,7 +96,7 @@ def derivatives_of(
         missing = np.isnan(windows.first) & np.isnan(windows.var1) & (state == 0)
         state[missing] = first_reason + UNEVEN_GAIN
         uneven = np.zeros(n, dtype=np.bool_)
-        if not straight:
+        if not uneven_too:
             uneven[usable] = rough(*of_usable)
         state[uneven & (state == 0)] = first_reason + ROUGH
         state[(windows.direction_sd > _TOLD) & (state == 0)] = first_reason + DROWNED_CHANGE

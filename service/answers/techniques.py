@@ -19,7 +19,9 @@ class _Techniques:
 
 
 # what solves and what refuses is code
-_SHAPES: dict[type, Shape] = {Technique: Shape(without=frozenset({"solve", "obstacle"}))}
+_SHAPES: dict[type, Shape] = {
+    Technique: Shape(without=frozenset({"solve", "obstacle", "beyond_r0"}))
+}
 
 TechniquesResponse: type[pydantic.BaseModel] = model_of(_Techniques, _SHAPES)
 

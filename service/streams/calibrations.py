@@ -57,6 +57,7 @@ class Calibrations:
         self._jobs = jobs
         self._settings = settings
         self._running: dict[str, _Running] = {}
+        self._closed = False
 
     def outcome(self, stream_id: str, client: str, plan: Plan, asked: Asked) -> Outcome | None:
         """Return what became of a calibration; None as long as it is under way.
@@ -89,6 +90,7 @@ class Calibrations:
 
     async def close(self) -> None:
         """Wait for nothing any more; posteriors stay in their store."""
+        self._closed = True
         tasks = [running.task for running in self._running.values()]
         self._running.clear()
         for task in tasks:
@@ -99,8 +101,9 @@ class Calibrations:
         try:
             return await self._outcome(posterior, client, plan, asked)
         except asyncio.CancelledError:
-            # nobody waits for it any more: the stream asks for another one, or is gone
-            if self._jobs.open:
+            # nobody waits for it any more: the stream asks for another one, or is gone. A service
+            # that ends is no such reason: the next one goes on
+            if self._jobs.open and not self._closed:
                 with contextlib.suppress(HybridTofError):
                     await self._jobs.cancel(posterior, client)
             raise

@@ -1,6 +1,6 @@
 """A frame's integral over its range, enclosed in balls: no rounding and no panel can hide.
 
-The integrand is written once more from docs/model.md, for complex balls. Shot noise has kinks where
+The integrand is written once more from docs/model.md for complex balls. Shot noise has kinks where
 a mean reading changes its sign: there `acb.integral` halves until they do not matter.
 """
 

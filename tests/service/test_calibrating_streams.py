@@ -5,15 +5,18 @@ import contextlib
 import json
 from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import httpx
 import pytest
 
+from inference.self_calibration.calibration import Asked
 from inference.self_calibration.plan import plan_of
+from inference.tracking.settings import TrackingSettings
 from service.app import create_app
 from service.service_settings import ServiceSettings
 from service.streams.calibrated_here import concluding_as_before
+from service.streams.calibrations import Calibrations, posterior_id
 from service.streams.followers import Calibrating
 from service.streams.forms import JsonLines
 from service.streams.kept import Kept
@@ -77,6 +80,41 @@ async def until_told(http: httpx.AsyncClient, path: str, rest: list[bytes]) -> l
         await asyncio.sleep(0.05)
         found += await sent(http, path, [rest.pop(0)])
     return found
+
+
+class _Unending:
+    """Jobs of which none ends."""
+
+    open = True
+
+    def __init__(self) -> None:
+        self.asked, self.cancelled = asyncio.Event(), asyncio.Event()
+
+    async def follow(self, posterior: str, client: str) -> AsyncIterator[Any]:
+        assert (posterior, client) == (posterior_id("stream", 1), "me")
+        self.asked.set()
+        await asyncio.Event().wait()
+        yield
+
+    async def cancel(self, posterior: str, client: str) -> None:
+        assert (posterior, client) == (posterior_id("stream", 1), "me")
+        self.cancelled.set()
+
+
+@pytest.mark.parametrize("ends", ["service", "stream"])
+async def test_a_service_that_ends_cancels_no_posterior(ends: str) -> None:
+    """The next one goes on with it; what a stream no longer wants is cancelled."""
+    jobs = _Unending()
+    calibrations = Calibrations(cast(Any, jobs), ServiceSettings(workers=1, warm=False))
+    asked = Asked(1, 2, "", 30, (1,), STATED, course().select(slice(0, 1)))
+    plan = plan_of(SENSOR, STATED, TrackingSettings(), 7)
+    assert calibrations.outcome("stream", "me", plan, asked) is None
+    await jobs.asked.wait()
+    if ends == "stream":
+        calibrations.forget("stream")
+        await jobs.cancelled.wait()
+    await calibrations.close()
+    assert jobs.cancelled.is_set() == (ends == "stream")
 
 
 @pytest.mark.slow

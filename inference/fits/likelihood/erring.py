@@ -24,15 +24,14 @@ from inference.fits.likelihood.erring_climb import (
 )
 from inference.fits.likelihood.erring_point import (
     Point,
-    columns_of,
     left_of_frames,
     linearised,
     point_at,
     slopes_of_priors,
     whitened_of,
 )
-from inference.fits.likelihood.frame_modes import frame_modes
 from inference.fits.likelihood.maximum import Maximum
+from inference.fits.likelihood.other_starts import larger, of_law
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import Told, contradictions, eliminated, improbable, told_at
 from inference.identifiability.elimination import eliminate
@@ -184,7 +183,7 @@ def erring_maxima(problem: FitProblem, starts: Iterable[Maximum]) -> list[Erring
         Ends of the best climbs, the best first.
     """
     first = []
-    for start in (*starts, *_of_law(problem)):
+    for start in (*starts, *of_law(problem)):
         if not (np.isfinite(start.x).all() and np.isfinite(start.deviance)):
             continue
         inward = held_within_priors(problem, start.x)
@@ -199,19 +198,10 @@ def erring_maxima(problem: FitProblem, starts: Iterable[Maximum]) -> list[Erring
         if not any(_same(at, end) for end, _ in ends):
             ends.append(climbed(problem, at, _STEPS))
     ends.sort(key=lambda end: end[0].deviance)
+    if ends:
+        ends += [climbed(problem, at, _STEPS) for at in larger(problem, ends[0][0])]
+        ends.sort(key=lambda end: end[0].deviance)
     return [_end(problem, at, remaining) for at, remaining in ends]
-
-
-def _of_law(problem: FitProblem) -> list[Maximum]:
-    """Return the centre of the scene's joint law, or of the mode that is taken, as a start."""
-    if not problem.law:
-        return []
-    z = np.zeros((1, len(problem.parameters)))
-    if problem.mode is not None:
-        z = problem.mode.centre[None]
-    natural = problem.parameters.natural(z)[:, columns_of(problem)]
-    x = problem.coordinates(natural)[0]
-    return [Maximum(x, 0.0, math.inf, frame_modes(problem, x)[0][:, 0])]
 
 
 def contradicting(top: Erring, problem: FitProblem) -> list[int]:

@@ -22,7 +22,7 @@ from inference.frame.arguments import instrument_of
 from inference.frame.noise import whiteners
 from inference.known import Known
 from inference.realtime.net import SATURATED, rule_out
-from inference.realtime.techniques.differential import DIFFERENTIAL
+from inference.realtime.techniques.differential import ranges_by_derivatives
 from inference.technique import Task, Technique
 from simulator.errors import RefusedError
 from simulator.frames import Frames
@@ -152,7 +152,8 @@ def _known(task: Task, path: str) -> float:
 
 def _fitted(task: Task, unknown: tuple[str, ...]) -> tuple[LinearFit, TechniqueResult]:
     """Return the best fit, and the ranges by derivatives that it started from."""
-    single = DIFFERENTIAL.solve(dataclasses.replace(task, exact=True))
+    # a start: what jumps is followed by the likelihood
+    single = ranges_by_derivatives(dataclasses.replace(task, exact=True), uneven_too=True)
     solved = int(np.count_nonzero(single.root_count))
     if solved < len(unknown) + 1:
         raise RefusedError(

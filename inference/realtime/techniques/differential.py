@@ -23,7 +23,7 @@ from inference.realtime.solving.curves import differential_phase, differential_r
 from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor
 
-__all__ = ["DIFFERENTIAL", "Targets", "target_of", "with_law"]
+__all__ = ["DIFFERENTIAL", "Targets", "ranges_by_derivatives", "target_of", "with_law"]
 
 Array = NDArray[np.float64]
 
@@ -106,10 +106,18 @@ def target_of(task: Task, rate: Net) -> Targets:
         return Targets(np.where(usable, phase, np.nan), np.ones_like(phase), sd, contact, still)
 
 
-def _solve(task: Task) -> TechniqueResult:
+def ranges_by_derivatives(task: Task, uneven_too: bool) -> TechniqueResult:
+    """Return the ranges that derivatives tell.
+
+    Parameters
+    ----------
+    task : Task
+        The request.
+    uneven_too : bool
+        As for `derivatives_of`.
+    """
     sensor, known = task.sensor, task.known
-    straight = task.scene.motion == "tangential"
-    rate = derivatives_of(sensor, known.crosstalk, task.frames, OWN, straight)
+    rate = derivatives_of(sensor, known.crosstalk, task.frames, OWN, uneven_too)
     targets = target_of(task, rate)
     pulsed = isinstance(sensor, PulsedSensor)
     # phases of derivatives are known modulo pi: half the unambiguous range of a sine wave
@@ -262,5 +270,6 @@ DIFFERENTIAL = Technique(
         "1 if c1 >= -1.633 sqrt(c0), else up to 3; without c0 and c1 bounds only; "
         "1 at a fixed range"
     ),
-    solve=_solve,
+    # along the straight line of tangential motion a chord has the direction of the derivative
+    solve=lambda task: ranges_by_derivatives(task, task.scene.motion == "tangential"),
 )
