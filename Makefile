@@ -102,7 +102,7 @@ lowest: ## Run the tests that take seconds with the lowest versions that pyproje
 	uv pip compile pyproject.toml --all-extras --resolution lowest-direct --quiet --no-header --no-annotate --output-file out/lowest.txt
 	uv pip install --quiet --python out/lowest/bin/python --requirements out/lowest.txt
 	uv pip install --quiet --python out/lowest/bin/python --no-deps --no-build-isolation --editable .
-	NUMBA_CACHE_DIR=out/lowest/kernels out/lowest/bin/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow" $(LOWEST)
+	NUMBA_CACHE_DIR=$(CURDIR)/out/lowest/kernels out/lowest/bin/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow" $(LOWEST)
 
 versions: ## Run the tests that take seconds on every Python that numba knows, 3.11 to 3.13 (needs uv)
 	for version in 3.11 3.12 3.13; do \
@@ -110,7 +110,7 @@ versions: ## Run the tests that take seconds on every Python that numba knows, 3
 		uv venv --quiet --clear --python $$version $$made && \
 		uv pip install --quiet --python $$python --require-hashes --requirements requirements/dev.txt && \
 		uv pip install --quiet --python $$python --no-deps --no-build-isolation --editable . && \
-		NUMBA_CACHE_DIR=$$made/kernels $$python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow" || exit 1; \
+		NUMBA_CACHE_DIR=$(CURDIR)/$$made/kernels $$python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow" || exit 1; \
 	done
 
 package: ## Build wheel and sdist, install each where nothing else is, and answer from another folder (needs uv)

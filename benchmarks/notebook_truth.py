@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybridtof
+from benchmarks.resumable import objects_of
 
 __all__ = ["HELD", "NOTEBOOKS", "executed", "held_by", "with_seeds"]
 
@@ -220,13 +221,7 @@ def main() -> None:
     mpl.use("Agg")
     options.out.mkdir(parents=True, exist_ok=True)
     path = options.out / "notebooks.ndjson"
-    done: dict[tuple[str, int], dict[str, Any]] = {}
-    if path.exists():
-        whole = path.read_text(encoding="utf-8").rpartition("\n")[
-            0
-        ]  # a line cut short is done again
-        path.write_text(whole + "\n" if whole else "", encoding="utf-8")
-        done = {(row["notebook"], row["run"]): row for row in map(json.loads, whole.splitlines())}
+    done = {(row["notebook"], row["run"]): row for row in objects_of(path)}
     with path.open("a", encoding="utf-8") as lines:
         # run by run, so that a table of fewer runs has all notebooks
         for run, name in itertools.product(range(options.seeds), options.only):

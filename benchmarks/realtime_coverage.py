@@ -12,45 +12,31 @@ left out.
 """
 
 import argparse
-import math
 import zlib
 from collections import defaultdict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.coverage.classes import CLASSES, FRAMES, DataSet, SceneClass, at, draw, surface
+from benchmarks.coverage.calibrated_object import calibrated_object
+from benchmarks.coverage.classes import CLASSES, FRAMES, DataSet, SceneClass, draw, surface
 from inference.estimate import estimate
 from inference.tracking.track import track
 from simulator.frames import Frames
-from simulator.optics.assembly import OpticalScene, read
-from simulator.optics.parametrisation import fit_object
 from simulator.scene import parse_scene
-from simulator.sensor import parse_sensor
 
 Array = NDArray[np.float64]
 
 TECHNIQUES = ("conventional", "intensity", "intensity_w1", "differential", "tracker")
 SCENES = {"default": "default", "0": 0}
 _Z = 1.6448536269514722  # of a 90 % interval
-_CALIBRATED_M = (0.1, 2.4)
 
 
 def calibrated(group: SceneClass, number: int) -> dict[str, float] | None:
     """Return c0, c1, c2 of a data set's surface; None where its light does not determine them."""
     rng = np.random.default_rng([zlib.crc32(group.slug.encode()), number])
     _, plate, radius = surface(group, rng)
-    silent = parse_sensor({"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1.0, 1.0]}})
-    light, ranges = [], []
-    for distance in np.geomspace(*_CALIBRATED_M, 40).tolist():
-        scene = OpticalScene(surfaces=(at(plate, radius, distance),))
-        first, second = read(scene, silent, tolerance=1e-6).mean
-        light.append(second)
-        ranges.append(silent.max_range_m * first / second)
-    fit = fit_object(np.array(ranges), np.array(light))
-    if not (fit.c0 > 0 and fit.c2 > 0 and fit.c1 > -2 * math.sqrt(fit.c0)):
-        return None
-    return {"c0": fit.c0, "c1": fit.c1, "c2": fit.c2}
+    return calibrated_object(plate, radius)
 
 
 def misses(data: DataSet, known: dict[str, float], name: str, discrepancy: object) -> Array:

@@ -9,14 +9,16 @@ import contextlib
 import csv
 import fcntl
 import io
+import json
 import multiprocessing
 import os
 import subprocess
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from pathlib import Path
+from typing import Any
 
-__all__ = ["Row", "code_version", "pool", "resume", "rows_of"]
+__all__ = ["Row", "code_version", "objects_of", "pool", "resume", "rows_of"]
 
 Row = Mapping[str, str | int | float]
 
@@ -57,6 +59,16 @@ def rows_of(path: Path) -> list[dict[str, str]]:
         return []
     text = path.read_text(encoding="utf-8")
     return list(csv.DictReader(io.StringIO(text[: text.rfind("\n") + 1])))
+
+
+def objects_of(path: Path) -> list[dict[str, Any]]:
+    """Read the complete lines of a file of JSON lines, and drop from it one that was cut short."""
+    if not path.exists():
+        return []
+    text = path.read_text(encoding="utf-8")
+    whole = text[: text.rfind("\n") + 1]
+    path.write_text(whole, encoding="utf-8")
+    return [json.loads(line) for line in whole.splitlines()]
 
 
 def _line(values: Sequence[object]) -> bytes:

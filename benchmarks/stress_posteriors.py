@@ -13,10 +13,10 @@ import dataclasses
 import json
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from benchmarks.resumable import objects_of
 from tests.extreme.posteriors import held, random_case
 
 
@@ -28,11 +28,7 @@ def main() -> None:
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     path = options.out / "posteriors.ndjson"
-    done: dict[int, dict[str, Any]] = {}
-    if path.exists():
-        whole = path.read_text().rpartition("\n")[0]  # a line cut short is done again
-        path.write_text(whole + "\n" if whole else "")
-        done = {row["case"]: row for row in map(json.loads, whole.splitlines())}
+    done = {row["case"]: row for row in objects_of(path)}
     with path.open("a") as lines:
         for number in range(options.cases):
             if number in done:

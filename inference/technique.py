@@ -48,6 +48,11 @@ class Task:
     exact: bool = False
 
 
+def _told_apart(sensor: Sensor) -> float:
+    """Return where the readings of a delay end or begin anew, r0 or c/2f [m]."""
+    return sensor.max_range_m
+
+
 @dataclasses.dataclass(frozen=True)
 class Technique:
     """One technique: what it needs, what it is immune to, what it costs, how it is solved.
@@ -78,8 +83,8 @@ class Technique:
     solve : callable
         Task -> TechniqueResult; a technique of many frames raises RefusedError where the frames
         turn out not to determine what is unknown.
-    beyond_r0 : bool
-        Whether it answers farther than a delay is told, r0 or c/2f: of light alone.
+    farthest_m : callable
+        Sensor -> the range beyond which it has no answer, whatever the scene [m].
     obstacle : callable, optional
         (sensor, scene, known, frames or None) -> a further reason why it cannot serve, or None. Of
         frames it asks how many there are, which columns they have, and which of them are ruled out.
@@ -96,5 +101,5 @@ class Technique:
     equations: str
     roots: str
     solve: Callable[[Task], TechniqueResult]
-    beyond_r0: bool = False
+    farthest_m: Callable[[Sensor], float] = _told_apart
     obstacle: Callable[[Sensor, Scene, Known, Frames | None], str | None] | None = None

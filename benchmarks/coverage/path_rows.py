@@ -8,11 +8,12 @@ import numpy as np
 from benchmarks.coverage.paths import PathSet, draw_path, random_scene
 from benchmarks.resumable import Row
 from inference.posterior import fold
+from inference.posterior.answer.posterior import Posterior
 from inference.posterior.settings import SamplerSettings
 from simulator.errors import RefusedError
 from simulator.scene import parse_scene
 
-__all__ = ["COLUMNS", "path_row", "random_row", "row_of"]
+__all__ = ["COLUMNS", "path_row", "posterior_of", "random_row", "row_of"]
 
 COLUMNS = (
     "set",
@@ -36,6 +37,32 @@ COLUMNS = (
 )
 
 
+def posterior_of(data: PathSet, settings: SamplerSettings) -> Posterior:
+    """Infer; all of it counts against the time limit, in processor time.
+
+    A busy machine does not change the answer so.
+
+    Parameters
+    ----------
+    data : PathSet
+        The data set.
+    settings : SamplerSettings
+        Of the posterior.
+
+    Raises
+    ------
+    RefusedError
+        Where no honest answer exists.
+    """
+    start = time.process_time()
+    job = fold.prepare(data.sensor, parse_scene(data.scene), data.frames, settings)
+    checkpoint = fold.start(job)
+    while tasks := fold.tasks(job, checkpoint, time.process_time() - start):
+        checkpoint = fold.merge(job, checkpoint, [fold.run(task) for task in tasks])
+    used = time.process_time() - start
+    return fold.summarise(job, checkpoint, used, used)
+
+
 def row_of(data: PathSet, settings: SamplerSettings, version: str) -> Row:
     """Infer, and hold intervals of ranges and parameters to the truth.
 
@@ -44,8 +71,7 @@ def row_of(data: PathSet, settings: SamplerSettings, version: str) -> Row:
     data : PathSet
         The data set.
     settings : SamplerSettings
-        Of the posterior; its time limit is counted in processor time, so that a busy machine does
-        not change the answer.
+        As for `posterior_of`.
     version : str
         Of the code, for the table.
 
@@ -63,17 +89,11 @@ def row_of(data: PathSet, settings: SamplerSettings, version: str) -> Row:
         "version": version,
         "sensor": data.sensor.kind,
     }
-    start = time.process_time()
     try:
-        job = fold.prepare(data.sensor, parse_scene(data.scene), data.frames, settings)
-        checkpoint = fold.start(job)
-        while tasks := fold.tasks(job, checkpoint, time.process_time() - start):
-            checkpoint = fold.merge(job, checkpoint, [fold.run(task) for task in tasks])
+        found = posterior_of(data, settings)
     except RefusedError as error:
         return {**row, "converged": 0, "reason": f"refused: {error}"}
-    used = time.process_time() - start
-    found = fold.summarise(job, checkpoint, used, used)
-    row |= {"seconds": used, "method": found.method}
+    row |= {"seconds": found.runtime.cpu_s, "method": found.method}
     reason = " / ".join(found.verdict.reasons)
     if not found.drawn:
         return {**row, "converged": 0, "reason": reason}

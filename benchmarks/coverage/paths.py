@@ -101,7 +101,7 @@ class PathSet:
     Attributes
     ----------
     name : str
-        Path and light.
+        What it is.
     sensor : Sensor
         The sensor.
     frames : Frames
@@ -109,9 +109,9 @@ class PathSet:
     scene : dict
         What inference is told.
     range_m : ndarray, shape (n,)
-        True ranges [m].
+        True ranges [m]; nan where there is no object.
     parameters : dict of str to float
-        True values of all unknowns, by scene path.
+        True values of unknowns, by scene path; those of an object only where it is the model's.
     """
 
     name: str

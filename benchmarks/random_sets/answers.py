@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.random_sets.sets import RandomSet, random_set
+from benchmarks.coverage.path_rows import posterior_of
+from benchmarks.coverage.paths import PathSet
+from benchmarks.random_sets.sets import random_set
 from benchmarks.resumable import Row
 from inference.estimate import estimate
 from inference.estimates import TechniqueResult
 from inference.fits.techniques.registry import FITS
-from inference.posterior import fold
 from inference.posterior.settings import SamplerSettings
 from inference.realtime.registry import TECHNIQUES
 from inference.tracking.track import track
@@ -90,7 +91,7 @@ def _normal(off: Array) -> NDArray[np.bool_]:
     return np.asarray(np.abs(off) < _Z)
 
 
-def _take_result(held: Held, data: RandomSet, found: TechniqueResult) -> str:
+def _take_result(held: Held, data: PathSet, found: TechniqueResult) -> str:
     """Take in a technique's answer; what flags it, if anything does."""
     asked = int(np.isfinite(data.range_m).sum())
     fit = found.fit or {}
@@ -107,7 +108,7 @@ def _take_result(held: Held, data: RandomSet, found: TechniqueResult) -> str:
     return ""
 
 
-def _by_techniques(names: Mapping[str, object], data: RandomSet, held: Held) -> Row:
+def _by_techniques(names: Mapping[str, object], data: PathSet, held: Held) -> Row:
     served = estimate(data.sensor, parse_scene(data.scene), data.frames, list(names))
     flags = [_take_result(held, data, found) for found in served.results]
     reasons = {each.name: each.reason for each in served.left_out if each.name in names}
@@ -117,15 +118,15 @@ def _by_techniques(names: Mapping[str, object], data: RandomSet, held: Held) -> 
     }
 
 
-def _at_once(data: RandomSet, number: int, seconds: float, held: Held) -> Row:  # noqa: ARG001
+def _at_once(data: PathSet, number: int, seconds: float, held: Held) -> Row:  # noqa: ARG001
     return _by_techniques(TECHNIQUES, data, held)
 
 
-def _by_fits(data: RandomSet, number: int, seconds: float, held: Held) -> Row:  # noqa: ARG001
+def _by_fits(data: PathSet, number: int, seconds: float, held: Held) -> Row:  # noqa: ARG001
     return _by_techniques(FITS, data, held)
 
 
-def _tracked(data: RandomSet, number: int, seconds: float, held: Held) -> Row:  # noqa: ARG001
+def _tracked(data: PathSet, number: int, seconds: float, held: Held) -> Row:  # noqa: ARG001
     asked = int(np.isfinite(data.range_m).sum())
     try:
         found = track(data.sensor, parse_scene(data.scene), data.frames)
@@ -138,20 +139,14 @@ def _tracked(data: RandomSet, number: int, seconds: float, held: Held) -> Row:  
     return {"flags": f"misfit in {int(found.misfit.sum())}" if found.misfit.any() else ""}
 
 
-def _inferred(data: RandomSet, number: int, seconds: float, held: Held) -> Row:
+def _inferred(data: PathSet, number: int, seconds: float, held: Held) -> Row:
     settings = SamplerSettings(method="auto", seed=number, max_seconds=seconds)
     asked = int(np.isfinite(data.range_m).sum())
-    start = time.process_time()
     try:
-        job = fold.prepare(data.sensor, parse_scene(data.scene), data.frames, settings)
-        checkpoint = fold.start(job)
-        while tasks := fold.tasks(job, checkpoint, time.process_time() - start):
-            checkpoint = fold.merge(job, checkpoint, [fold.run(task) for task in tasks])
+        found = posterior_of(data, settings)
     except RefusedError as error:
         held.asked += asked
         return {"reason": f"refused: {error}"}
-    used = time.process_time() - start
-    found = fold.summarise(job, checkpoint, used, used)
     if not (found.drawn and found.verdict.converged) or found.fit.misfit:
         held.asked += asked
         flag = "misfit" if found.drawn and found.fit.misfit else "not converged"
@@ -168,7 +163,7 @@ def _inferred(data: RandomSet, number: int, seconds: float, held: Held) -> Row:
     return {"flags": "" if status["range_m"] == "identified" else f"scale {status['range_m']}"}
 
 
-WAYS: Mapping[str, Callable[[RandomSet, int, float, Held], Row]] = {
+WAYS: Mapping[str, Callable[[PathSet, int, float, Held], Row]] = {
     "estimate": _at_once,
     "fits": _by_fits,
     "tracker": _tracked,

@@ -3,14 +3,14 @@
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.coverage.calibrated_object import calibrated_object
 from benchmarks.coverage.classes import CLASSES, KINDS, SHADOW, at, surface
-from benchmarks.coverage.paths import LIGHT, PATHS
-from simulator.catalogue import PlateScene
+from benchmarks.coverage.paths import LIGHT, PATHS, PathSet
 from simulator.discrepancy import DISCREPANCY_SD
 from simulator.frames import Frames
 from simulator.model_error import FITTED_SHARE, RANGE_ERROR_SD
@@ -18,14 +18,13 @@ from simulator.object_model import object_flux
 from simulator.optics.assembly import OpticalScene, read
 from simulator.optics.electronics import Electronics
 from simulator.optics.motion import series
-from simulator.optics.parametrisation import fit_object
 from simulator.optics.surfaces import Shell
 from simulator.scene import parse_scene
 from simulator.sensor import Sensor, parse_sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
 
-__all__ = ["RandomSet", "fitted_object", "random_set"]
+__all__ = ["random_set"]
 
 Array = NDArray[np.float64]
 
@@ -36,48 +35,29 @@ _FRAMES = (8, 40)
 _EMPTY = (0, 0, 3, 6)
 _TOLD = (1.0, 3.0, 10.0)  # standard deviation of the crosstalk that is told, over the true one
 _WIDEST = 1.0  # of that in the signal in the middle of the stroke
-_CALIBRATED_M = (0.1, 2.4)
-_SILENT = parse_sensor({"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1.0, 1.0]}})
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class RandomSet:
-    """Readings with the truth.
+class _Wanted(NamedTuple):
+    """What is drawn of a set before its object."""
 
-    Attributes
-    ----------
-    name : str
-        What it is.
-    sensor : Sensor
-        The sensor.
-    frames : Frames
-        Its readings; those without an object come first and are told so.
-    scene : dict
-        What inference is told.
-    range_m : ndarray, shape (n,)
-        True ranges [m]; nan where there is no object.
-    parameters : dict of str to float
-        True values of unknowns, by scene path; those of an object only where it is the model's.
-    """
-
-    name: str
-    sensor: Sensor
-    frames: Frames
-    scene: dict[str, Any]
-    range_m: Array
-    parameters: dict[str, float]
+    kind: Mapping[str, Any]  # of the sensor
+    light: str
+    known: bool
+    snr: float
+    ranges: Array
+    middle_m: float
+    empty: int
 
 
-@dataclasses.dataclass(frozen=True)
-class _Light:
-    """Light besides the object's: what it is, and what is told of it."""
+class _Crosstalk(NamedTuple):
+    """Crosstalk: what it is, what is told of it, and the truth by scene path."""
 
-    crosstalk: list[float] | None
-    background: dict[str, Any] | None
+    values: list[float] | None
     told: dict[str, Any]
+    truth: dict[str, float]
 
 
-def random_set(seed: int, number: int) -> RandomSet:
+def random_set(seed: int, number: int) -> PathSet:
     """Draw a set.
 
     A path of `benchmarks.coverage.paths` over a stroke that starts at 0.1 to 0.4 m and ends 2 to 6
@@ -96,7 +76,7 @@ def random_set(seed: int, number: int) -> RandomSet:
 
     Returns
     -------
-    RandomSet
+    PathSet
     """
     rng = np.random.default_rng([seed, number])
     path, light = str(rng.choice(list(PATHS))), str(rng.choice(LIGHT))
@@ -110,7 +90,7 @@ def random_set(seed: int, number: int) -> RandomSet:
     ranges = PATHS[path](low * inside, high / inside, count, rng)
     optics, known = rng.random() < _OPTICS, rng.random() < _KNOWN
     make = _through_optics if optics else _of_model
-    made = make(kind, light, known, snr, ranges, math.sqrt(low * high), empty, rng)
+    made = make(_Wanted(kind, light, known, snr, ranges, math.sqrt(low * high), empty), rng)
     step = max(float(np.sqrt(np.mean(np.diff(np.log(ranges)) ** 2))), 1e-3)
     present = np.arange(count + empty) >= empty
     frames = Frames(
@@ -123,36 +103,19 @@ def random_set(seed: int, number: int) -> RandomSet:
     return dataclasses.replace(made, name=name, frames=frames)
 
 
-def fitted_object(plate: PlateScene, radius: float) -> dict[str, float] | None:
-    """Return c0, c1, c2 of a surface as a calibration finds them; None where it finds none.
-
-    Parameters
-    ----------
-    plate, radius : PlateScene, float
-        As `benchmarks.coverage.classes.surface` has them.
-    """
-    light, ranges = [], []
-    for distance in np.geomspace(*_CALIBRATED_M, 40).tolist():
-        scene = OpticalScene(surfaces=(at(plate, radius, distance),))
-        first, second = read(scene, _SILENT, tolerance=1e-6).mean
-        light.append(second)
-        ranges.append(_SILENT.max_range_m * first / second)
-    fit = fit_object(np.array(ranges), np.array(light))
-    if not (fit.c0 > 0 and fit.c2 > 0 and fit.c1 > -2 * math.sqrt(fit.c0)):
-        return None
-    return {"c0": fit.c0, "c1": fit.c1, "c2": fit.c2}
-
-
-def _crosstalk(light: str, middle: float, known: bool, rng: np.random.Generator) -> _Light:
+def _crosstalk(wanted: _Wanted, middle: float, rng: np.random.Generator) -> _Crosstalk:
     """Draw crosstalk, and what is told of it."""
-    if light not in ("crosstalk", "both"):
-        return _Light(None, None, {})
+    if wanted.light not in ("crosstalk", "both"):
+        return _Crosstalk(None, {}, {})
     size = middle * math.exp(rng.uniform(math.log(0.01), 0.0))
     values = (size * rng.standard_normal(2)).tolist()
     sd = min(size * float(rng.choice(_TOLD)), max(size, _WIDEST * middle))
-    if known and rng.random() < 0.5:
-        return _Light(values, None, {"crosstalk": values})
-    return _Light(values, None, {"crosstalk": [{"prior": "normal", "mean": 0.0, "sd": sd}] * 2})
+    columns = _sensor(wanted.kind, 1.0).columns
+    truth = {f"crosstalk.{c}": v for c, v in zip(columns, values, strict=True)}
+    if wanted.known and rng.random() < 0.5:
+        return _Crosstalk(values, {"crosstalk": values}, truth)
+    prior = {"prior": "normal", "mean": 0.0, "sd": sd}
+    return _Crosstalk(values, {"crosstalk": [prior] * 2}, truth)
 
 
 def _strength_prior(strength: float, rng: np.random.Generator) -> dict[str, Any]:
@@ -164,23 +127,15 @@ def _sensor(kind: Mapping[str, Any], noise: float) -> Sensor:
     return parse_sensor({**kind, "noise": {"read": [noise, noise]}})
 
 
-def _of_model(
-    kind: Mapping[str, Any],
-    light: str,
-    known: bool,
-    snr: float,
-    ranges: Array,
-    middle_m: float,
-    empty: int,
-    rng: np.random.Generator,
-) -> RandomSet:
+def _of_model(wanted: _Wanted, rng: np.random.Generator) -> PathSet:
     """Make readings of an object of the model, with a smooth error."""
+    kind, light, known, snr, ranges, middle_m, empty = wanted
     c0 = 0.08 * math.exp(0.7 * rng.standard_normal())
     c1 = 2 * math.sqrt(c0) * math.expm1(0.4 * rng.standard_normal())
     c2 = 0.1 * math.exp(0.5 * rng.standard_normal())
     thing = {"c0": c0, "c1": c1, "c2": c2}
     middle = float(object_flux(middle_m, c0 * c2, c0, c1))
-    other = _crosstalk(light, middle, known, rng)
+    other = _crosstalk(wanted, middle, rng)
     error = DISCREPANCY_SD * (FITTED_SHARE if known else 1.0)
     made: dict[str, Any] = {
         "object": thing,
@@ -188,10 +143,9 @@ def _of_model(
     }
     told: dict[str, Any] = dict(other.told) | ({"object": thing} if known else {})
     truth = {} if known else {f"object.{name}": value for name, value in thing.items()}
-    if other.crosstalk is not None:
-        made["crosstalk"] = other.crosstalk
-        columns = ("w1", "w2") if kind["kind"] == "pulsed" else ("i", "q")
-        truth |= {f"crosstalk.{c}": v for c, v in zip(columns, other.crosstalk, strict=True)}
+    truth |= other.truth
+    if other.values is not None:
+        made["crosstalk"] = other.values
     if light in ("background", "both"):
         strength, distance = float(middle * rng.uniform(0.3, 1.0)), float(rng.uniform(3.0, 6.0))
         shadow = {
@@ -211,39 +165,29 @@ def _of_model(
         object_present=[False] * empty + [True] * ranges.size,
     )
     seen = simulate(sensor, parse_scene(made), path, rng)
-    return RandomSet("model", sensor, seen.frames, told, seen.range_m, truth)
+    return PathSet("model", sensor, seen.frames, told, seen.range_m, truth)
 
 
-def _through_optics(
-    kind: Mapping[str, Any],
-    light: str,
-    known: bool,
-    snr: float,
-    ranges: Array,
-    middle_m: float,
-    empty: int,
-    rng: np.random.Generator,
-) -> RandomSet:
+def _through_optics(wanted: _Wanted, rng: np.random.Generator) -> PathSet:
     """Make readings of a surface as exact optics has them."""
+    kind, light, known, snr, ranges, middle_m, empty = wanted
     group = CLASSES["crosstalk"]  # any surface
     while True:
         name, plate, radius = surface(group, rng)
-        thing = fitted_object(plate, radius) if known else None
+        thing = calibrated_object(plate, radius) if known else None
         if not known or thing is not None:
             break
     silent = _sensor(kind, 1.0)
     bare = OpticalScene(surfaces=(at(plate, radius, middle_m),))
     middle = float(np.hypot(*read(bare, silent, tolerance=1e-6).mean))
-    other = _crosstalk(light, middle, known, rng)
+    other = _crosstalk(wanted, middle, rng)
     sensor = _sensor(kind, middle / snr)
     told: dict[str, Any] = dict(other.told) | ({"object": thing} if known else {})
     scene = OpticalScene(surfaces=(at(plate, radius, 1.0),))
-    truth: dict[str, float] = {}
-    if other.crosstalk is not None:
-        first, second = other.crosstalk
+    truth = dict(other.truth)
+    if other.values is not None:
+        first, second = other.values
         scene = scene.model_copy(update={"electronics": Electronics(crosstalk=(first, second))})
-        columns = ("w1", "w2") if kind["kind"] == "pulsed" else ("i", "q")
-        truth = {f"crosstalk.{c}": v for c, v in zip(columns, other.crosstalk, strict=True)}
     if light in ("background", "both"):
         distance = float(rng.uniform(3.0, 6.0))
         scene = scene.model_copy(update={"background": Shell(radius_m=distance)})
@@ -257,4 +201,4 @@ def _through_optics(
     dark = [read(without, sensor, rng).values for _ in range(empty)]
     readings = np.concatenate([np.array(dark).reshape(-1, 2), seen.frames.readings])
     range_m = np.concatenate([np.full(empty, np.nan), seen.range_m])
-    return RandomSet(name, sensor, Frames(readings), told, range_m, truth)
+    return PathSet(name, sensor, Frames(readings), told, range_m, truth)

@@ -5,6 +5,8 @@ differ by is, to first order, an error of the object's flux and one of the effec
 numbers from two readings (docs/model.md, learnt-error).
 """
 
+import dataclasses
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
@@ -56,7 +58,7 @@ def learnt_error(sensor: Sensor, terms: Terms, frames: Frames, unknowns: int) ->
     known, sd = frames.known_range_m[used], frames.known_range_sd_m[used]
     factor = np.ones(known.size) if frames.gain is None else frames.gain[used]
     static = np.zeros(2) if terms.crosstalk is None else terms.crosstalk[0]
-    bare = Terms(terms.object, None, None, terms.ranges, None, terms.gain, terms.lag)
+    bare = dataclasses.replace(terms, crosstalk=None, background=None)
     light = factor[:, None] * mean_readings(sensor, bare, known)
 
     def foreseen(ranges: Array) -> Array:

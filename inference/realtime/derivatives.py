@@ -84,27 +84,30 @@ def derivatives_of(
     windows = Windows(*(np.full(n, np.nan) for _ in range(6)))
     state = net.state.copy()
     if usable.size >= 2:
-        part = Windows(*(np.full(usable.size, np.nan) for _ in range(6)))
-        of_usable = (
-            frames.time_s[usable],
-            net.select(usable),
-            None if gain is None else gain[usable],
-        )
-        differences(*of_usable, part)
-        for whole, some in zip(windows, part, strict=True):
-            whole[usable] = some
+        uneven = np.zeros(usable.size, dtype=np.bool_)
+        if not uneven_too:
+            uneven = rough(*_of_frames(usable, frames.time_s, net, gain))
+        # no window reaches across what is uneven: it would take in what lies behind a jump
+        for stretch in np.split(usable, np.flatnonzero(np.diff(uneven, prepend=uneven[0]))):
+            part = Windows(*(np.full(stretch.size, np.nan) for _ in range(6)))
+            differences(*_of_frames(stretch, frames.time_s, net, gain), part)
+            for whole, some in zip(windows, part, strict=True):
+                whole[stretch] = some
+        state[usable[uneven]] = first_reason + ROUGH
         missing = np.isnan(windows.first) & np.isnan(windows.var1) & (state == 0)
         state[missing] = first_reason + UNEVEN_GAIN
-        uneven = np.zeros(n, dtype=np.bool_)
-        if not uneven_too:
-            uneven[usable] = rough(*of_usable)
-        state[uneven & (state == 0)] = first_reason + ROUGH
         state[(windows.direction_sd > _TOLD) & (state == 0)] = first_reason + DROWNED_CHANGE
     else:
         state[usable] = first_reason + LONELY
     bad = (state == 0) & ~(np.isfinite(windows.first) & np.isfinite(windows.second))
     state[bad] = UNREPRESENTABLE
     return Net(windows.first, windows.second, windows.var1, windows.var2, windows.cov, 0.0, state)
+
+
+def _of_frames(
+    chosen: NDArray[np.intp], time_s: Array, net: Net, gain: Array | None
+) -> tuple[Array, Net, Array | None]:
+    return time_s[chosen], net.select(chosen), None if gain is None else gain[chosen]
 
 
 def _measured(sensor: Sensor, frames: Frames) -> Net:

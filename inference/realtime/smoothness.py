@@ -19,6 +19,7 @@ _UNLIKE = 1.0  # change of a rate over its mean: more than three times as fast, 
 _TOLD = 4.0  # standard deviations above which a change is none of noise
 _SHARE = 0.2  # of the frames that tell, above which no frame is believed
 _FEWEST = 2
+_BY_CHANCE = 0.01  # rate, at most, at which noise alone makes all frames of a smooth motion uneven
 _AROUND = 2  # frames on either side, whose windows hold an uneven one
 
 
@@ -26,7 +27,8 @@ def rough(time_s: Array, net: Net, gain: Array | None) -> Flags:
     """Tell which frames have no derivative that differences could find.
 
     Those within two frames of one at which the rate changes threefold, or turns back, by more than
-    its noise. All, where that is so at a fifth of the frames whose rates are told at all.
+    its noise. All, where that is so at a fifth of the frames whose rates are told at all, and at
+    one of them by more than noise does anywhere in so many frames.
 
     Parameters
     ----------
@@ -46,22 +48,27 @@ def rough(time_s: Array, net: Net, gain: Array | None) -> Flags:
         return np.zeros(n, dtype=np.bool_)
     with np.errstate(all="ignore"):
         step = np.diff(time_s)
-        sd = np.sqrt(np.column_stack([net.var1, net.var2]))
+        reading_sd = np.sqrt(np.column_stack([net.var1, net.var2]))
         # in units of the noise; relative to the shortest step, so that nothing overflows
         values = np.column_stack([net.first, net.second])
-        noise = np.maximum(sd[:-1], sd[1:])
+        noise = np.maximum(reading_sd[:-1], reading_sd[1:])
         rate = np.diff(values, axis=0) / noise * (step.min() / step)[:, None]
         own = np.sqrt(2.0) * step.min() / step
         change = np.hypot(*(rate[1:] - rate[:-1]).T)
         mean = np.hypot(*(rate[1:] + rate[:-1]).T) / 2.0
-        blur = _TOLD * np.hypot(own[1:], own[:-1])
+        sd = np.hypot(own[1:], own[:-1])
+        blur = _TOLD * sd
         told = np.maximum(change, mean) > blur
         uneven = told & (change - blur > _UNLIKE * mean)
+        # successive rates share a reading, so that their change has up to 3/2 of the sum of their
+        # variances; of two readings it has Rayleigh's law
+        largest = np.sqrt(3.0 * np.log(n / _BY_CHANCE)) * sd
+        sure = uneven & (change - largest > _UNLIKE * mean)
         if gain is not None:
             same = (gain[1:-1] == gain[:-2]) & (gain[1:-1] == gain[2:])
-            told, uneven = told & same, uneven & same
+            told, uneven, sure = told & same, uneven & same, sure & same
     count = int(uneven.sum())
-    if count >= _FEWEST and count > _SHARE * int(told.sum()):
+    if sure.any() and count >= _FEWEST and count > _SHARE * int(told.sum()):
         return np.ones(n, dtype=np.bool_)
     at = np.flatnonzero(uneven) + 1
     near = np.zeros(n, dtype=np.bool_)

@@ -161,9 +161,12 @@ def renewed(
         after, moved = _conditioned(plan, drift, means)
         if moved or means.time_s - drift.at_s >= _RENEWED_S:
             drift = after
+    if moved:  # the law takes over with the next frame, which tells what was known before
+        state = dataclasses.replace(state, drift=drift)
+        return state, "frames without the object have moved"
     if drift is not state.drift or now > drift.until_s:
         state = in_force(plan, state, drift)
-    return state, "frames without the object have moved" if moved else None
+    return state, None
 
 
 def in_force(plan: Plan, state: CalibrationState, drift: Drift) -> CalibrationState:

@@ -7,6 +7,7 @@ error that its frames share. Frames without the object read the crosstalk itself
 law at once. How fast it walks is learnt from what calibrations and such frames found.
 """
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from inference.self_calibration.scenes import prior_scene
 from inference.tracking.tabulate import empty_readings
+from simulator.errors import InvalidInputError
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor
@@ -82,6 +84,7 @@ class Means(NamedTuple):
     time_s: float
 
 
+@functools.lru_cache(maxsize=64)  # a look asks several times for the same law
 def crosstalk_of(sensor: Sensor, scene: Scene) -> tuple[Array, Array] | None:
     """Return mean and standard deviation of unknown crosstalk.
 
@@ -219,7 +222,8 @@ def conditioned(sensor: Sensor, scene: Scene, means: Means) -> tuple[Scene, floa
     -------
     (Scene, float)
         Its law conditioned, linear in a standard deviation of each unknown; and how much the
-        readings surprise the mode that foresaw them best, a chi-square.
+        readings surprise the mode that foresaw them best, a chi-square. Infinite, and the scene as
+        it was, where the readings are farther from what was stated than any law may lie.
     """
     joint = scene.joint
     if joint is None:
@@ -259,7 +263,10 @@ def conditioned(sensor: Sensor, scene: Scene, means: Means) -> tuple[Scene, floa
         for mode, weight in zip(modes, weights, strict=True)
         if weight > _RIDGE
     ]
-    return _with_modes(scene, kept), min(surprises)
+    try:
+        return _with_modes(scene, kept), min(surprises)
+    except InvalidInputError:  # farther from its priors than a scene may state
+        return scene, math.inf
 
 
 def _without_object(sensor: Sensor, parameters: Parameters, z: Array, gain: float) -> Array:

@@ -88,7 +88,8 @@ def _doubted(plan: Plan, state: CalibrationState, sequence: int, reason: str) ->
     stated = prior_scene(plan.stated)
     # what was given up so soon may never have been true, of the object neither
     lasted = state.count - state.taken_at >= _LASTING
-    before = (about_object(state.scene, stated) if lasted else None) or stated
+    law = state.scene if state.drift is None else state.drift.law
+    before = (about_object(law, stated) if lasted else None) or stated
     return dataclasses.replace(
         state,
         before=before,

@@ -20,7 +20,7 @@ class _Techniques:
 
 # what solves and what refuses is code
 _SHAPES: dict[type, Shape] = {
-    Technique: Shape(without=frozenset({"solve", "obstacle", "beyond_r0"}))
+    Technique: Shape(without=frozenset({"solve", "obstacle", "farthest_m"}))
 }
 
 TechniquesResponse: type[pydantic.BaseModel] = model_of(_Techniques, _SHAPES)

@@ -95,10 +95,9 @@ def limits_of(technique: Technique, sensor: Sensor, known: Known) -> Limits:
         Of the scene: where its ranges are, and its background.
     """
     low, high = known.support
-    if not technique.beyond_r0:
-        high = min(high, sensor.max_range_m)
+    high = min(high, technique.farthest_m(sensor))
     if technique.uses_background and known.has("background.distance_m"):
-        high = min(known.support[1], known.get("background.distance_m"))
+        high = min(high, known.get("background.distance_m"))
     return low, high
 
 

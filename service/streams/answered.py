@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from inference.estimates import Status
 from service.problems import describe
-from service.streams.said import MARK, Said, said_from_bytes
+from service.streams.said import MARK, OWN, Said, said_from_bytes
 from simulator.errors import HybridTofError
 
 __all__ = ["answers_in", "answers_of", "encoded", "error_of", "more_of"]
@@ -48,7 +48,7 @@ def answers_of(said: Said) -> list[bytes]:
 
 def _of_one_count(count: int, heads: Texts, table: Array, tails: Texts) -> list[bytes]:
     """Return the answers to frames with equally many hypotheses."""
-    order = [*range(5), *range(9, 9 + 3 * count), 5, 6, 7, 8]
+    order = [*range(5), *range(OWN, OWN + 3 * count), 5, 6, 7, 8]
     every, n = _texts(table[order].ravel()), table.shape[1]
     *columns, latency = [every[k * n : (k + 1) * n] for k in range(len(order))]
     misfit, more = tails
@@ -81,7 +81,9 @@ def _laid(count: int, columns: Texts) -> list[bytes]:
 
 def _texts(values: NDArray[Any]) -> list[str]:
     """Return the JSON texts of numbers."""
-    text = orjson.dumps(np.ascontiguousarray(values), option=orjson.OPT_SERIALIZE_NUMPY)
+    # what was kept begins at any byte, and orjson reads whole numbers
+    values = np.require(values, requirements=["C", "A"])
+    text = orjson.dumps(values, option=orjson.OPT_SERIALIZE_NUMPY)
     return text[1:-1].decode("ascii").split(",")
 
 

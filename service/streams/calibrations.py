@@ -103,7 +103,7 @@ class Calibrations:
         except asyncio.CancelledError:
             # nobody waits for it any more: the stream asks for another one, or is gone. A service
             # that ends is no such reason: the next one goes on
-            if self._jobs.open and not self._closed:
+            if not self._closed:
                 with contextlib.suppress(HybridTofError):
                     await self._jobs.cancel(posterior, client)
             raise

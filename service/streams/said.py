@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 
 from inference.tracking.track import Track
 
-__all__ = ["MARK", "Said", "said_from_bytes", "said_of", "said_to_bytes"]
+__all__ = ["MARK", "OWN", "Said", "said_from_bytes", "said_of", "said_to_bytes"]
 
 MARK = b"\0"
 """The first byte of what `said_to_bytes` writes, with which no JSON text begins."""
 
+OWN = 9
+"""Rows of `Said.table` that every frame has, before those of its hypotheses."""
+
 _HEAD = struct.Struct("<cIIQ")
-_OWN = 9
 
 
 class Said(NamedTuple):
@@ -74,16 +76,16 @@ def said_of(
         See `Said`.
     """
     width = track.hypotheses_m.shape[1]
-    table = np.empty((_OWN + 3 * width, len(track)))
+    table = np.empty((OWN + 3 * width, len(track)))
     sd = track.sd_m
     table[0], table[1] = track.range_m, sd
     for row, part in zip(table[2:5], track.sd_parts_m, strict=True):
         row[:] = np.where(np.isfinite(sd), part, np.nan)
     table[5], table[6], table[7] = track.present, track.outlier, track.rate_m_s
     table[8] = latencies
-    table[_OWN::3] = track.hypotheses_m.T
-    table[_OWN + 1 :: 3] = track.hypotheses_sd_m.T
-    table[_OWN + 2 :: 3] = track.hypotheses_weight.T
+    table[OWN::3] = track.hypotheses_m.T
+    table[OWN + 1 :: 3] = track.hypotheses_sd_m.T
+    table[OWN + 2 :: 3] = track.hypotheses_weight.T
     return Said(
         np.array(sequences, dtype=np.int64),
         np.array(times, dtype=np.float64),

@@ -9,7 +9,8 @@ from inference.estimate import all_roots
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from tests.extreme.balls import exact, roots_of
-from tests.extreme.waves import WAVES, Wave, certified_roots, tally_waves, wave_error
+from tests.extreme.wave_scenes import Wave
+from tests.extreme.waves import WAVES, certified_roots, tally_waves, wave_error
 
 
 @pytest.mark.parametrize("technique", WAVES)

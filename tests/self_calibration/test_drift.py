@@ -154,6 +154,20 @@ def test_empty_frames_that_drift_renew_a_scene_without_a_doubt() -> None:
     assert (np.abs(np.array(TRUTH) - found[0]) > 2e-5).all()
 
 
+@pytest.mark.parametrize("far", [0.02, 0.5, -0.5])
+def test_a_scene_is_given_up_for_empty_frames_however_far_they_are(far: float) -> None:
+    """Ten to 250 standard deviations of the prior, as under a hand that is told to be nothing."""
+    n = 120
+    readings = np.array(TRUTH) + 8e-5 * np.random.default_rng(5).standard_normal((n, 2))
+    readings[60:] += far
+    frames = Frames(readings, np.arange(n) / 30, object_present=np.zeros(n, dtype=bool))
+    state, pieces = follow(PLAN, begin(PLAN), frames, range(1, n + 1))
+    (event,) = (piece.event for piece in pieces if piece.event is not None)
+    assert (event["kind"], event["sequence"]) == ("doubted", 91)
+    assert event["before"]["scene"]["crosstalk.w1"]["q95"] < 2 * TRUTH[0]
+    assert not state.calibrated
+
+
 def test_crosstalk_that_has_walked_is_no_object() -> None:
     """An empty scene whose crosstalk is off by 2 of its standard deviations."""
     n = 90

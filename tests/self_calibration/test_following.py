@@ -235,6 +235,9 @@ def test_empty_frames_that_move_give_a_scene_up() -> None:
         ("doubted", "frames without the object have moved")
     ]
     assert 120 < events[0]["sequence"] <= 120 + 2 * EVERY
+    before, after = (events[0][which]["scene"]["crosstalk.w1"] for which in ("before", "after"))
+    assert before["q05"] < TRUTH[0] < before["q95"]
+    assert after["q05"] > before["q95"]
     assert state.asked is not None  # empty frames alone are worth a calibration of crosstalk
 
 

@@ -85,8 +85,6 @@ async def until_told(http: httpx.AsyncClient, path: str, rest: list[bytes]) -> l
 class _Unending:
     """Jobs of which none ends."""
 
-    open = True
-
     def __init__(self) -> None:
         self.asked, self.cancelled = asyncio.Event(), asyncio.Event()
 

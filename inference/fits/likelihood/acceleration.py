@@ -24,7 +24,6 @@ __all__ = ["fill_bending"]
 Array = NDArray[np.float64]
 
 _STEP = 0.1  # of the whole step: second differences of smooth residuals
-_WHITENED = 2  # rows of a frame: the residuals of its readings
 
 
 @compiled

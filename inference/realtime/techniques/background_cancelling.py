@@ -187,4 +187,5 @@ BACKGROUND_CANCELLING = Technique(
     equations="4.73; of a sine wave docs/model.md, exact",
     roots="1 in (0, R) if c1^2 <= 32 c0 / 9; sine wave: 1 if kR <= pi, else up to 2 a half period",
     solve=_solve,
+    farthest_m=lambda _: math.inf,
 )

@@ -10,7 +10,11 @@ from inference.realtime.from_curve import candidates_of
 from inference.realtime.model_error import model_error_of
 from inference.realtime.motion import law_of_model
 from inference.realtime.solving.curves import both_phase, both_ratio
-from inference.realtime.techniques.differential import target_of, with_law
+from inference.realtime.techniques.differential import (
+    farthest_by_derivatives,
+    target_of,
+    with_law,
+)
 from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor
 
@@ -32,19 +36,18 @@ def _solve(task: Task) -> TechniqueResult:
     sensor, known = task.sensor, task.known
     rate = derivatives_of(sensor, known.crosstalk, task.frames, _OWN)
     targets = target_of(task, rate)
-    high = known.get("background.distance_m")
+    high = min(known.get("background.distance_m"), farthest_by_derivatives(sensor))
     if isinstance(sensor, PulsedSensor):
         unit = known.unit
         candidates, _ = candidates_of(
             task,
             both_ratio.CURVE,
-            min(high, sensor.r0),
+            high,
             targets.top / unit,
             targets.sd / unit,
             targets.bottom,
         )
     else:
-        high = min(high, sensor.max_range_m / 2)
         candidates, _ = candidates_of(task, both_phase.CURVE, high, targets.top, targets.sd)
         if task.physical:
             candidates.roots[targets.contact] = np.nan
@@ -85,4 +88,5 @@ BACKGROUND_CANCELLING_DIFFERENTIAL = Technique(
     equations="4.83; of a sine wave docs/model.md, exact",
     roots="2 as a rule, 1 for a bright object, up to 3; sine wave: more at high frequencies",
     solve=_solve,
+    farthest_m=farthest_by_derivatives,
 )

@@ -121,4 +121,5 @@ BACKGROUND_INTENSITY = Technique(
     equations="4.76; of a sine wave docs/model.md, exact",
     roots="1 in (0, R) for c1' >= 0; sine wave: 1 if kR <= pi and c1' >= 0, else several",
     solve=_solve,
+    farthest_m=lambda _: math.inf,
 )

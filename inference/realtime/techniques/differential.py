@@ -21,9 +21,16 @@ from inference.realtime.motion import MotionLaw, law_of_model, law_of_motion
 from inference.realtime.net import Net, net_readings
 from inference.realtime.solving.curves import differential_phase, differential_ratio
 from inference.technique import Task, Technique
-from simulator.sensor import PulsedSensor
+from simulator.sensor import PulsedSensor, Sensor
 
-__all__ = ["DIFFERENTIAL", "Targets", "ranges_by_derivatives", "target_of", "with_law"]
+__all__ = [
+    "DIFFERENTIAL",
+    "Targets",
+    "farthest_by_derivatives",
+    "ranges_by_derivatives",
+    "target_of",
+    "with_law",
+]
 
 Array = NDArray[np.float64]
 
@@ -106,6 +113,18 @@ def target_of(task: Task, rate: Net) -> Targets:
         return Targets(np.where(usable, phase, np.nan), np.ones_like(phase), sd, contact, still)
 
 
+def farthest_by_derivatives(sensor: Sensor) -> float:
+    """Return the range beyond which derivatives tell none [m].
+
+    Parameters
+    ----------
+    sensor : Sensor
+        Of a sine wave phases of derivatives are known modulo pi: half its unambiguous range.
+    """
+    pulsed = isinstance(sensor, PulsedSensor)
+    return sensor.max_range_m if pulsed else sensor.max_range_m / 2
+
+
 def ranges_by_derivatives(task: Task, uneven_too: bool) -> TechniqueResult:
     """Return the ranges that derivatives tell.
 
@@ -120,10 +139,7 @@ def ranges_by_derivatives(task: Task, uneven_too: bool) -> TechniqueResult:
     rate = derivatives_of(sensor, known.crosstalk, task.frames, OWN, uneven_too)
     targets = target_of(task, rate)
     pulsed = isinstance(sensor, PulsedSensor)
-    # phases of derivatives are known modulo pi: half the unambiguous range of a sine wave
-    high = sensor.max_range_m if pulsed else sensor.max_range_m / 2
-    if task.high_m is not None:
-        high = task.high_m
+    high = farthest_by_derivatives(sensor) if task.high_m is None else task.high_m
     bounds = None
     if task.scene.motion == "tangential":
         candidates = _fixed_distance(task, targets, high)
@@ -272,4 +288,5 @@ DIFFERENTIAL = Technique(
     ),
     # along the straight line of tangential motion a chord has the direction of the derivative
     solve=lambda task: ranges_by_derivatives(task, task.scene.motion == "tangential"),
+    farthest_m=farthest_by_derivatives,
 )

@@ -84,5 +84,5 @@ INTENSITY = Technique(
     equations="4.1-4.3",
     roots="1 if c1 >= -1.886 sqrt(c0), else up to 3",
     solve=_solve,
-    beyond_r0=True,
+    farthest_m=lambda _: np.inf,
 )
