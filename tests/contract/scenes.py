@@ -83,6 +83,24 @@ class Setting:
         }
         return dataclasses.replace(self, name=f"{self.name}, and {term}", **changes[term])
 
+    def without(self, path: str) -> "Setting":
+        """Return the same readings where one number of the object or the wall is unknown.
+
+        Parameters
+        ----------
+        path : str
+            Of the scene, such as ``background.shadow.c0``.
+        """
+        part, *between, name = path.split(".")
+        unknown = dict(self.stated[part])
+        holder = unknown
+        for inner in between:
+            holder[inner] = dict(holder[inner])
+            holder = holder[inner]
+        holder[name] = {"prior": "lognormal", "median": holder[name], "sigma": 0.5}
+        stated = self.stated | {part: unknown}
+        return dataclasses.replace(self, name=f"{self.name}, {path} unknown", stated=stated)
+
     def contains(self, term: str) -> bool:
         """Whether the readings contain a term."""
         return {

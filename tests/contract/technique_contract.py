@@ -30,6 +30,7 @@ __all__ = [
     "immunities_are_those_declared",
     "model_errors_are_right",
     "model_errors_of_many_frames_are_right",
+    "needs_are_those_declared",
     "of_single_frames",
     "settings_of",
 ]
@@ -208,6 +209,27 @@ def model_errors_of_many_frames_are_right(technique: Technique, kind: str) -> No
     low = float(special.chdtri(_ERRING, 1 - _ALARM / 2)) / _ERRING
     high = float(special.chdtri(_ERRING, _ALARM / 2)) / _ERRING
     assert low < float(np.mean(sums)) < high, (technique.name, low, np.mean(sums), high)
+
+
+def needs_are_those_declared(technique: Technique, kind: str) -> None:
+    """Check each number of a scene: what a technique does not declare, it answers right without.
+
+    Every scene that is served is tried with one of its known numbers unknown, a normal law of its
+    logarithm: it is refused, or the answer is as right as in `answers_are_right`.
+    """
+    sensor = sensor_of(kind)
+    for setting in settings_of(technique, kind):
+        truth, frames = _frames(technique, sensor, setting, 5)
+        for path in known_of(setting.scene).numbers:
+            less = setting.without(path)
+            known = known_of(less.scene)
+            assert path not in known.numbers
+            if obstacle(technique, sensor, less.scene, known, frames) is not None:
+                continue
+            result = _solve(technique, sensor, less, frames)
+            if result.range_bounds_m is None:
+                worst = float(np.nanmax(_misses(result, truth)))
+                assert worst < _RIGHT, f"{technique.name}, {less.name}: {worst:.3g} sd off"
 
 
 def _binomial_band(n: int) -> tuple[float, float]:

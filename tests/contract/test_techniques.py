@@ -20,6 +20,7 @@ from tests.contract.technique_contract import (
     immunities_are_those_declared,
     model_errors_are_right,
     model_errors_of_many_frames_are_right,
+    needs_are_those_declared,
     of_single_frames,
     settings_of,
 )
@@ -105,6 +106,26 @@ def test_errors_of_the_model_of_many_frames(technique: Technique, kind: str) -> 
 @pytest.mark.parametrize(("technique", "kind"), EVERY)
 def test_immunities(technique: Technique, kind: str) -> None:
     immunities_are_those_declared(technique, kind)
+
+
+@pytest.mark.parametrize(("technique", "kind"), SINGLE)
+def test_needs(technique: Technique, kind: str) -> None:
+    needs_are_those_declared(technique, kind)
+
+
+@pytest.mark.parametrize(
+    ("technique", "kind", "need"),
+    [
+        pytest.param(*case.values, need, id=f"{case.id}-{need}")
+        for case in SINGLE
+        for need in case.values[0].needs  # type: ignore[union-attr]
+    ],
+)
+def test_a_need_that_is_not_declared_is_noticed(technique: Technique, kind: str, need: str) -> None:
+    needs = tuple(other for other in technique.needs if other != need)
+    # wrong, or there is no number to compute with
+    with pytest.raises((AssertionError, KeyError, ZeroDivisionError)):
+        needs_are_those_declared(dataclasses.replace(technique, needs=needs), kind)
 
 
 @pytest.mark.parametrize(("technique", "kind"), EVERY)
