@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.tracking.borrowed import borrowed
-from inference.tracking.hypotheses import CROSSTALK1, CROSSTALK2, U
+from inference.tracking.hypotheses import CROSSTALK1, CROSSTALK2, WITHOUT_CROSSTALK, U
 from inference.tracking.readings_table import (
     FIRST,
     LOG_PRIOR,
@@ -38,8 +38,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-
-_WITHOUT_CROSSTALK = 2  # own states of a hypothesis that does not learn it
 
 
 class TrackedFrame(NamedTuple):
@@ -138,7 +136,7 @@ def _add_at(root: Root, u: float, gain: float, added: Added, table: ReadingsTabl
     i, t = cell_of(u, table)
     spread = added.spread
     own = spread.shape[1] - nuisance_count(table)
-    if own == _WITHOUT_CROSSTALK:
+    if own == WITHOUT_CROSSTALK:
         return add_root(root, nuisance_root(u, gain, table))
     for j in range(spread.shape[1]):
         f1, f2 = spread[FIRST, j], spread[SECOND, j]
@@ -177,7 +175,7 @@ def _felt_at(
     n = X.shape[0]
     f1, f2 = nuisance_at(i, t, j, table)
     f1, f2 = gain * (f1 + slopes[0] * X[U, n + j]), gain * (f2 + slopes[1] * X[U, n + j])
-    if n > _WITHOUT_CROSSTALK:
+    if n > WITHOUT_CROSSTALK:
         f1, f2 = f1 + X[CROSSTALK1, n + j], f2 + X[CROSSTALK2, n + j]
     return f1, f2
 

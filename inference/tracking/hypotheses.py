@@ -24,6 +24,7 @@ __all__ = [
     "ROUGHNESS",
     "RUNNING",
     "TIME",
+    "WITHOUT_CROSSTALK",
     "Hypotheses",
     "Scratch",
     "U",
@@ -40,6 +41,7 @@ Array = NDArray[np.float64]
 
 # states of a hypothesis: log r, its rate, crosstalk, and the log r at which tangents are taken
 U, V, CROSSTALK1, CROSSTALK2, ANCHOR = range(5)
+WITHOUT_CROSSTALK = 2  # own states of a hypothesis that does not learn it
 # places in `Hypotheses.numbers`
 TIME, PENDING, RUNNING, COUNT, LOST, ROUGHNESS = range(6)
 _LEAST = -700.0  # log of a weight that underflows
@@ -88,7 +90,7 @@ def copied(of: Hypotheses) -> Hypotheses:
 @compiled
 def learns_crosstalk(of: Hypotheses) -> bool:
     """Tell whether the crosstalk is part of a hypothesis."""
-    return bool(of.X.shape[1] > 2)
+    return bool(of.X.shape[1] > WITHOUT_CROSSTALK)
 
 
 @compiled

@@ -31,6 +31,7 @@ from inference.tracking.readings_table import (
     object_at,
 )
 from inference.tracking.roots import UNIT, add_root, solve
+from inference.tracking.second_order import add_products
 from inference.tracking.shared_error import NOT_SHARED, follow, straighten
 from inference.tracking.square_root import Linear, update
 from simulator.compiled import compiled
@@ -102,6 +103,8 @@ def _of_readings(
     if not table.noise.plain:
         o1, o2 = object_at(t.u, table)
         noise = noise_root(m1, m2, gain * o1, gain * o2, table.noise)
+    if learns_crosstalk(of) and not prior.position.born:
+        noise = add_products(noise, t.u, gain, math.sqrt(1.0 / prior.position.precision), table)
     i, part = cell_of(t.u, table)
     for j in range(nuisance.shape[1]):
         g1, g2 = nuisance_at(i, part, j, table)

@@ -17,6 +17,7 @@ from inference.tracking.frame_density import (
     log_known,
     spread_at,
 )
+from inference.tracking.hypotheses import WITHOUT_CROSSTALK
 from inference.tracking.readings_table import ReadingsTable, noise_root, nuisance_count, object_at
 from inference.tracking.roots import UNIT, add_root, solve
 from simulator.compiled import compiled
@@ -26,7 +27,6 @@ __all__ = ["PeakedMode", "bends", "refined"]
 _CLOSE = 0.05  # standard deviations within which a mode has to be found
 _STEPS = 8
 _HALVINGS = 4
-_WITHOUT_CROSSTALK = 2  # own states of a hypothesis that does not learn it
 
 
 class PeakedMode(NamedTuple):
@@ -55,7 +55,7 @@ def bends(own: int, table: ReadingsTable) -> bool:
     table : ReadingsTable
         The scene.
     """
-    without_crosstalk = own == _WITHOUT_CROSSTALK
+    without_crosstalk = own == WITHOUT_CROSSTALK
     return without_crosstalk and nuisance_count(table) > 0 and table.channels == 2
 
 

@@ -24,6 +24,7 @@ from inference.tracking.merging import merge
 from inference.tracking.motion import Motion, Rules, motion_over, presence_over
 from inference.tracking.readings_table import ReadingsTable, mean_at
 from inference.tracking.roots import Root, add_factor
+from inference.tracking.second_order import add_products
 from inference.tracking.shared_error import certainty, shared_part
 from inference.tracking.square_root import move
 from simulator.compiled import compiled
@@ -154,6 +155,7 @@ def prior_of(
         _, _, share = shared_part(of, row)
         _, _, d1, d2 = mean_at(x[row, ANCHOR], table)
         slope1, slope2 = slope1 + gain * share * d1, slope2 + gain * share * d2
+        root = add_products(root, x[row, U], gain, math.sqrt(1.0 / precision), table)
     rate = Rate(x[row, V], 0.0, 0.0)
     if table.by_rate:
         rate = _rate_given_u(of, row, precision)

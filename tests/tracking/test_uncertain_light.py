@@ -53,3 +53,38 @@ def test_light_that_is_not_as_expected_corrects_no_range_too_far(kind: str, fact
         told_of += int(np.isfinite(off).sum())
     assert told_of > 300
     assert worst < 5.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_light_that_is_not_as_expected_is_not_taken_for_crosstalk(kind: str) -> None:
+    """The same with crosstalk unknown by 30 read noises and c2 1.8 times as large: 20 tracks.
+
+    Without the product of what motion adds to log r and what the light is off, how the readings
+    turn passed for crosstalk: ranges were 30 (pulses) and 27 (sine waves) standard deviations off.
+    Frames of a track err together; five standard deviations are asked of all, 3.3 is the worst.
+    """
+    sd = 3e-4
+    shape = {"c0": 0.0769, "c1": -0.123}
+    told = {
+        "object": {**shape, "c2": {"prior": "lognormal", "median": C2, "sigma": 0.4}},
+        "crosstalk": [{"prior": "normal", "mean": 0.0, "sd": sd}] * 2,
+        "discrepancy": 0,
+        "range_m": {"prior": "loguniform", "low": 0.2, "high": 1.5},
+        "joint": {"unknowns": ["object.c2"], "modes": [{"mean": [0.0], "covariance": [[1.0]]}]},
+    }
+    sensor = parse_sensor({**KINDS[kind], "noise": {"read": [1e-5, 1e-5]}})
+    settings = TrackingSettings(visit_s=1e5, absence_s=1e5, rate_sd=0.3)
+    model = tracker(sensor, parse_scene(told), settings)
+    time, worst, told_of = 0.02 * np.arange(20.0), 0.0, 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        crosstalk = (sd * rng.standard_normal(2)).tolist()
+        truth = parse_scene({"object": {**shape, "c2": 1.8 * C2}, "crosstalk": crosstalk})
+        r = 0.5 * np.exp(0.5 * np.sin(0.6 * time + rng.uniform(0.0, 6.0)))
+        path = SampledTrajectory(range_m=r.tolist(), time_s=time.tolist())
+        _, found = step(model, model.first, simulate(sensor, truth, path, rng).frames)
+        off = np.abs(found.range_m - r) / found.sd_m
+        worst = max(worst, float(np.nanmax(off)))
+        told_of += int(np.isfinite(off).sum())
+    assert told_of > 300
+    assert worst < 5.0
