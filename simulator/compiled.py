@@ -28,6 +28,7 @@ __all__ = [
     "given_up_s",
     "hot",
     "ready_only",
+    "soon",
     "when_compiling",
 ]
 
@@ -37,6 +38,8 @@ R = TypeVar("R")
 # what making machine code takes, about: to import numba and start it, for each function that a
 # kernel is made of, and to read from the disk what was made before [s]
 _START_S, _MAKE_S, _LOAD_S = 0.4, 0.1, 0.04
+# share of the time of making machine code for which the interpreter may try what is called often
+_HOT = 0.1
 # more elements than the interpreter gets through in such times
 _MANY = 100_000
 _AT_ONCE = "KERNELS_COMPILE"
@@ -82,6 +85,24 @@ def ready_only() -> Iterator[None]:
         yield
     finally:
         _this_thread.ready_only = False
+
+
+@contextlib.contextmanager
+def soon(*kernels: Callable[..., Any]) -> Iterator[None]:
+    """Let kernels be compiled soon in this thread, as `hot` does everywhere.
+
+    For who calls them so often that the interpreter will not come to the end of it.
+    """
+    before = _soon()
+    _this_thread.soon = before | set(kernels)
+    try:
+        yield
+    finally:
+        _this_thread.soon = before
+
+
+def _soon() -> frozenset[Any]:
+    return getattr(_this_thread, "soon", frozenset())
 
 
 def _in_a_hurry() -> bool:
@@ -230,7 +251,8 @@ class Kernel:
     def _left_s(self, kind: object) -> float:
         """Return for how long the interpreter may still try to answer such calls [s]."""
         start_s = 0.0 if _machine else _START_S
-        cost_s = start_s + (_LOAD_S if self._kept() else self.patience * self._make_s)
+        patience = min(self.patience, _HOT) if self in _soon() else self.patience
+        cost_s = start_s + (_LOAD_S if self._kept() else patience * self._make_s)
         return cost_s - self._spent_s.get(kind, 0.0)
 
     def _may_try(self, args: tuple[Any, ...]) -> bool:
@@ -294,5 +316,5 @@ def compiled_for_both(function: Callable[P, R]) -> Callable[P, R]:
 
 def hot(kernel: Callable[P, R]) -> Callable[P, R]:
     """Say of a kernel that who calls it calls it thousands of times: it is compiled soon."""
-    cast("Kernel", kernel).patience = 0.1
+    cast("Kernel", kernel).patience = _HOT
     return kernel

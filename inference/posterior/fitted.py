@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
+from inference.fits.likelihood.levenberg_marquardt import levenberg_marquardt
 from inference.fits.likelihood.multistart import find_maxima
 from inference.fits.likelihood.problem import fit_problem
 from inference.frame.blocks import DISPLACEMENT, DISPLACEMENT_RATE
 from inference.posterior.job import Job
 from inference.posterior.sampling.start import Optimum, climb, refine
+from simulator.compiled import soon
 from simulator.parameters import OFFSET
 
 __all__ = ["fitted_optima"]
@@ -47,7 +49,8 @@ def fitted_optima(job: Job, density: CollapsedDensity) -> list[Optimum]:
     problem = fit_problem(job.sensor, job.scene, job.frames.select(job.usable))
     if problem.names != names:
         return []
-    fits = find_maxima(problem)
+    with soon(levenberg_marquardt):  # with terms beside the object a start takes hundreds of steps
+        fits = find_maxima(problem)
     found = []
     for fit in fits[:_MOST]:
         if not fit.deviance < fits[0].deviance + _DEVIANCE:

@@ -303,3 +303,27 @@ def test_who_is_in_a_hurry_gets_what_is_there(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setenv("KERNELS_COMPILE", "always")
     with simulator.compiled.ready_only(), pytest.raises(simulator.compiled.NotReadyError):
         kernel(3.0)
+
+
+def test_who_calls_often_waits_a_tenth_as_long_for_the_interpreter(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits: list[float] = []
+
+    def run(_: Any, args: tuple[float], most_s: float) -> tuple[float, float]:
+        limits.append(most_s)
+        return args[0], 0.0
+
+    monkeypatch.setattr("simulator.uncompiled.run", run)
+    monkeypatch.setattr(simulator.compiled, "_START_S", 0.0)
+    monkeypatch.delenv("KERNELS_COMPILE", raising=False)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    kernel: Any = simulator.compiled.compiled(half)
+    with simulator.compiled.soon(kernel), simulator.compiled.soon():
+        kernel(3.0)
+    kernel(3.0)
+    often: Any = simulator.compiled.hot(simulator.compiled.compiled(half))
+    with simulator.compiled.soon(often):
+        often(3.0)
+    assert limits == pytest.approx([0.1 * limits[1], limits[1], 0.1 * limits[1]])
+    assert limits[1] > 0.0

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 from inference.fits.likelihood.arguments import Bounds, Fit, Place
 from inference.fits.likelihood.deviance import deviance
 from inference.fits.likelihood.linearisation import fill_projected
-from simulator.compiled import compiled
+from simulator.compiled import compiled, hot
 
 __all__ = ["profile_slopes"]
 
 Array = NDArray[np.float64]
 
 
+@hot
 @compiled
 def profile_slopes(matrix: Array, place: Place, fit: Fit) -> float:
     """Return the deviance with every range at its best, and fill its projected rows.
