@@ -104,7 +104,7 @@ lowest: ## Run the tests that take seconds with the lowest versions that pyproje
 	uv pip install --quiet --python out/lowest/bin/python --no-deps --no-build-isolation --editable .
 	NUMBA_CACHE_DIR=$(CURDIR)/out/lowest/kernels out/lowest/bin/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow" $(LOWEST)
 
-versions: ## Run the tests that take seconds on every Python that numba knows, 3.11 to 3.13 (needs uv)
+versions: ## Run the tests that take seconds on Python 3.11 to 3.13 (needs uv, and finds or fetches these)
 	for version in 3.11 3.12 3.13; do \
 		made=out/python-$$version; python=$$made/bin/python; \
 		uv venv --quiet --clear --python $$version $$made && \

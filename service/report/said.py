@@ -1,6 +1,8 @@
 """What techniques are called where people read."""
 
-__all__ = ["said"]
+import re
+
+__all__ = ["in_words", "said"]
 
 _SAID = {
     "conventional": "time of flight alone",
@@ -20,3 +22,9 @@ _SAID = {
 def said(name: str) -> str:
     """Return what a technique is called where people read."""
     return _SAID.get(name, name.replace("_", " "))
+
+
+def in_words(reason: str) -> str:
+    """Return a reason with the names of techniques as `said` has them."""
+    names = (name for name in _SAID if "_" in name)
+    return re.sub(rf"\b({'|'.join(names)})\b", lambda found: f"the {said(found[0])}", reason)

@@ -40,7 +40,9 @@ LEGEND = (
     "frame with several ranges holds the truth where one of theirs does. CRPS: the continuous "
     "ranked probability score over the range, which for a number without interval would be its "
     "error. A frame: processor time of a call over its frames; alone: of a frame that comes by "
-    "itself. Memory: most that a call held. Effective draws a second: after a passed verdict."
+    "itself. Memory: most that a call held. Effective draws a second: after a passed verdict. "
+    "Frames of one fit or posterior err together, and few of these are measured here: how often "
+    "their intervals hold the truth is told by many (docs/calibration.md, docs/coverage.md)."
 )
 _WIDTHS = (32, 24, 9, 9, 7, 9, 10, 8, 9, 9, 9, 9, 8, 9)
 _HEADS = (
@@ -92,7 +94,7 @@ def _memory(size: int | None) -> str:
 
 
 def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}" if value < 1e4 else f"{value:,.0f}"
+    return "-" if value is None else f"{value:.3g}" if value < 100 else f"{value:,.0f}"
 
 
 def method_of(row: Row) -> str:
