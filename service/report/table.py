@@ -42,7 +42,7 @@ LEGEND = (
     "error. A frame: processor time of a call over its frames; alone: of a frame that comes by "
     "itself. Memory: most that a call held. Effective draws a second: after a passed verdict. "
     "Frames of one fit or posterior err together, and few of these are measured here: how often "
-    "their intervals hold the truth is told by many (docs/calibration.md, docs/coverage.md)."
+    "their intervals hold the truth is told by many: docs/coverage.md and docs/calibration.md."
 )
 _WIDTHS = (32, 24, 9, 9, 7, 9, 10, 8, 9, 9, 9, 9, 8, 9)
 _HEADS = (
