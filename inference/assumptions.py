@@ -1,6 +1,8 @@
 """What an answer supposes that no reading can test, and that moves ranges where it is wrong."""
 
+from simulator.frames import Frames
 from simulator.scene import Scene
+from simulator.sensor import Sensor
 
 __all__ = ["assumptions_of"]
 
@@ -11,17 +13,26 @@ _OWN_SHADOW = (
 )
 
 
-def assumptions_of(scene: Scene) -> tuple[str, ...]:
+_TEMPERATURE = (
+    "gain and delay do not follow the temperature: temperature_k is given and not used, since the "
+    "sensor states no coefficients in `temperature`"
+)
+
+
+def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, ...]:
     """Return what answers about a scene suppose without a check.
 
     Parameters
     ----------
-    scene : Scene
-        The scene.
+    scene, sensor, frames : Scene, Sensor, Frames
+        The request.
 
     Returns
     -------
     tuple of str
         For a person; empty where everything is either stated in numbers or unknown.
     """
-    return (_OWN_SHADOW,) if scene.shadow_is_object else ()
+    supposed = (_OWN_SHADOW,) if scene.shadow_is_object else ()
+    if sensor.temperature is None and frames.temperature_k is not None:
+        supposed = (*supposed, _TEMPERATURE)
+    return supposed

@@ -9,8 +9,8 @@ from inference.known import known_of
 from inference.plan import Plan, cheapest, obstacle, plan
 from inference.realtime.registry import TECHNIQUES
 from inference.shared_error import with_shared_error
-from inference.technique import Task
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
+from inference.temperature import of_known_temperature, task_of, with_untold
 from simulator.errors import InvalidInputError, Problem, RefusedError
 from simulator.frames import Frames
 from simulator.joint_scene import around, centre
@@ -83,7 +83,7 @@ def estimate_planned(
     InvalidInputError
         As of `estimate`.
     """
-    supposed = assumptions_of(scene)
+    supposed = assumptions_of(scene, sensor, frames)
     if techniques is None:
         if choice.chosen is None:
             return Estimates(None, (), choice.left_out, supposed)
@@ -120,9 +120,13 @@ def estimate_planned(
 def _run(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> TechniqueResult | LeftOut:
     start = time.perf_counter()
     try:
-        result = _solved(sensor, scene, frames, name)
+        told = of_known_temperature(sensor, frames)
+        used = frames if told is None else frames.select(told)
+        result = _solved(sensor, scene, used, name)
     except RefusedError as error:
         return LeftOut(name, str(error))
+    if told is not None:
+        result = with_untold(result, told)
     return _taken(result, time.perf_counter() - start)
 
 
@@ -136,17 +140,17 @@ def _taken(result: TechniqueResult, seconds: float) -> TechniqueResult:
 def _solved(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> TechniqueResult:
     solve = ALL_TECHNIQUES[name].solve
     if scene.joint is None or name not in TECHNIQUES:
-        return solve(Task(sensor, scene, frames, known_of(scene, sensor)))
+        return solve(task_of(sensor, scene, frames, known_of(scene, sensor)))
 
     def at(of: Sensor, stated: Scene) -> TechniqueResult:
         known = known_of(stated, of)
         reason = obstacle(ALL_TECHNIQUES[name], of, stated, known, frames)
         if reason is not None:
             raise RefusedError(f"a standard deviation off the scene's centre it {reason}")
-        return solve(Task(of, stated, frames, known, physical=False))
+        return solve(task_of(of, stated, frames, known, physical=False))
 
     of, middle = centre(sensor, scene)
-    result = solve(Task(of, middle, frames, known_of(middle, of)))
+    result = solve(task_of(of, middle, frames, known_of(middle, of)))
     pairs = ((at(*plus), at(*minus)) for plus, minus in around(sensor, scene))
     return with_shared_error(result, pairs)
 
@@ -182,5 +186,8 @@ def all_roots(
     reason = obstacle(TECHNIQUES[technique], sensor, scene, known, frames)
     if reason is not None:
         raise InvalidInputError.at("/technique", reason)
-    task = Task(sensor, scene, frames, known, physical=False, high_m=high_m)
-    return TECHNIQUES[technique].solve(task)
+    told = of_known_temperature(sensor, frames)
+    used = frames if told is None else frames.select(told)
+    task = task_of(sensor, scene, used, known, physical=False, high_m=high_m)
+    found = TECHNIQUES[technique].solve(task)
+    return found if told is None else with_untold(found, told)

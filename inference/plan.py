@@ -17,11 +17,12 @@ from simulator.joint_scene import centre
 from simulator.remembered import remembered
 from simulator.scene import Scene
 from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor
-from simulator.sensor_unknowns import GAIN
+from simulator.sensor_unknowns import DRIFTS, GAIN
 
 __all__ = ["Plan", "cheapest", "obstacle", "plan"]
 
 _MOST_HALF_TURNS = 1000.0  # of phase to the background, each of which may hold a root
+_OF_GAIN = (GAIN, DRIFTS[0])
 _FEW = 1000  # frames whose estimates take no longer than their plan
 
 
@@ -87,7 +88,7 @@ def obstacle(
                 f"the background lies {turns:.3g} half turns of phase away, and a frame may have "
                 "as many roots; a lower frequency would tell them apart"
             )
-    of_sensor = _sensor_obstacle(technique, sensor)
+    of_sensor = _sensor_obstacle(technique, sensor, known)
     if of_sensor is not None:
         return of_sensor
     missing = [path for path in technique.needs if not known.has(path)]
@@ -98,18 +99,24 @@ def obstacle(
     return None
 
 
-def _sensor_obstacle(technique: Technique, sensor: Sensor) -> str | None:
+def _sensor_obstacle(technique: Technique, sensor: Sensor, known: Known) -> str | None:
     """Return why a technique cannot serve a sensor that is not calibrated, None if it can."""
     fits = technique.name not in REALTIME
+    of = sensor.temperature
+    if of is not None and of.delay_drift_s_per_k is not None and known.crosstalk is None:
+        return (
+            "the sensor's delay follows its temperature and crosstalk does not: it has to be known "
+            "to be taken apart; ask a posterior, for a calibrated scene"
+        )
     if fits and isinstance(sensor, PulsedSensor) and sensor.timing_offset_s is not None:
         return "fits over many frames take no timing_offset_s; ask a posterior"
     missing = [
         path
         for path in sensor.unknown
         if fits
-        or (path == GAIN and "object.c2" in technique.needs)
+        or (path in _OF_GAIN and "object.c2" in technique.needs)
         # neither w2 nor the modulus depends on when light comes
-        or (path != GAIN and technique.name != "intensity")
+        or (path not in _OF_GAIN and technique.name != "intensity")
     ]
     if missing:
         return (
@@ -149,7 +156,8 @@ def plan(sensor: Sensor, scene: Scene, frames: Frames | None = None) -> Plan:
     """
     if frames is None or len(frames) > _FEW:
         return _planned(sensor, scene, frames)
-    if frames.object_present is not None or sensor.full_scale is not None:
+    ruling_out = frames.object_present, sensor.full_scale, sensor.temperature
+    if any(each is not None for each in ruling_out):
         return _planned(sensor, scene, frames)  # some of the frames may be ruled out
     timed, derived = frames.time_s is not None, frames.derivatives is not None
     return _planned_for(sensor, scene, len(frames), timed, derived)

@@ -100,10 +100,14 @@ class IdentifiabilityRequest(SystemDescription):
         To how much a ruler or a robot tells the range of each frame [m]; null where nothing does.
     displacement_sd_m : list of float or null, optional
         The same of odometry, which tells ranges up to one offset that all frames share.
+    temperature_k : list of float, optional
+        Temperature of a sensor that has temperature coefficients in every frame [K]; left out: that
+        at which it was calibrated.
     """
 
     ranges_m: Annotated[list[Positive], _PLANNED]
     known_range_sd_m: Annotated[list[Positive | None], _PLANNED] | None = None
     displacement_sd_m: Annotated[list[Positive | None], _PLANNED] | None = None
     object_present: Annotated[list[bool], _PLANNED] | None = None
+    temperature_k: Annotated[list[Positive], _PLANNED] | None = None
     at: Annotated[dict[Name, float], pydantic.Field(max_length=64)] | None = None

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from simulator.errors import InvalidInputError, Problem
 from simulator.known_ranges import MAY_BE_NULL, known_range_problems, telling
 from simulator.sensor import Sensor
+from simulator.temperature import temperature_problems
 from simulator.validated import Validated
 
 __all__ = ["FrameColumns", "Frames", "check_frames", "frames_from_columns"]
@@ -41,6 +42,7 @@ class FrameColumns(Validated):
     known_range_sd_m: NullableColumn | None = None
     displacement_m: NullableColumn | None = None
     displacement_sd_m: NullableColumn | None = None
+    temperature_k: NullableColumn | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -65,6 +67,9 @@ class Frames:
         is known. Posteriors and trackers use them.
     displacement_m, displacement_sd_m : ndarray, shape (n,), optional
         The same of ranges less one offset of all frames, as odometry tells them.
+    temperature_k : ndarray, shape (n,), optional
+        Temperature of the sensor [K]; nan where it is not known. Of a sensor without temperature
+        coefficients it is not used.
     """
 
     readings: Array
@@ -76,6 +81,7 @@ class Frames:
     known_range_sd_m: Array | None = None
     displacement_m: Array | None = None
     displacement_sd_m: Array | None = None
+    temperature_k: Array | None = None
 
     def __len__(self) -> int:
         return int(self.readings.shape[0])
@@ -171,6 +177,7 @@ def frames_from_columns(
             problems.append(Problem("/gain", "must be positive"))
     if not problems:
         problems = known_range_problems(arrays, sensor.max_range_m)
+        problems += temperature_problems(sensor.temperature, arrays.get("temperature_k"))
     if problems:
         raise InvalidInputError(*problems)
     readings = np.empty((n, 2))
@@ -184,6 +191,7 @@ def frames_from_columns(
         gain=arrays.get("gain"),
         object_present=arrays.get("object_present"),
         **telling(arrays),
+        temperature_k=arrays.get("temperature_k"),
     )
 
 
@@ -209,7 +217,7 @@ def check_frames(sensor: Sensor, frames: Frames) -> None:
     ------
     InvalidInputError
         A pointer below /frames for each column that is empty, of another length, not finite, or
-        (gain) not positive.
+        (gain, temperature_k) not positive.
     """
     first, second = sensor.columns
     readings = np.asarray(frames.readings)

@@ -12,6 +12,7 @@ from simulator.errors import RefusedError, listed
 from simulator.parameters import parameters_of
 from simulator.scene import Scene, Shadow
 from simulator.sensor import Sensor
+from simulator.sensor_unknowns import with_numbers
 from simulator.validated import is_number
 
 __all__ = ["around", "centre"]
@@ -119,6 +120,4 @@ def _at(
         if shadow and isinstance(scene.background.shadow, Shadow):
             update["shadow"] = scene.background.shadow.model_copy(update=shadow)
         changes["background"] = scene.background.model_copy(update=update)
-    given = of("sensor.")
-    known = sensor.model_copy(update=given) if given else sensor
-    return known, scene.model_copy(update=changes)
+    return with_numbers(sensor, numbers), scene.model_copy(update=changes)

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 _KNOWN = ("known_range_m", "known_range_sd_m")
 _MOVED = ("displacement_m", "displacement_sd_m")
-MAY_BE_NULL = (*_KNOWN, *_MOVED)
+MAY_BE_NULL = (*_KNOWN, *_MOVED, "temperature_k")
 """Columns whose entries may be null, which as numbers are nan: there nothing is known."""
 
 # false alarms of ranges and displacements that agree: one set of frames in a billion
@@ -36,7 +36,7 @@ def known_range_problems(columns: Mapping[str, NDArray[Any]], max_range_m: float
     list of Problem
         For each column its first bad entry.
     """
-    if columns.keys().isdisjoint(MAY_BE_NULL):
+    if columns.keys().isdisjoint((*_KNOWN, *_MOVED)):
         return []
     problems = [
         Problem(f"/{name}", f"is missing, and {other} is given")

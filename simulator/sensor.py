@@ -11,6 +11,7 @@ from simulator.constants import SPEED_OF_LIGHT
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.priors import LEAST_LOG_MASS
 from simulator.quantity import PositiveQuantity, Quantity
+from simulator.temperature import Temperature
 from simulator.validated import NonNegative, Positive, Validated, problems_of
 
 __all__ = [
@@ -67,6 +68,7 @@ class _AnySensor(Validated):
     gain: PositiveQuantity = 1.0
     noise: Noise
     full_scale: PositivePair | None = None
+    temperature: Temperature | None = None
 
     @pydantic.field_validator("gain")
     @classmethod
@@ -85,7 +87,11 @@ class _AnySensor(Validated):
     @property
     def quantities(self) -> dict[str, Quantity]:
         """What may be unknown of the sensor, by its path; what is left out is not among them."""
-        return {"sensor.gain": self.gain}
+        of: dict[str, Quantity] = {"sensor.gain": self.gain}
+        if self.temperature is not None:
+            drifts = self.temperature.quantities.items()
+            of |= {f"sensor.temperature.{name}": value for name, value in drifts}
+        return of
 
     @property
     def unknown(self) -> tuple[str, ...]:
@@ -112,6 +118,8 @@ class PulsedSensor(_AnySensor):
         Noise of the readings.
     full_scale : (float, float), optional
         A reading at or beyond it is saturated.
+    temperature : Temperature, optional
+        How gain and delay follow the temperature. Left out: they do not.
     """
 
     kind: Literal["pulsed"] = "pulsed"
@@ -164,6 +172,8 @@ class SineWaveSensor(_AnySensor):
         Noise of the readings.
     full_scale : (float, float), optional
         A reading whose magnitude is at or beyond it is saturated.
+    temperature : Temperature, optional
+        How gain and delay follow the temperature. Left out: they do not.
     """
 
     kind: Literal["sine_wave"] = "sine_wave"

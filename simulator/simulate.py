@@ -23,6 +23,7 @@ from simulator.scene import Scene
 from simulator.sensor import Reach, Sensor, instrument
 from simulator.sensor_unknowns import sensor_at
 from simulator.trajectories import RadialTrajectory, SampledTrajectory
+from simulator.warmed import temperatures, warmed
 
 __all__ = ["Simulation", "mean_readings", "simulate"]
 
@@ -210,6 +211,11 @@ def simulate(
             late = _smooth_error(rng, ranges, wrong.range_m)
         terms = parameters.terms(z)
         moments = _moments(sensor, terms, ranges, factor, late)
+        temperature = temperatures(sensor, trajectory)
+        if temperature is not None:
+            bare = dataclasses.replace(terms, crosstalk=None, background=None)
+            light = _moments(sensor, bare, ranges, factor, late)[:, :2]
+            moments = warmed(sensor_at(sensor, terms), terms, moments, light, temperature)
         readings = moments[:, :2] + _noise(rng, *moments[:, 2:].T)
     check_readings(sensor_at(sensor, terms), trajectory, factor, moments, readings)
     if sensor.full_scale is not None:
@@ -222,6 +228,7 @@ def simulate(
         object_present=present,
         known_range_m=known,
         known_range_sd_m=sds,
+        temperature_k=temperature,
     )
     truth = np.where(np.isfinite(ranges), ranges, np.nan)
     return Simulation(frames, truth, drawn)

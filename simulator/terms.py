@@ -32,6 +32,9 @@ class Terms:
     lag : ndarray, shape (n,), optional
         Of the sensor where it is unknown (`simulator.sensor_unknowns`): a phase [rad], or of a
         pulse a length [m].
+    drift : ndarray, shape (n, 2), optional
+        Of the sensor's gain [1/K] and delay [s/K] with its temperature; None of a sensor without
+        coefficients.
     """
 
     object: Array
@@ -41,3 +44,4 @@ class Terms:
     offset: Array | None = None
     gain: Array | None = None
     lag: Array | None = None
+    drift: Array | None = None

@@ -35,6 +35,9 @@ class SampledTrajectory(Validated):
     known_range_sd_m : list of float or None, optional
         Standard deviation to which the range of every frame is known beside the readings [m]; None
         where it is not.
+    temperature_k : list of float, optional
+        Temperature of a sensor that has temperature coefficients in every frame [K]. Left out: that
+        at which it was calibrated.
     """
 
     range_m: Annotated[list[_Entry], _BOUNDS]
@@ -42,8 +45,11 @@ class SampledTrajectory(Validated):
     amplitude: Annotated[list[_Entry], _BOUNDS] | None = None
     object_present: Annotated[list[bool], _BOUNDS] | None = None
     known_range_sd_m: Annotated[list[_Entry | None], _BOUNDS] | None = None
+    temperature_k: Annotated[list[_Entry], _BOUNDS] | None = None
 
-    @pydantic.field_validator("time_s", "amplitude", "object_present", "known_range_sd_m")
+    @pydantic.field_validator(
+        "time_s", "amplitude", "object_present", "known_range_sd_m", "temperature_k"
+    )
     @classmethod
     def _as_long_as_the_ranges(cls, column: T, info: pydantic.ValidationInfo) -> T:
         ranges = info.data.get("range_m")  # missing where it is wrong itself

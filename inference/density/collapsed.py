@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from inference.density.best_ranges import fill_best_ranges
 from inference.density.frame_integrals import fill_log_likelihoods
+from inference.density.pieces import at_reference, pieces
 from inference.density.range_draw import fill_range_draws
 from inference.frame.arguments import (
     Instrument,
@@ -19,6 +20,8 @@ from inference.frame.arguments import (
 )
 from inference.frame.blocks import GAIN, Data, own_blocks
 from inference.frame.known_range import columns_of, with_displacements
+from inference.frame.warmth import with_warmth, without_warmth
+from simulator.at_temperature import warmth
 from simulator.frames import Frames
 from simulator.parameters import Parameters, Terms, parameters_of
 from simulator.scene import Reference, Scene
@@ -53,8 +56,9 @@ class CollapsedDensity:
     ----------
     parameters : Parameters
         The unknowns; z are their standard normal coordinates.
-    frames : ndarray, shape (n, 3 or 7)
-        Usable frames: two readings, the gain factor, and what is known of the ranges.
+    frames : ndarray, shape (n, 3, 7 or 8)
+        Usable frames: two readings, the gain factor, what is known of the ranges, and by how much
+        warmer than its reference a sensor was that follows its temperature.
     present : ndarray of bool, optional
         False where a frame is known to hold no object; None where all may.
     sensor : Sensor
@@ -77,7 +81,7 @@ class CollapsedDensity:
     @functools.cached_property
     def data(self) -> Data:
         """The frames as the kernels take them."""
-        return self.blocks_of(self.frames)
+        return self.blocks_of(without_warmth(self.frames))
 
     def blocks_of(self, frames: Array) -> Data:
         """Return frames, shape (n, 3 or 7), as blocks that have a range of their own."""
@@ -142,17 +146,20 @@ class CollapsedDensity:
 
     def paired_log_likelihood(self, z: Array, readings: Array) -> Array:
         """Return log p(readings_i | z_i) for readings of shape (n, frames, 2), shape (n,)."""
-        rows = self.integral_rows(self.parameters.terms(z))
+        terms = self.parameters.terms(z)
+        rows = self.integral_rows(terms)
         out = np.empty(len(z))
         for i in range(len(z)):
             frames = self.frames.copy()
             frames[:, :GAIN] = readings[i]
-            out[i] = self._of_rows(row_of(rows, i), self.blocks_of(frames)).sum()
+            seen = self.blocks_of(at_reference(self.sensor, frames, terms, i))
+            out[i] = self._of_rows(row_of(rows, i), seen).sum()
         return out
 
     def _of_terms(self, terms: Terms) -> Array:
         """Return log p(y_j | terms_i) for physical terms."""
-        return self.shared(self._of_rows(self.integral_rows(terms), self.data))
+        parts = pieces(self, terms, self.integral_rows(terms))
+        return self.shared(np.concatenate([self._of_rows(rows, data) for _, rows, data in parts]))
 
     def frame_log_likelihoods(self, z: Array) -> Array:
         """Return log p(y_j | z_i), shape (len(z), frames); -inf where physics forbids z."""
@@ -167,6 +174,8 @@ class CollapsedDensity:
         for values in (terms.gain, terms.lag):
             if values is not None:
                 good &= np.isfinite(values)
+        if terms.drift is not None:
+            good &= np.isfinite(terms.drift).all(axis=1)
         if good.all():
             out = self._of_terms(terms)
         elif good.any():
@@ -213,17 +222,20 @@ class CollapsedDensity:
 
     def _draw_blocks(self, z: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """Draw log r of every block, and count what did not settle, each of shape (n, blocks)."""
-        rows = self._with_flux_errors(self.integral_rows(self.parameters.terms(z)), z, rng)
+        terms = self.parameters.terms(z)
+        rows = self._with_flux_errors(self.integral_rows(terms), z, rng)
         out, unfinished = np.empty((2, len(z), self.data.blocks))
         uniforms = rng.random((*out.shape, 2))
-        fill_range_draws(out, unfinished, uniforms, rows, self.data, self.instrument)
+        for k, each, data in pieces(self, terms, rows):
+            fill_range_draws(out[k], unfinished[k], uniforms[k], each, data, self.instrument)
         return out, unfinished
 
     def best_ranges(self, z: Array) -> Array:
         """Find each frame's best range (`inference.density.profile.best_ranges`)."""
-        rows = self.rows(self.parameters.terms(z))
+        terms = self.parameters.terms(z)
         found = np.empty((len(z), self.data.blocks, 3))
-        fill_best_ranges(found, rows, self.data, self.instrument)
+        for k, rows, data in pieces(self, terms, self.rows(terms)):
+            fill_best_ranges(found[k], rows, data, self.instrument)
         return self.of_frames(found)
 
     def flux_basis(self, z: Array, log_r: Array) -> FluxBasis | None:  # noqa: ARG002
@@ -270,8 +282,10 @@ def collapsed_density(sensor: Sensor, scene: Scene, frames: Frames) -> Collapsed
     """
     all_present = frames.object_present is None or bool(frames.object_present.all())
     columns = columns_of(frames)
+    parameters = with_displacements(parameters_of(sensor, scene), columns)
+    columns = with_warmth(columns, warmth(sensor, frames))
     return CollapsedDensity(
-        with_displacements(parameters_of(sensor, scene), columns),
+        parameters,
         columns,
         None if all_present else frames.object_present,
         sensor,

@@ -9,6 +9,7 @@ from inference.density.collapsed import CollapsedDensity, FluxBasis
 from inference.density.discrepancy_integral import integrate_flux_error
 from inference.density.flux_expansion import FluxFunctions
 from inference.density.joint_maximum import fill_joint_maxima
+from inference.density.pieces import pieces
 from inference.frame.arguments import FluxError, Rows
 from inference.frame.blocks import Data
 from simulator.discrepancy import DiscrepancyBasis, discrepancy_basis
@@ -72,10 +73,11 @@ class DiscrepantDensity(CollapsedDensity):
         # a single row would be taken as work space by all vectors
         centres, factors = np.empty((max(n, 2), size)), np.empty((max(n, 2), size, size))
         out = np.empty((n, len(self.frames)))
-        rows = self.integral_rows(self.parameters.terms(z))
-        integrate_flux_error(
-            out, centres, factors, rows, self.data, self.instrument, self.functions
-        )
+        terms = self.parameters.terms(z)
+        for k, rows, data in pieces(self, terms, self.integral_rows(terms)):
+            integrate_flux_error(
+                out[k], centres[k], factors[k], rows, data, self.instrument, self.functions
+            )
         return centres[:n], factors[:n]
 
     def _with_flux_errors(self, rows: Rows, z: Array, rng: np.random.Generator) -> Rows:
@@ -135,8 +137,9 @@ class DiscrepantDensity(CollapsedDensity):
         """
         out = np.empty((len(z), len(self.frames), 3))
         centres = np.empty((len(z), self.basis.size))
-        rows = self.rows(self.parameters.terms(z))
-        fill_joint_maxima(out, centres, rows, self.data, self.instrument, self.functions)
+        terms = self.parameters.terms(z)
+        for k, rows, data in pieces(self, terms, self.rows(terms)):
+            fill_joint_maxima(out[k], centres[k], rows, data, self.instrument, self.functions)
         return out, centres
 
     def best_ranges(self, z: Array) -> Array:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from inference.frame.coordinates import coordinate_slopes
 from inference.frame.known_range import Beside, beside, offset_slopes
 from inference.frame.sensitivity import sensitivity, whiteners
+from inference.frame.warmth import gains_of
 from simulator.parameters import Parameters
 from simulator.sensor import Sensor
 
@@ -91,8 +92,8 @@ def whitened(
         The sensor.
     parameters : Parameters
         The unknowns.
-    frames : ndarray, shape (n, 3 or 7)
-        Two readings, the gain factor, and what is known of the range.
+    frames : ndarray, shape (n, 3, 7 or 8)
+        As `inference.density.collapsed.CollapsedDensity.frames`.
     z : ndarray, shape (d,)
         The parameters.
     log_r : ndarray, shape (n,)
@@ -105,7 +106,7 @@ def whitened(
     Whitened
     """
     terms, slopes = coordinate_slopes(parameters, z)
-    at = sensitivity(sensor, terms, log_r, frames[:, 2], flux_error)
+    at = sensitivity(sensor, terms, log_r, gains_of(frames), flux_error)
     whitener = whiteners(sensor, at)
     # a sum of products over an array that is not contiguous takes five times as long
     by_term = np.ascontiguousarray(at.by_term)

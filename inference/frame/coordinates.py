@@ -10,6 +10,7 @@ from simulator.parameters import Parameters, Terms
 
 __all__ = [
     "COORDINATES",
+    "DRIFT_COORDINATES",
     "SENSOR_COORDINATES",
     "coordinate_slopes",
     "has_sensor",
@@ -35,16 +36,20 @@ COORDINATES = (
 Derivatives are along log c0, c1 / sqrt(c0) with c0 held, log c2, the crosstalk [reading units],
 log B, log R, log c0' and c1' / sqrt(c0') with c0' held, everything else held. A term
 that the scene lacks has columns of zeros. Behind them, where something of the sensor is unknown,
-are its `SENSOR_COORDINATES`.
+are its `SENSOR_COORDINATES`, and behind these, of a sensor that follows its temperature, its
+`DRIFT_COORDINATES`.
 """
 
 SENSOR_COORDINATES = ("sensor.known_gain", "sensor.lag")
 """The log of the gain, and the lag: a phase [rad] or a length [m] (`sensor_unknowns`)."""
 
+DRIFT_COORDINATES = ("sensor.gain_drift", "sensor.delay_drift")
+"""What gain [1/K] and delay [s/K] change by with the temperature."""
+
 
 def has_sensor(terms: Terms) -> bool:
-    """Tell whether something of the sensor is unknown."""
-    return terms.gain is not None or terms.lag is not None
+    """Tell whether something of the sensor is unknown, or follows its temperature."""
+    return terms.gain is not None or terms.lag is not None or terms.drift is not None
 
 
 # the maps from z are smooth and of unit scale: a central difference errs by 1e-10 of itself, and an
@@ -59,7 +64,8 @@ def some_of(terms: Terms, k: slice) -> Terms:
     offset = None if terms.offset is None else terms.offset[k]
     gain = None if terms.gain is None else terms.gain[k]
     lag = None if terms.lag is None else terms.lag[k]
-    return Terms(terms.object[k], crosstalk, background, terms.ranges[k], offset, gain, lag)
+    drift = None if terms.drift is None else terms.drift[k]
+    return Terms(terms.object[k], crosstalk, background, terms.ranges[k], offset, gain, lag, drift)
 
 
 def term_changes(reference: Terms, plus: Terms, minus: Terms) -> Array:
@@ -74,12 +80,15 @@ def term_changes(reference: Terms, plus: Terms, minus: Terms) -> Array:
 
     Returns
     -------
-    ndarray, shape (9 or 11, k)
+    ndarray, shape (9, 11 or 13, k)
         Differences along `COORDINATES`, and the sensor's where something of it is unknown.
     """
     count = len(COORDINATES)
     of_sensor = len(SENSOR_COORDINATES) if has_sensor(reference) else 0
-    change = np.zeros((count + of_sensor, plus.object.shape[0]))
+    of_drift = 0 if reference.drift is None else len(DRIFT_COORDINATES)
+    change = np.zeros((count + of_sensor + of_drift, plus.object.shape[0]))
+    if plus.drift is not None and minus.drift is not None:
+        change[count + of_sensor :] = (plus.drift - minus.drift).T
     if plus.gain is not None and minus.gain is not None:
         change[count] = np.log(plus.gain / minus.gain)
     if plus.lag is not None and minus.lag is not None:
@@ -114,7 +123,7 @@ def coordinate_slopes(parameters: Parameters, z: Array) -> tuple[Terms, Array]:
     Returns
     -------
     (Terms, ndarray)
-        Of one vector; shape (9 or 11, d), along `COORDINATES` and the sensor's.
+        Of one vector; shape (9, 11 or 13, d), along `COORDINATES` and the sensor's.
     """
     d = z.size
     steps = _STEP * np.concatenate([np.zeros((1, d)), np.eye(d), -np.eye(d)])

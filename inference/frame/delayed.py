@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.frame.arguments import Pair
-from simulator.sensor import Reach
+from simulator.sensor import Reach, Sensor, instrument
 
-__all__ = ["delayed"]
+__all__ = ["by_lag", "delayed"]
 
 Array = NDArray[np.float64]
 
@@ -39,3 +39,27 @@ def delayed(light: Array, log_r: Array, r0: Reach, wave: Pair | None) -> Array:
     else:
         late = np.where(log_r < np.log(r0), light[:, 1] / r0, 0.0)
     return np.column_stack([late, np.zeros(log_r.size)])
+
+
+def by_lag(sensor: Sensor, light: Array, signal: Array, r: Array, distance: float) -> Array:
+    """Return how readings change with the sensor's lag, per radian or per metre, shape (n, 2).
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The sensor, with numbers.
+    light, signal : ndarray, shape (n, 2)
+        Of object and background together, and the object's part of it.
+    r : ndarray, shape (n,)
+        Ranges [m].
+    distance : float
+        Of the background [m].
+    """
+    r0, wave = instrument(sensor)
+    if wave is not None:
+        return np.column_stack([-light[:, 1], light[:, 0]])
+    assert isinstance(r0, tuple)  # noqa: S101  # a lag comes with its r0
+    late, behind = r + r0[1], distance + r0[1]
+    of_object = np.where((late > 0) & (late < r0[0]), signal[:, 1], 0.0)
+    of_rest = light[:, 1] - signal[:, 1] if 0 < behind < r0[0] else np.zeros(r.size)
+    return np.column_stack([(of_object + of_rest) / r0[0], np.zeros(r.size)])

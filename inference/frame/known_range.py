@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.frame.blocks import DISPLACEMENT, DISPLACEMENT_RATE, RANGE, RATE, Known
+from inference.frame.blocks import DISPLACEMENT, DISPLACEMENT_RATE, RANGE, RATE, WARM, Known
 from simulator.compiled import compiled
 from simulator.frames import Frames
 from simulator.parameters import OFFSET, Parameters, Terms, with_offset
@@ -94,7 +94,10 @@ def rates_of(frames: Array) -> Array | None:
 
     Zero where nothing is known; None where nothing is of any frame.
     """
-    return None if frames.shape[1] <= RANGE else frames[:, [RATE, DISPLACEMENT_RATE]]
+    if frames.shape[1] <= RANGE:
+        return None
+    rates = frames[:, [RATE, DISPLACEMENT_RATE]]
+    return None if frames.shape[1] > WARM and not rates.any() else rates
 
 
 def beside(frames: Array, log_r: Array, terms: Terms) -> Beside | None:

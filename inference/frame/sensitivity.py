@@ -14,7 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.frame.arguments import Instrument, instrument_of
+from inference.frame.delayed import by_lag
 from inference.frame.noise import whiteners as whiteners_at
+from inference.frame.warmth import circuits, slopes_of_drift
+from simulator.at_temperature import delayed_light
 from simulator.background import shadow
 from simulator.compiled import compiled
 from simulator.object_model import quadratic
@@ -26,7 +29,7 @@ from simulator.readings import (
     object_readings,
     object_slopes,
 )
-from simulator.sensor import Reach, Sensor, instrument
+from simulator.sensor import Reach, Sensor
 from simulator.sensor_unknowns import sensor_at
 
 __all__ = [
@@ -187,9 +190,9 @@ class Sensitivity:
         Mean readings [reading units].
     signal : ndarray, shape (n, 2)
         The object's part of them; zero for a frame without object.
-    by_term : ndarray, shape (n, 2, 9 or 11)
-        Derivatives along `inference.frame.coordinates.COORDINATES`, and along the gain's log and
-        the lag where something of the sensor is unknown.
+    by_term : ndarray, shape (n, 2, 9, 11 or 13)
+        Derivatives along `inference.frame.coordinates.COORDINATES`, along the gain's log and the
+        lag where something of the sensor is unknown, and along its temperature coefficients.
     by_range : ndarray, shape (n, 2)
         Derivative along log r; zero for a frame without object.
     """
@@ -217,8 +220,9 @@ def sensitivity(
         Physical values; the first parameter vector is used.
     log_r : ndarray, shape (n,)
         log r of every frame [log m]; nan for a frame without object.
-    gain : ndarray, shape (n,), optional
-        Factor of each frame on the sensor's gain.
+    gain : ndarray, shape (n,) or (n, 2), optional
+        Factor of each frame on the sensor's gain, and by how much warmer than its reference the
+        sensor was [K]; left out: not at all.
     flux_error : (ndarray, ndarray), each of shape (n,), optional
         Logarithm of the factor by which the object's flux differs from the model's, and its slope
         along log r.
@@ -228,9 +232,12 @@ def sensitivity(
     Sensitivity
         Not finite where a number overflows.
     """
-    sensor, of_sensor = sensor_at(sensor, terms), terms.gain is not None or terms.lag is not None
+    sensor = sensor_at(sensor, terms)
+    of_sensor = any(each is not None for each in (terms.gain, terms.lag, terms.drift))
     n = log_r.size
-    factors = np.ones(n) if gain is None else np.ascontiguousarray(gain)
+    factors, warm = circuits(n, gain)
+    if terms.drift is not None:
+        factors = factors * (1.0 + terms.drift[0, 0] * warm)
     gains = np.full(n, sensor.known_gain)
     values, scales = np.zeros(Value.LOG_RANGE), np.ones(Value.LOG_RANGE)
     values[: Value.CROSSTALK_1] = terms.object[0]
@@ -257,24 +264,20 @@ def sensitivity(
             light = slopes[:, Value.READINGS, :2] - values[Value.CROSSTALK_1 : Value.STRENGTH]
             lag = np.zeros_like(light)
             if terms.lag is not None:
-                lag = _by_lag(sensor, light, signal, np.exp(log_r), values[Value.DISTANCE])
+                lag = by_lag(sensor, light, signal, np.exp(log_r), values[Value.DISTANCE])
             by_term = np.concatenate([by_term, np.stack([signal, lag], axis=2)], axis=2)
-    return Sensitivity(slopes[:, Value.READINGS, :2], signal, by_term, by_range)
-
-
-def _by_lag(sensor: Sensor, light: Array, signal: Array, r: Array, distance: float) -> Array:
-    """Return how readings change with the sensor's lag, per radian or per metre, shape (n, 2).
-
-    Of the light of object and background together, of which ``signal`` is the object's.
-    """
-    r0, wave = instrument(sensor)
-    if wave is not None:
-        return np.column_stack([-light[:, 1], light[:, 0]])
-    assert isinstance(r0, tuple)  # noqa: S101  # a lag comes with its r0
-    late, behind = r + r0[1], distance + r0[1]
-    of_object = np.where((late > 0) & (late < r0[0]), signal[:, 1], 0.0)
-    of_rest = light[:, 1] - signal[:, 1] if 0 < behind < r0[0] else np.zeros(r.size)
-    return np.column_stack([(of_object + of_rest) / r0[0], np.zeros(r.size)])
+        mean = slopes[:, Value.READINGS, :2]
+        if terms.drift is not None:
+            # everything but crosstalk comes later by what the delay has drifted
+            static, delay = slice(Value.CROSSTALK_1, Value.STRENGTH), terms.drift[0, 1] * warm
+            mean = values[static] + delayed_light(sensor, mean - values[static], delay)
+            turned = delayed_light(sensor, by_term, delay)
+            turned[:, :, static] = by_term[:, :, static]
+            by_drift = slopes_of_drift(sensor, terms.drift[0], warm, mean - values[static])
+            by_term = np.concatenate([turned, by_drift], axis=2)
+            signal = delayed_light(sensor, signal, delay)
+            by_range = delayed_light(sensor, by_range, delay)
+    return Sensitivity(mean, signal, by_term, by_range)
 
 
 def whiteners(sensor: Sensor, of: Sensitivity) -> Array:

@@ -15,6 +15,7 @@ from inference.identifiability.expected_posterior import (
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.information import Information
 from inference.identifiability.known_beside import planned_rates, with_rates
+from inference.identifiability.planned_circuit import planned_circuit
 from inference.identifiability.reasons import Diagnosis
 from inference.identifiability.remedies import Offer
 from inference.identifiability.status import Identifiability
@@ -199,6 +200,7 @@ def identifiability(
     gain: Sequence[float] | None = None,
     known_range_sd_m: Sequence[float | None] | None = None,
     displacement_sd_m: Sequence[float | None] | None = None,
+    temperature_k: Sequence[float] | None = None,
 ) -> Foresight:
     """Foresee what frames at given ranges tell of a scene, before any data.
 
@@ -222,6 +224,8 @@ def identifiability(
         nothing does.
     displacement_sd_m : sequence of float or None, optional
         The same of odometry, which tells ranges up to one offset that all frames share.
+    temperature_k : sequence of float, optional
+        Temperature of the sensor in each frame [K]; left out: that at which it was calibrated.
 
     Returns
     -------
@@ -231,7 +235,7 @@ def identifiability(
     ------
     InvalidInputError
         With pointers relative to the request: "/scene/...", "/ranges_m/i", "/object_present",
-        "/at/...", "/known_range_sd_m", "/displacement_sd_m".
+        "/at/...", "/known_range_sd_m", "/displacement_sd_m", "/temperature_k".
     RefusedError
         For tangential motion, a discrepancy of an object at rest, and where a number overflows.
     """
@@ -252,7 +256,7 @@ def identifiability(
         parameters,
         _reference(parameters, at),
         log_r,
-        None if gain is None else np.asarray(gain, dtype=float),
+        planned_circuit(sensor, log_r.size, gain, temperature_k),
         discrepancy=scene.stated_flux_error,
         common_range=scene.motion == "static",
     )

@@ -35,8 +35,9 @@ class Experiment:
         Their values, in the coordinates whose prior is standard normal.
     log_r : ndarray, shape (n,)
         log r of every frame [log m]; nan for a frame without object.
-    gain : ndarray, shape (n,), optional
-        Factor of each frame on the sensor's gain.
+    gain : ndarray, shape (n,) or (n, 2), optional
+        Factor of each frame on the sensor's gain, and by how much warmer than its reference the
+        sensor was [K].
     known : tuple of str
         Unknowns that are supposed to be known after all.
     discrepancy : float, optional
@@ -127,7 +128,7 @@ class Experiment:
 
     @functools.cached_property
     def change(self) -> Array:
-        """Derivatives of the coordinates of `COORDINATES` along z, shape (9 or 11, d)."""
+        """Derivatives of the coordinates of `COORDINATES` along z, shape (9, 11 or 13, d)."""
         with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
             return coordinate_slopes(self.parameters, self.z)[1]
 
@@ -157,7 +158,7 @@ class Experiment:
 
         Returns
         -------
-        ndarray, shape (n, 2, 9 or 11)
+        ndarray, shape (n, 2, 9, 11 or 13)
             Along `COORDINATES`, and the sensor's where something of it is unknown.
         ndarray, shape (n, 2)
             Along log r; nan for a frame without object.

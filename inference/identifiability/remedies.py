@@ -36,6 +36,7 @@ _GROUPS = {
     "sensor.gain": "the sensor's gain",
     "sensor.phase_offset_rad": "the sensor's phase offset",
     "sensor.timing_offset_s": "the sensor's timing offset",
+    "sensor.temperature": "the sensor's temperature coefficients",
 }
 
 
@@ -117,7 +118,7 @@ def _with_frames(experiment: Experiment, log_r: Array) -> Experiment:
     """Return the experiment with other frames, all of the median gain."""
     gain = experiment.gain
     if gain is not None:
-        gain = np.full(log_r.size, float(np.median(gain)))
+        gain = _usual(gain, log_r.size)
     rates = experiment.rates
     if rates is not None:  # ranges of a new stroke are told as well as most of those that were
         usual = np.median(rates[np.isfinite(experiment.log_r)], axis=0)
@@ -125,11 +126,16 @@ def _with_frames(experiment: Experiment, log_r: Array) -> Experiment:
     return dataclasses.replace(experiment, log_r=log_r, gain=gain, common_range=False, rates=rates)
 
 
+def _usual(gain: Array, n: int) -> Array:
+    """Return the median gain, and temperature, n times."""
+    return np.repeat(np.median(gain, axis=0, keepdims=True), n, axis=0)
+
+
 def _with_more(experiment: Experiment, log_r: Array, rate: float | None = None) -> Experiment:
     """Return the experiment with more frames, of the median gain, their ranges told or not."""
     gain, rates = experiment.gain, experiment.rates
     if gain is not None:
-        gain = np.append(gain, np.full(log_r.size, float(np.median(gain))))
+        gain = np.append(gain, _usual(gain, log_r.size), axis=0)
     if rates is not None or rate is not None:
         before = np.zeros((experiment.log_r.size, 2)) if rates is None else rates
         rates = np.append(before, np.tile([rate or 0.0, 0.0], (log_r.size, 1)), axis=0)

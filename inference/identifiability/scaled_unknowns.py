@@ -7,15 +7,19 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.frame.coordinates import COORDINATES, has_sensor
+from inference.frame.coordinates import COORDINATES, SENSOR_COORDINATES, has_sensor
 from inference.frame.sensitivity import Value
+from simulator.at_temperature import lag_rate
 from simulator.parameters import OFFSET, Parameters, Terms
 from simulator.sensor import Sensor, SineWaveSensor, shift_of
-from simulator.sensor_unknowns import GAIN, PHASE, TIMING, lag_path
+from simulator.sensor_unknowns import DRIFTS, GAIN, PHASE, TIMING, lag_path
 
 __all__ = ["ScaledUnknowns"]
 
 Array = NDArray[np.float64]
+
+_LAG = len(COORDINATES) + SENSOR_COORDINATES.index("sensor.lag")
+_TYPICAL_K = 10.0  # kelvin that a sensor warms up by: what coefficients are measured by
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -60,7 +64,11 @@ class ScaledUnknowns:
         if has_sensor(self.terms):
             # by how much the light of a typical range would have to be late
             wave = self.sensor.wave_number if isinstance(self.sensor, SineWaveSensor) else 1.0
-            units[-1] = wave * self.typical_m
+            units[_LAG] = wave * self.typical_m
+        if self.terms.drift is not None:
+            gain = _LAG + 1
+            units[gain] = 1.0 / _TYPICAL_K
+            units[gain + 1] = units[_LAG] / lag_rate(self.sensor) / _TYPICAL_K
         if self.light is not None:
             light = self.light.copy()
             if self.sensor.kind != "pulsed":
@@ -73,7 +81,7 @@ class ScaledUnknowns:
 
     @functools.cached_property
     def directions(self) -> Array:
-        """How the coordinates of `COORDINATES` move with each of ``names``, (9 or 11, d).
+        """How the coordinates of `COORDINATES` move with each of ``names``, (9, 11 or 13, d).
 
         Along log c0, c1 / sqrt(c0), log c2, the crosstalk in `units`, log B, log R, log c0', c1' /
         sqrt(c0'), and the offset of displacements over a typical range, as in the tables of
@@ -109,7 +117,8 @@ class ScaledUnknowns:
         first, second = self.parameters.crosstalk or ("crosstalk.0", "crosstalk.1")
         before, after = COORDINATES[: Value.CROSSTALK_1], COORDINATES[Value.STRENGTH :]
         of_sensor = (GAIN, lag_path(self.sensor)) if has_sensor(self.terms) else ()
-        return (*before, first, second, *after, *of_sensor)
+        of_drift = () if self.terms.drift is None else DRIFTS
+        return (*before, first, second, *after, *of_sensor, *of_drift)
 
     @property
     def _count(self) -> int:
@@ -136,9 +145,11 @@ class ScaledUnknowns:
             elif name == OFFSET:
                 result[j, j] = self.typical_m
             elif name == PHASE:
-                result[j, j] = self.units[-1]
+                result[j, j] = self.units[_LAG]
             elif name == TIMING:
-                result[j, j] = self.units[-1] / shift_of(1.0)
+                result[j, j] = self.units[_LAG] / shift_of(1.0)
+            elif name in DRIFTS:
+                result[j, j] = self.units[self._paths.index(name)]
             else:
                 result[j, j] = values[name]
         return result

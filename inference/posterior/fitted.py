@@ -44,7 +44,8 @@ def fitted_optima(job: Job, density: CollapsedDensity) -> list[Optimum]:
         object at rest or ranges whose law is unknown.
     """
     names = tuple(name for name in density.parameters.names if name != OFFSET)
-    if job.scene.motion != "radial" or job.sensor.unknown:
+    drifting = job.sensor.temperature is not None
+    if job.scene.motion != "radial" or job.sensor.unknown or drifting:
         return []
     problem = fit_problem(job.sensor, job.scene, job.frames.select(job.usable))
     if problem.names != names:

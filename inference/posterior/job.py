@@ -16,6 +16,7 @@ from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.posterior.checks import check_scene_for_posterior
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.streams import Stream
+from simulator.at_temperature import warmth
 from simulator.errors import RefusedError
 from simulator.frames import Frames, check_frames
 from simulator.model_error import ErrorSizes
@@ -64,11 +65,13 @@ class Job:
 
     @property
     def usable(self) -> NDArray[np.bool_]:
-        """Frames that are not saturated, shape (n,)."""
-        if self.sensor.full_scale is None:
-            return np.ones(len(self.frames), dtype=bool)
-        limit = np.asarray(self.sensor.full_scale)
-        return np.asarray((np.abs(self.frames.readings) < limit).all(axis=1))
+        """Frames that are not saturated, and of known temperature where it counts, shape (n,)."""
+        usable = np.ones(len(self.frames), dtype=bool)
+        if self.sensor.full_scale is not None:
+            limit = np.asarray(self.sensor.full_scale)
+            usable &= (np.abs(self.frames.readings) < limit).all(axis=1)
+        warm = warmth(self.sensor, self.frames)
+        return np.asarray(usable if warm is None else usable & np.isfinite(warm))
 
     def to_bytes(self) -> bytes:
         """Return the job for a store."""
@@ -180,6 +183,8 @@ def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSetti
         settings = settings.model_copy(update={"seed": seed})
     job = Job(sensor, _with_error_integrated(scene, frames), frames, settings)
     if not job.usable.any():
+        if sensor.temperature is not None:
+            raise RefusedError("every frame is saturated, or its temperature_k is null")
         raise RefusedError("every frame is saturated: lower the gain or the exposure")
     check_scene_for_posterior(sensor, scene, frames.select(job.usable))
     return job

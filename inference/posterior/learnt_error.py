@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from inference.frame.delayed import delayed
+from simulator.at_temperature import at_reference, warmth
 from simulator.frames import Frames
 from simulator.joint import LearntError
 from simulator.parameters import Terms
@@ -47,6 +48,10 @@ def learnt_error(sensor: Sensor, terms: Terms, frames: Frames, unknowns: int) ->
     LearntError or None
         None where too few ranges are known: `unknowns` and four more.
     """
+    static = np.zeros(2) if terms.crosstalk is None else terms.crosstalk[0]
+    warm = warmth(sensor, frames)
+    if warm is not None:
+        frames = at_reference(sensor_at(sensor, terms), frames.select(np.isfinite(warm)), static)[1]
     if frames.known_range_m is None or frames.known_range_sd_m is None:
         return None
     used = np.isfinite(frames.known_range_m) & frames.present
@@ -57,7 +62,6 @@ def learnt_error(sensor: Sensor, terms: Terms, frames: Frames, unknowns: int) ->
         return None
     known, sd = frames.known_range_m[used], frames.known_range_sd_m[used]
     factor = np.ones(known.size) if frames.gain is None else frames.gain[used]
-    static = np.zeros(2) if terms.crosstalk is None else terms.crosstalk[0]
     bare = dataclasses.replace(terms, crosstalk=None, background=None)
     light = factor[:, None] * mean_readings(sensor, bare, known)
 

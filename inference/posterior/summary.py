@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.frame.known_range import rates_of
+from inference.frame.warmth import gains_of
 from inference.identifiability.after_data import statuses_of_draws
 from inference.identifiability.status import Identifiability, weak_at_best
 from inference.posterior.answer.draws import Draws, draws_of
@@ -51,7 +52,6 @@ from inference.posterior.stages.standing import standing
 from inference.posterior.stages.starting import begin
 from inference.posterior.streams import Stream
 from inference.posterior.undrawn import without_draws
-from simulator.scene import Scene
 
 __all__ = ["draw", "summarise"]
 
@@ -60,7 +60,8 @@ Array = NDArray[np.float64]
 _INTEGRALS = 100  # draws at which the integrals over ranges are looked at
 
 
-def _left_out(scene: Scene, selection: Selection | None) -> tuple[LeftOutTerm, ...]:
+def _left_out(job: Job, selection: Selection | None) -> tuple[LeftOutTerm, ...]:
+    scene = job.scene
     absent = {
         "crosstalk": scene.crosstalk,
         "background": scene.background,
@@ -72,6 +73,9 @@ def _left_out(scene: Scene, selection: Selection | None) -> tuple[LeftOutTerm, .
     ]
     if scene.model_error.flux == scene.model_error.range_m == 0:
         rows.append(LeftOutTerm("discrepancy", "the scene states none"))
+    if job.sensor.temperature is None and job.frames.temperature_k is not None:
+        reason = "temperature_k is given and not used: the sensor states no coefficients"
+        rows.append(LeftOutTerm("temperature", reason))
     if selection is not None:
         rows += [
             LeftOutTerm(decision.term, decision.reason)
@@ -102,7 +106,7 @@ def _judged(job: Job, density: CollapsedDensity, whole: Whole) -> tuple[Identifi
         whole.spread,
         chosen,
         log_r,
-        density.frames[:, 2],
+        gains_of(density.frames),
         # at rest it is no different from another c2
         discrepancy=None if static else job.scene.model_error.flux or None,
         common_range=static,
@@ -235,7 +239,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
         found.range_m,
         rows,
         found.fit,
-        _left_out(job.scene, checkpoint.selection),
+        _left_out(job, checkpoint.selection),
         Runtime(wall_s, cpu_s, drawn.calls, found.k_hat),
         drawn.draws,
         selection_summary(job.scene, checkpoint.selection),

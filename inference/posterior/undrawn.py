@@ -93,6 +93,8 @@ def _foreseen(
     values = density.parameters.natural(best)[0].tolist()
     present = np.isfinite(log_r)
     ranges, rates = np.where(present, np.exp(log_r), 1.0), rates_of(density.frames)
+    # without coefficients it is not used
+    warm = None if job.sensor.temperature is None else job.frames.temperature_k
     try:
         found = identifiability(
             job.sensor,
@@ -101,7 +103,9 @@ def _foreseen(
             present.tolist(),
             {name: at for name, at in zip(names, values, strict=True) if name != OFFSET},
             density.frames[:, GAIN].tolist(),
-            *([] if rates is None else [_sds(rate) for rate in rates.T]),
+            known_range_sd_m=None if rates is None else _sds(rates[:, 0]),
+            displacement_sd_m=None if rates is None else _sds(rates[:, 1]),
+            temperature_k=None if warm is None else warm[job.usable].tolist(),
         ).identifiability
     except HybridTofError as error:
         reason = f"not known yet: nothing was drawn, and nothing can be foreseen ({error})"

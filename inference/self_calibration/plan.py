@@ -13,6 +13,7 @@ from inference.self_calibration.scenes import (
 from inference.self_calibration.state import CalibrationState
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.tracker import Tracker, tracker
+from simulator.errors import RefusedError
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
@@ -73,8 +74,14 @@ def plan_of(sensor: Sensor, scene: Scene, settings: TrackingSettings, seed: int)
     InvalidInputError
         At "/calibrate" where nothing is unknown; as `inference.tracking.tracker.tracker`.
     RefusedError
-        Where there is no tracker for it.
+        Where there is no tracker for it; of a sensor with temperature coefficients.
     """
+    if sensor.temperature is not None:
+        raise RefusedError(
+            "a stream that calibrates itself takes no temperature coefficients: its calibrations "
+            "would have to tell their drift from that of the crosstalk; calibrate from recorded "
+            "frames, and track with what that has found"
+        )
     check_unknown(sensor, scene)
     plan = Plan(sensor, scene, settings, seed)
     begin(plan)

@@ -31,6 +31,7 @@ from inference.tracking.report import (
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState, check_state
 from inference.tracking.tracker import Tracker, tracker
+from simulator.at_temperature import at_reference
 from simulator.errors import InvalidInputError
 from simulator.frames import Frames, check_frames
 from simulator.scene import Scene
@@ -122,7 +123,9 @@ def step(
     frames : Frames
         With times that increase and are later than the state's. ``object_present`` false says that
         no object is there; true says nothing. A known range is one more reading of its frame, and
-        says that an object is there; readings that contradict it are an outlier.
+        says that an object is there; readings that contradict it are an outlier. Where the sensor
+        follows its temperature, and that is not known, the readings say nothing: the status is
+        none, and everything is predicted.
     full : bool
         Whether to look for new objects along the whole range in every frame, also where none could
         be heavy enough to be kept: slower, with the same answer to within what is negligible.
@@ -149,11 +152,18 @@ def step(
     if model.sensor.full_scale is not None:
         beyond = np.abs(frames.readings) >= np.asarray(model.sensor.full_scale)
         kinds[beyond.any(axis=1)] = SATURATED
+    untold = None
+    if model.sensor.temperature is not None and frames.temperature_k is not None:
+        untold = np.isnan(frames.temperature_k)
+        kinds[untold] = SATURATED  # as unreadable as those
+        frames = at_reference(model.sensor, frames, model.crosstalk)[1]
     if frames.object_present is not None:
         kinds[~frames.object_present] = EMPTY
         if model.sensor.full_scale is not None:
             # crosstalk cannot be learnt from a reading that is cut
             kinds[~frames.object_present & beyond.any(axis=1)] = EMPTY_SATURATED
+        if untold is not None:
+            kinds[~frames.object_present & untold] = EMPTY_SATURATED
     values = _observations(model, frames)
     gain = np.ones(len(frames)) if frames.gain is None else frames.gain
     out = np.full((len(frames), REPORT_COLUMNS), np.nan)
@@ -162,6 +172,8 @@ def step(
     columns = [values, gain, *_known(model, frames)]
     table = np.ascontiguousarray(np.column_stack(columns))
     run_filter(out, rows, times, table, kinds, hypotheses, model.model, full)
+    if untold is not None:
+        out[untold, STATUS] = Status.NONE
     return TrackState(hypotheses, state.signature), _track(model, out, rows)
 
 

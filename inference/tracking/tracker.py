@@ -25,13 +25,13 @@ from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
 from inference.tracking.tabulate import empty_readings, knots_of, places_of, table_of
 from inference.tracking.weighing import Model
-from simulator.errors import InvalidInputError, RefusedError
+from simulator.errors import InvalidInputError, RefusedError, listed
 from simulator.model_error import ModelError
 from simulator.parameters import Terms, parameters_of
 from simulator.range_prior import RangePrior
 from simulator.scene import Reference, Scene, Stroke
 from simulator.sensor import PulsedSensor, Sensor
-from simulator.sensor_unknowns import sensor_at
+from simulator.sensor_unknowns import DRIFTS, sensor_at
 
 __all__ = ["Tracker", "tracker"]
 
@@ -59,6 +59,9 @@ class Tracker:
     added_sd : ndarray, shape (knots,), optional
         Standard deviation of log r by errors of the model that the filter does not carry along, at
         the knots of its table.
+    crosstalk : (float, float)
+        Its best value before any frame [reading units]: what is not turned with the light where the
+        sensor's delay follows its temperature.
     """
 
     sensor: Sensor
@@ -68,6 +71,7 @@ class Tracker:
     limit: float
     first: TrackState
     added_sd: Array | None = None
+    crosstalk: tuple[float, float] = (0.0, 0.0)
 
     def added(self, positions: Array) -> Array:
         """Return that standard deviation at given log r; 0 where the filter carries everything."""
@@ -135,6 +139,10 @@ def tracker(
     # derivatives do not see crosstalk at all
     spared = unknown_crosstalk if learns or observed.by_rate else ()
     known = nuisance_of(parameters, posterior, spared)
+    static = (0.0, 0.0)
+    if known.centre.crosstalk is not None:
+        first, second = known.centre.crosstalk[0].tolist()
+        static = (first, second)
     sensor = sensor_at(sensor, known.centre)
     if observed.by_rate and known.plus:
         raise RefusedError(
@@ -173,7 +181,7 @@ def tracker(
     first = dataclasses.replace(first, signature=_signature(table, places, rules, first.hypotheses))
     model = Model(table, places, rules)
     added = sd_by_derivatives(sensor, erring, known.centre, knots, observed)
-    return Tracker(sensor, settings, observed, model, limit, first, added)
+    return Tracker(sensor, settings, observed, model, limit, first, added, static)
 
 
 def _check(sensor: Sensor, scene: Scene, settings: TrackingSettings) -> None:
@@ -187,6 +195,12 @@ def _check(sensor: Sensor, scene: Scene, settings: TrackingSettings) -> None:
         raise RefusedError(
             f"{', '.join(scene.optional_terms)} optional: a stream cannot wait for the data to "
             "decide; keep the term or leave it out of the scene"
+        )
+    drifting = [path for path in sensor.unknown if path in DRIFTS]
+    if drifting:
+        raise RefusedError(
+            f"{listed(drifting)} unknown: what that does to a range changes with the temperature, "
+            "and a tracker takes a number; calibrate, and state what has been found"
         )
     if settings.observables in ("w1", "w2") and not isinstance(sensor, PulsedSensor):
         raise InvalidInputError.at(

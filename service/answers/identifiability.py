@@ -133,6 +133,7 @@ def identifiability_of(request: IdentifiabilityRequest) -> ForeseenIdentifiabili
         request.at,
         known_range_sd_m=request.known_range_sd_m,
         displacement_sd_m=request.displacement_sd_m,
+        temperature_k=request.temperature_k,
     )
     bounds, posterior = found.sd, found.posterior_sd
     ranges = np.exp(found.experiment.log_r)

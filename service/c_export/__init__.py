@@ -118,6 +118,8 @@ def export_c(technique: str, sensor: Sensor, scene: Scene, tolerance: float = 1e
     known = known_of(scene)
     if isinstance(sensor, PulsedSensor) and sensor.timing_offset_s is not None:
         raise RefusedError("timing_offset_s is not exported to C; leave it out, and take it off")
+    if sensor.temperature is not None:
+        raise RefusedError("temperature is not exported to C; leave it out, and take it off")
     reason = obstacle(ALL_TECHNIQUES[technique], sensor, scene, known, None)
     if reason is not None:
         raise RefusedError(f"{technique}: {reason}")

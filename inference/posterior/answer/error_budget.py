@@ -20,6 +20,7 @@ from scipy.spatial import KDTree
 from inference.density.collapsed import CollapsedDensity
 from inference.frame.blocks import DISPLACEMENT, RANGE
 from inference.frame.known_range import rates_of
+from inference.frame.warmth import gains_of
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.model_response import (
     ModelResponse,
@@ -183,7 +184,7 @@ def error_budget(
             density.parameters,
             z[i],
             log_r[i],
-            density.frames[:, 2],
+            gains_of(density.frames),
             discrepancy=flux or None,
             common_range=job.scene.motion == "static",
             rates=rates,

@@ -11,6 +11,7 @@ from inference.density.whitened import Whitened, whitened
 from inference.frame.coordinates import some_of
 from inference.frame.known_range import free_of_range, rates_of
 from inference.frame.sensitivity import sensitivity
+from inference.frame.warmth import gains_of
 from inference.posterior.job import Job
 from simulator.parameters import Terms
 
@@ -65,7 +66,7 @@ def _turned(density: CollapsedDensity, z: Array, log_r: Array) -> NDArray[np.boo
     terms = some_of(density.parameters.terms(z[None]), slice(0, 1))
     low, high = _support(terms)
     u = np.where(present, log_r, 0.0)[:, None] + offsets
-    gain = np.repeat(density.frames[:, 2], offsets.size)
+    gain = np.repeat(gains_of(density.frames), offsets.size, axis=0)
     path = sensitivity(density.sensor, terms, u.ravel(), gain)
     scale = _with_unknowns(at, present)
     mean = path.mean.reshape(*u.shape, 2)

@@ -6,13 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
+from inference.density.pieces import pieces
 from inference.frame.arguments import Instrument, Rows, scene_of
-from inference.frame.blocks import DISPLACEMENT, GAIN, RANGE
+from inference.frame.blocks import DISPLACEMENT, GAIN, RANGE, WARM
 from inference.frame.known_range import rates_of
 from inference.frame.mean_readings import with_surroundings
 from inference.frame.noise import noise_of
+from simulator.at_temperature import readings_at_reference
 from simulator.compiled import compiled
 from simulator.readings import object_readings
+from simulator.terms import Terms
 
 __all__ = ["replicate", "replicate_frames"]
 
@@ -81,12 +84,30 @@ def replicate(
         Readings.
     """
     out = np.empty((*positions.shape, 2))
-    rows = density.rows(density.parameters.terms(z))
+    terms = density.parameters.terms(z)
     errors = density.flux_errors(positions, rng)
     normals = rng.standard_normal((*positions.shape, 4))
-    gains = np.ascontiguousarray(density.frames[:, GAIN])
-    _replicate(out, normals, rows, positions, gains, density.instrument, errors)
-    return out
+    for k, rows, data in pieces(density, terms, density.rows(terms)):
+        gains = np.ascontiguousarray(data.frames[:, GAIN])
+        some = None if errors is None else errors[k]
+        _replicate(out[k], normals[k], rows, positions[k], gains, density.instrument, some)
+    return _at_temperature(density, terms, out)
+
+
+def _at_temperature(density: CollapsedDensity, terms: Terms, readings: Array) -> Array:
+    """Return readings at the sensor's reference temperature as they are at that of each frame."""
+    if terms.drift is None or density.frames.shape[1] <= WARM:
+        return readings
+    warm = density.frames[:, WARM]
+    static = np.zeros((len(readings), 2)) if terms.crosstalk is None else terms.crosstalk
+    drifts = terms.drift[:, 1].tolist()
+    # back by the opposite drift
+    return np.stack(
+        [
+            readings_at_reference(density.sensor, each, warm, -drift, x)
+            for each, drift, x in zip(readings, drifts, static, strict=True)
+        ]
+    )
 
 
 def replicate_frames(

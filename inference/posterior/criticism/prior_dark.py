@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.frame.known_range import rates_of
 from inference.frame.range_prior import LEAST_INFORMATION
+from inference.frame.warmth import gains_of
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.status import Identifiability, weak_at_best
 from simulator.scene import Reference
@@ -61,7 +62,7 @@ def mark_dark(
 
 def _told(density: CollapsedDensity, z: Array, log_r: Array) -> Array:
     """Return the information on every log r, shape (frames,), of readings and of what is known."""
-    rates, gain = rates_of(density.frames), density.frames[:, 2]
+    rates, gain = rates_of(density.frames), gains_of(density.frames)
     of = Experiment(density.sensor, density.parameters, z, log_r, gain, rates=rates)
     told = np.square(of.whitened_terms()[1]).sum(axis=1)
     return np.asarray(told if of.beside is None else told + np.square(of.beside[0]).sum(axis=1))
