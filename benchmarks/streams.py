@@ -225,15 +225,18 @@ def survived(
     kills: int,
     rng: random.Random,
     command: Sequence[str] = SERVE,
+    *,
+    body: Any = None,
+    pace_s: float = 0.0,
 ) -> tuple[list[list[dict[str, Any]]], int]:
     """Send streams while the service is killed; each one's answers, and how often it was.
 
     It is killed whenever some more lines were answered, at random how many. Every client sends
     again what it has no answer to. Each line must be answered once, and what comes again must be
-    the same as before.
+    the same as before. ``body`` makes the streams; each waits ``pace_s`` between batches.
     """
     running = [Service(command, {"HYBRIDTOF_DATABASE": database})]
-    paths = opened(running[0].address, system(), len(lines))
+    paths = opened(running[0].address, body or system(), len(lines))
     answers: list[dict[int, dict[str, Any]]] = [{} for _ in lines]
     problems: list[str] = []
     left = threading.Semaphore(0)
@@ -245,9 +248,9 @@ def survived(
             got = b""
             with contextlib.suppress(httpx.HTTPError):
                 address = running[0].address + paths[index]
-                body = b"\n".join(batch)
+                content = b"\n".join(batch)
                 with httpx.stream(
-                    "POST", address, content=body, headers=NDJSON, timeout=60
+                    "POST", address, content=content, headers=NDJSON, timeout=60
                 ) as response:
                     if response.status_code not in (200, 503, 409):
                         problems.append(f"{response.status_code}")
@@ -263,8 +266,7 @@ def survived(
                 if answers[index].setdefault(number, answer) != answer:
                     problems.append(f"stream {index}, line {number} was answered differently")
                 at = max(at, number)
-            if not whole:
-                time.sleep(0.02)
+            time.sleep(pace_s if whole else 0.02)
         left.release()
 
     threads = [threading.Thread(target=send, args=(k,)) for k in range(len(lines))]

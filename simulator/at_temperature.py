@@ -1,8 +1,8 @@
 """Light as a sensor reads it at a temperature, and frames as it would read them at another.
 
 A sensor of temperature T has 1 + a (T - T0) times its gain, and light seems to come d (T - T0)
-later (docs/model.md, sensor-temperature). Both act on the light of object and background. Crosstalk is
-stated in reading units and does not follow the temperature.
+later (docs/model.md, sensor-temperature). Both act on the light of object and background. Crosstalk
+is stated in reading units and does not follow the temperature.
 """
 
 import dataclasses

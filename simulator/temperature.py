@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 class Temperature(Validated):
-    """Temperature coefficients of a sensor (docs/model.md, sensor-temperature); one of them at least.
+    """Temperature coefficients of a sensor (docs/model.md, sensor-temperature), one at least.
 
     Attributes
     ----------
