@@ -249,20 +249,26 @@ def _spread_roots(nuisance: Array) -> Array:
     return np.column_stack([np.abs(upper[:, 0, 0]), first * upper[:, 0, 1], np.abs(upper[:, 1, 1])])
 
 
-def places_of(knots: Knots, empty: Array, observed: Observed, rate_sd: float) -> Places:
+def places_of(
+    knots: Knots, nuisance: Array, empty: Array, observed: Observed, rate_sd: float
+) -> Places:
     """Return where the kernels look for an object.
 
     Parameters
     ----------
     knots : Knots
         With means in units of the noise.
+    nuisance : ndarray, shape (knots, 2 p)
+        Nuisance Jacobian.
     empty : ndarray, shape (2, 1 + p)
         Readings of the empty scene, and their change with the nuisance parameters.
     observed, rate_sd
         As for `knots_of`.
     """
     scan = scan_of(knots.positions, knots.means[:, MEAN], observed.by_rate, rate_sd)
-    boxes, groups = boxes_of(knots.positions, knots.means, knots.log_prior, scan)
+    boxes, groups = boxes_of(
+        knots.positions, knots.means, knots.log_prior, _spread_roots(nuisance), scan
+    )
     positions = knots.positions[scan]
     if not observed.by_rate:
         around = places_around_folds(knots.positions, knots.means[:, MEAN], knots.means[:, SLOPE])

@@ -164,7 +164,8 @@ def tracker(
         crosstalk = known.centre.crosstalk[0] * observed.scale
     table = table_of(knots, jacobian.along, np.zeros(2) if learns else crosstalk, observed)
     empty = empty_readings(sensor, known.centre, observed.by_rate) * observed.scale
-    places = places_of(knots, np.column_stack([empty, jacobian.empty]), observed, settings.rate_sd)
+    bare = np.column_stack([empty, jacobian.empty])
+    places = places_of(knots, jacobian.along, bare, observed, settings.rate_sd)
     rules = rules_of(settings, observed, scene.motion == "static", jacobian)
     limit = surprise_limit(settings, rules, observed.channels, jacobian)
     one, other = parameters.crosstalk or ("", "")
