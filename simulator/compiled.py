@@ -197,16 +197,16 @@ class Kernel:
         """Dispatcher of numba that answers calls by kernels.
 
         A kernel that another kernel calls needs no way in from Python, whose opening of named
-        tuples takes a sixth of the whole time of compiling: kernels call a twin without it.
+        tuples takes a sixth of the whole time of compiling, nor machine code of its own, a seventh:
+        kernels call a twin without (`simulator.inner_code`).
         """
         with _lock:
             if self._for_both:
                 return self.dispatcher
             if self._below is None:
                 folder = self._folder
-                below = folder and CacheFolder(folder.path / "called", folder.writable)
-                options = self.options | {"no_cpython_wrapper": True}
-                self._below = _compiler().dispatcher(self._function, below, options)
+                below = folder and CacheFolder(folder.path / "inner", folder.writable)
+                self._below = _compiler().dispatcher(self._function, below, self.options, True)
                 self._answer_calls(self._below)
         return self._below
 

@@ -9,6 +9,7 @@ from numba import extending, types
 from numba.core import caching, sigutils
 
 from simulator.compile_lock import turn
+from simulator.inner_code import InnerCompiler, rebuilt
 from simulator.kernel_cache import CacheFolder, base_folder
 
 __all__ = ["dispatcher", "is_none", "is_number", "overload", "unliteral"]
@@ -69,12 +70,18 @@ class _Impl(_CacheImpl):  # type: ignore[misc]
         )
 
 
+class _InnerImpl(_Impl):
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        return rebuilt(target_context, payload)
+
+
 class _Cache(_FunctionCache):  # type: ignore[misc]
     """numba's cache of a function, in a folder that may be read-only."""
 
-    def __init__(self, function: Callable[..., Any], folder: Path, writable: bool) -> None:
-        self._writable = writable
-        self._impl_class = lambda one: _Impl(one, folder)
+    def __init__(self, function: Callable[..., Any], folder: CacheFolder, inner: bool) -> None:
+        self._writable = folder.writable
+        impl = _InnerImpl if inner else _Impl
+        self._impl_class = lambda one: impl(one, folder.path)
         super().__init__(function)
 
     def save_overload(self, signature: Any, result: Any) -> None:
@@ -83,24 +90,31 @@ class _Cache(_FunctionCache):  # type: ignore[misc]
 
 
 def dispatcher(
-    function: Callable[..., Any], folder: CacheFolder | None, options: dict[str, bool]
+    function: Callable[..., Any],
+    folder: CacheFolder | None,
+    options: dict[str, bool],
+    inner: bool = False,
 ) -> Any:
     """Return numba's dispatcher of a function, with its machine code in a folder.
+
+    One of an inner function answers kernels alone (`simulator.inner_code`).
 
     Division by zero gives inf or nan as in numpy; the interpreter lock is released; no fast-math,
     because error-free transformations and tests for nan must survive.
     """
     hidden = {name: value for name, value in options.items() if name.startswith("_")}
+    for_kernels = {"no_cpython_wrapper": True, "pipeline_class": InnerCompiler} if inner else {}
     made = _njit(
         nogil=True,
         error_model="numpy",
         fastmath=False,
         no_cfunc_wrapper=True,  # nothing here is called from C
         **{name: value for name, value in options.items() if name not in hidden},
+        **for_kernels,
     )(function)
     made.targetoptions.update(hidden)
     if folder is not None:
-        made._cache = _Cache(function, *folder)
+        made._cache = _Cache(function, folder, inner)
         if folder.writable:
             _in_turn(made, f"{folder.path.name}/{function.__qualname__}")
     return made

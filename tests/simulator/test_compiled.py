@@ -176,6 +176,33 @@ def test_a_kernel_that_a_kernel_calls_gets_its_way_in_from_python_when_it_is_use
     assert len(kernel.dispatcher.overloads) == 1
 
 
+within: Any = None
+
+
+def quarter(x: float) -> float:
+    return float(within(within(x)))
+
+
+def eighth(x: float) -> float:
+    return float(0.25 * within(x))
+
+
+@pytest.mark.usefixtures("always")
+def test_what_only_kernels_call_is_never_made_runnable_and_taken_in_from_the_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    for taken, (caller, answer) in enumerate([(quarter, 0.75), (eighth, 0.375)]):
+        inner: Any = simulator.compiled.compiled(half)
+        monkeypatch.setitem(globals(), "within", inner)
+        assert simulator.compiled.compiled(caller)(3.0) == answer
+        assert sum(inner.called.stats.cache_hits.values()) == taken
+    runnable = {
+        path.parent.name == "inner": b"ELF" in path.read_bytes() for path in tmp_path.rglob("*.nbc")
+    }
+    assert runnable == {True: False, False: True}
+
+
 @pytest.mark.usefixtures("always")
 def test_numbers_written_in_a_call_are_no_types_and_both_sides_may_share_machine_code() -> None:
     kernel: Any = thrice
