@@ -121,7 +121,8 @@ def tracker(
         belong to it ("/posterior"), or for settings that do not belong to the sensor ("/settings").
     RefusedError
         Where there is no honest answer: unknowns without a posterior, tangential motion, optional
-        terms, derivatives with an uncertain scene.
+        terms, derivatives with an uncertain scene, crosstalk to learn of a sensor whose delay
+        drifts.
     """
     settings = TrackingSettings() if settings is None else settings
     try:
@@ -136,6 +137,11 @@ def tracker(
     learns = not observed.by_rate and (
         settings.crosstalk_drift is not None or (posterior is None and bool(untold))
     )
+    if learns and sensor.temperature is not None and sensor.temperature.known[1] != 0.0:
+        raise RefusedError(
+            "the sensor's delay follows its temperature and crosstalk does not: a tracker that "
+            "learns crosstalk could not take them apart; state its numbers, or calibrate"
+        )
     # derivatives do not see crosstalk at all
     spared = unknown_crosstalk if learns or observed.by_rate else ()
     known = nuisance_of(parameters, posterior, spared)

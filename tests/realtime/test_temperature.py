@@ -107,6 +107,8 @@ def test_what_is_not_known_is_left_out_by_name() -> None:
         export_c("conventional", sensor, parse_scene(SCENE))
     known, frames = _seen("pulsed")
     unknown = parse_scene(SCENE | {"crosstalk": [prior, prior]})
+    with pytest.raises(RefusedError, match="could not take them apart"):
+        tracker(known, unknown)
     reasons = {row.name: row.reason for row in estimate(known, unknown, frames).left_out}
     assert "follows its temperature" in reasons["differential"]
 
