@@ -17,8 +17,10 @@ Flags = NDArray[np.bool_]
 
 _UNLIKE = 1.0  # change of a rate over its mean: more than three times as fast, or back
 _TOLD = 4.0  # standard deviations above which a change is none of noise
-_SHARE = 0.2  # of the frames that tell, above which no frame is believed
-_FEWEST = 2
+# Share of the frames that tell, above which no frame is believed: an uneven one takes itself and
+# two on either side, so that of a fifth, spread over a track, nothing is left but by chance
+_SHARE = 0.2
+_FEWEST = 2  # one turn, or one jump, is no rough motion: what is beside it is left out anyway
 _BY_CHANCE = 0.01  # rate, at most, at which noise alone makes all frames of a smooth motion uneven
 _AROUND = 2  # frames on either side, whose windows hold an uneven one
 
