@@ -36,7 +36,7 @@ class _Part(NamedTuple):
 
 def _parts(examples: int, address: str) -> Iterator[_Part]:
     """Return everything that is asked for."""
-    document = httpx.get(f"{address}/openapi.json").json()
+    document = httpx.get(f"{address}/openapi.json", timeout=60).json()
     pieces = -(-examples // PIECE)
     for path, operations in document["paths"].items():
         if re.match(test_schemathesis.NO_END, path):
