@@ -1,6 +1,8 @@
 """Chunks on a real Dask cluster, with TLS: its workers and its scheduler may die."""
 
+import contextlib
 import random
+import shutil
 import time
 from functools import partial
 from pathlib import Path
@@ -9,13 +11,15 @@ import pytest
 
 pytest.importorskip("distributed", reason="Dask is not installed: hybridtof[cluster]")
 
-from benchmarks.cluster import Cluster, certificate
+from benchmarks.cluster import Cluster
 from benchmarks.fleet import Fleet, fleet
 from benchmarks.kills import survived
+from benchmarks.postgres import postgres
 from service import cluster
 from service.cli import main
 from tests.service.conftest import FRAMES, SENSOR
 from tests.service.fake_fold import CHUNKS, STEPS
+from tests.service.test_compose import certified
 from tests.service.test_jobs import undisturbed
 from tests.service.test_server import fake_server
 
@@ -49,9 +53,8 @@ def test_refused_at_the_start(
 
 @pytest.mark.slow
 def test_kills_of_a_cluster_change_nothing(tmp_path: Path) -> None:
-    """A chunk's process, then a worker, then the scheduler."""
-    dask = certificate(tmp_path)
-    if dask is None:
+    """The parts of compose.yaml together: a chunk's process, a worker, then the scheduler die."""
+    if shutil.which("openssl") is None:
         pytest.skip("no openssl is installed to make certificates")
     body = {
         "sensor": SENSOR,
@@ -67,11 +70,14 @@ def test_kills_of_a_cluster_change_nothing(tmp_path: Path) -> None:
             time.sleep(0.02)
         reached[0] = steps
 
-    settings = {"HYBRIDTOF_DATABASE": f"sqlite:///{tmp_path}/jobs.sqlite"}
-    with Cluster.running(tmp_path) as run:
+    with contextlib.ExitStack() as parts:
+        database = parts.enter_context(postgres()) or f"sqlite:///{tmp_path}/jobs.sqlite"
+        run = Cluster(certified(tmp_path), tmp_path, 2)
+        parts.callback(run.end)
         kills = [partial(run.kill, rng, what) for what in ("process", "worker", "scheduler")]
-        with fleet(fake_server(sleep=0.2), settings | run.settings, 1) as running:
-            found = survived(running, dict.fromkeys("ab", body), kills, further)
+        settings = run.settings | {"HYBRIDTOF_DATABASE": database}
+        running = parts.enter_context(fleet(fake_server(sleep=0.2), settings, 1))
+        found = survived(running, dict.fromkeys("ab", body), kills, further)
     answers = [answer for answer, _ in found.values()]
     assert [a["parameters"]["object.c0"]["mean"] for a in answers] == [undisturbed()] * 2
     assert found["a"] == found["b"]

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -36,6 +37,46 @@ def _filled(value: Any, variables: dict[str, str]) -> Any:
 def cluster_env() -> dict[str, str]:
     lines = (ROOT / "cluster.env").read_text().splitlines()
     return dict(line.split("=", 1) for line in lines if not line.startswith("#"))
+
+
+def certified(folder: Path) -> dict[str, str]:
+    """Make the certificate as the file does, in a folder; Dask's settings in the file."""
+    services = compose()["services"]
+    part = services["certificate"]
+    command = [word.replace("/var/lib/tls", str(folder)) for word in part["command"]]
+    subprocess.run((*part["entrypoint"], *command), check=True, capture_output=True)
+    return {
+        name: value.replace("/var/lib/tls", str(folder))
+        for name, value in services["scheduler"]["environment"].items()
+    }
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not installed")
+def test_one_certificate_for_all_parts(tmp_path: Path) -> None:
+    """Made once, for whoever talks to the scheduler; the parts are run in test_cluster.py."""
+    settings = certified(tmp_path)
+    made = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert {value for value in settings.values() if value.startswith("/")} == {
+        str(tmp_path / name) for name in made
+    }
+    certified(tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == made
+    services = compose()["services"]
+    for name in ("hybridtof", "scheduler", "worker"):
+        assert services["scheduler"]["environment"].items() <= services[name]["environment"].items()
+        assert any(volume.startswith("tls:/var/lib/tls") for volume in services[name]["volumes"])
+
+
+def test_parts_wait_for_what_they_need() -> None:
+    """Also where the profile leaves the others out: they are waited for where they are there."""
+    services = compose()["services"]
+    waits = services["hybridtof"]["depends_on"]
+    assert waits.keys() == {"postgres", "scheduler"}
+    assert not any(one["required"] for one in waits.values())
+    assert "healthcheck" in services["postgres"]
+    for name in ("scheduler", "worker"):
+        assert "certificate" in services[name]["depends_on"]
+    assert services["worker"]["scale"] == 2
 
 
 def test_profiles() -> None:
