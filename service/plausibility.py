@@ -64,8 +64,10 @@ def _of_noise(sensor: Sensor, frames: Frames) -> Iterator[str]:
     for k, column in enumerate(sensor.columns):
         values = np.abs(frames.readings[:, k])
         step = _rounding(values)
+        if step is None:
+            continue
         sd = math.sqrt(sensor.noise.read[k] ** 2 + sensor.noise.shot * float(np.median(values)))
-        if step is not None and sd < _SMALL * step:
+        if sd < _SMALL * step:
             yield (
                 f"{column} is rounded to {step:g}, and its stated noise is {sensor.noise.read[k]:g}"
                 f": state {step / math.sqrt(12.0):.2g} or more in noise.read, or standard "
@@ -75,7 +77,7 @@ def _of_noise(sensor: Sensor, frames: Frames) -> Iterator[str]:
 
 def _rounding(values: Array) -> float | None:
     """Return the power of ten to which values are rounded; None for those that are not."""
-    # unique imports masked arrays, which takes longer than a few frames do
+    # unique and median import masked arrays, which takes longer than a few frames do
     if values.size < _FEWEST or np.unique(values).size < _FEWEST:
         return None
     largest = math.floor(math.log10(values.max()))

@@ -88,7 +88,7 @@ class JointLaw:
             terms.append(size - 0.5 * np.einsum("ji,ji->i", off, off))
         return np.asarray(scipy.special.logsumexp(terms, axis=0))
 
-    def sample(self, rng: np.random.Generator, n: int) -> Array:
+    def sample(self, rng: "np.random.Generator", n: int) -> Array:
         """Draw n vectors z."""
         normal = rng.standard_normal((n, self.mean.size))
         if self.weights.size == 0:

@@ -144,7 +144,7 @@ class Parameters:
             *sensor_terms(values),
         )
 
-    def sample(self, rng: np.random.Generator, n: int) -> Array:
+    def sample(self, rng: "np.random.Generator", n: int) -> Array:
         """Draw n vectors z from the prior, joint truncations by rejection.
 
         The effort is bounded: priors that all but exclude one another are refused.

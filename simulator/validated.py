@@ -52,7 +52,13 @@ class Validated(pydantic.BaseModel):
     """Base of the scene language: immutable, no coercion, no unknown fields, nothing non-finite."""
 
     model_config = pydantic.ConfigDict(
-        frozen=True, strict=True, extra="forbid", allow_inf_nan=False, revalidate_instances="never"
+        frozen=True,
+        strict=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        revalidate_instances="never",
+        # most types are parts of others, or of no use to a process
+        defer_build=True,
     )
 
 

@@ -7,18 +7,19 @@ but for their numbers: of each kind the texts of columns are laid between texts 
 import dataclasses
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import orjson
 from numpy.typing import NDArray
 
 from inference.estimates import Estimates, LeftOut, SdParts, Status, TechniqueResult
-from service.answers.estimates import AnswerShape
 from service.json_text import encode
 from simulator.remembered import remembered
 
-__all__ = ["encode_estimates"]
+__all__ = ["AnswerShape", "encode_estimates"]
+
+AnswerShape = Literal["rows", "columns"]
 
 Array = NDArray[np.float64]
 # text between numbers, and texts of numbers

@@ -5,7 +5,6 @@ from typing import Literal
 import pydantic
 
 __all__ = [
-    "AnswerShape",
     "ColumnarEstimatesResponse",
     "EstimateColumns",
     "EstimatesResponse",
@@ -15,7 +14,6 @@ __all__ = [
     "TechniqueEstimates",
 ]
 
-AnswerShape = Literal["rows", "columns"]
 StatusName = Literal["unique", "ambiguous", "none", "saturated"]
 
 

@@ -6,7 +6,6 @@ import os
 import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -159,6 +158,8 @@ async def _posterior(
     settings: "SamplerSettings",
     make: "Callable[[Jobs[Any, Any, Any, Any], JobRecord], Awaitable[bytes]] | None",
 ) -> tuple["JobRecord", bytes | None]:
+    from tempfile import TemporaryDirectory
+
     from inference.posterior import fold
     from service.jobs import Jobs
     from service.process_pool import ProcessPool

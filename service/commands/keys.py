@@ -6,8 +6,6 @@ import os
 import re
 from pathlib import Path
 
-import platformdirs
-
 from service.commands.command import Subparsers, add_command, note
 from service.commands.output import write_result
 from simulator.errors import InvalidInputError
@@ -45,6 +43,8 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
 
 
 def _run(args: argparse.Namespace) -> int:
+    import platformdirs
+
     from service.border.keys import new_key, read_keys, write_keys
 
     named = os.environ.get("HYBRIDTOF_API_KEYS")

@@ -8,8 +8,8 @@ from fastapi.responses import Response
 from inference.estimate import estimate, estimate_planned
 from inference.fits.techniques.registry import FITS
 from inference.plan import plan
-from service.answers.encoding import encode_estimates
-from service.answers.estimates import AnswerShape, ColumnarEstimatesResponse, EstimatesResponse
+from service.answers.encoding import AnswerShape, encode_estimates
+from service.answers.estimates import ColumnarEstimatesResponse, EstimatesResponse
 from service.bodies import BodyOf
 from service.checked_system import aliases_of, checked_frames
 from service.errors import NotAcceptableError, OverdueError

@@ -1,6 +1,8 @@
 """The command line in this process; what needs a process of its own is in test_server.py."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -236,3 +238,22 @@ def test_calibrate_writes_a_scene_that_every_command_takes(
     code, _, err = run(capsys, "estimate", frames, "--scene", output)
     assert code == 2
     assert "calibrated.json#/scene/calibration/accept: " in err
+
+
+def test_an_estimate_of_one_frame_imports_what_it_needs(tmp_path: Path) -> None:
+    """What the service, the samplers and the compiler take would be most of its time."""
+    noise = {"read": [2e-5, 1e-3]}
+    system = {"sensor": {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": noise}, "scene": {}}
+    (tmp_path / "scene.json").write_text(json.dumps(system))
+    (tmp_path / "frames.csv").write_text("w1,w2\n0.0242,0.4230\n")
+    code = """
+import sys
+from service.cli import main
+assert main(["estimate", "frames.csv", "--scene", "scene.json", "--quiet"]) == 0
+whole = {"alembic", "asyncio", "emcee", "fastapi", "h5py", "httpx", "numba", "platformdirs"}
+whole |= {"sqlalchemy", "starlette", "tempfile", "uvicorn"}
+parts = {"numpy.ma", "numpy.random", "scipy.linalg", "scipy.special", "scipy.stats"}
+brought = (whole | parts) & sys.modules.keys()
+assert not brought, brought
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, capture_output=True)
