@@ -43,7 +43,7 @@ def _parts(examples: int, address: str) -> Iterator[_Part]:
             continue
         for method in operations:
             name = f"{method.upper()} {path}"
-            options = ("--include-path", path, "--include-method", method.upper())
+            options = ("--include-name", name)
             # what it makes of every keyword once needs no further seeds
             each = (*options, "--phases", "examples,coverage")
             yield _Part(f"{name} keywords", each, 1, 1)

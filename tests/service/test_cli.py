@@ -251,7 +251,7 @@ import sys
 from service.cli import main
 assert main(["estimate", "frames.csv", "--scene", "scene.json", "--quiet"]) == 0
 whole = {"alembic", "asyncio", "emcee", "fastapi", "h5py", "httpx", "numba", "platformdirs"}
-whole |= {"sqlalchemy", "starlette", "tempfile", "uvicorn"}
+whole |= {"sqlalchemy", "starlette", "uvicorn"}
 parts = {"numpy.ma", "numpy.random", "scipy.linalg", "scipy.special", "scipy.stats"}
 brought = (whole | parts) & sys.modules.keys()
 assert not brought, brought
