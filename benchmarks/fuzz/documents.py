@@ -49,8 +49,8 @@ def _parts(examples: int, address: str) -> Iterator[_Part]:
             yield _Part(f"{name} keywords", each, 1, 1)
             yield _Part(name, (*options, "--phases", "fuzzing"), min(examples, PIECE), pieces)
     several = max(examples // 20, 1)
-    options = ("--exclude-path-regex", test_schemathesis.NO_END, "--phases", "stateful")
-    yield _Part("several requests", options, min(several, 25), -(-several // 25))
+    chained = ("--exclude-path-regex", test_schemathesis.NO_END, "--phases", "stateful")
+    yield _Part("several requests", chained, min(several, 25), -(-several // 25))
 
 
 def checked(examples: int, only: str, out: Path) -> bool:
