@@ -136,8 +136,9 @@ def boxes_of(
         length = float(np.linalg.norm(chord))
         slowest = float((slopes @ chord).min()) / length if length > 0.0 else 0.0
         boxes[j, _PROBABILITY] = top * width
-        within = math.sqrt(2.0 * math.pi) / (_LEAST_SPEED * slowest) if slowest > 0.0 else width
-        boxes[j, _MOST] = top * min(within, width)
+        # of a sensor with more gain the curve is faster, and what it takes up as much less
+        speed = _LEAST_SPEED * slowest
+        boxes[j, _MOST] = top * math.sqrt(2.0 * math.pi) / speed if speed > 0.0 else math.inf
         boxes[j, _SPREAD] = norms[a : b + 1].max()
         boxes[j, [_LEAST1, _LEAST2]] = roots[a : b + 1, [0, 2]].min(axis=0)
     firsts = np.arange(0, boxes.shape[0], _GROUP)
