@@ -145,6 +145,8 @@ if not TYPE_CHECKING:
             value = importlib.import_module("inference.posterior.fold")
         elif name in _HOMES:
             value = getattr(importlib.import_module(_HOMES[name]), name)
+            if hasattr(value, "model_rebuild"):
+                value.model_rebuild()  # or help() does not know what it takes
         else:
             raise AttributeError(f"module 'hybridtof' has no attribute {name!r}")
         globals()[name] = value

@@ -44,6 +44,9 @@ def meant(name: str) -> list[str]:
         return [known for known in NAMES if "w" in known and known[0] == plain[0]]
     if len(plain) <= 3:
         return []
+    if "temperature" in plain:
+        # of a die, a room, in degrees: only a sensor with coefficients asks for one, and by name
+        return []
     from difflib import get_close_matches  # seldom needed
 
     return get_close_matches(plain, NAMES, n=2, cutoff=_ALIKE)

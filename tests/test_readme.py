@@ -129,13 +129,13 @@ def test_forms_of_sensors_scenes_and_frames() -> None:
     text = (ROOT / "docs" / "scenes.md").read_text(encoding="utf-8")
     shown = [json.loads(found) for found in re.findall(r"```json\n(.*?)\n```", text, re.DOTALL)]
     sensors = [hybridtof.parse_sensor(form) for form in shown if "kind" in form]
-    assert [sensor.kind for sensor in sensors] == ["pulsed", "sine_wave", "sine_wave"]
+    assert [sensor.kind for sensor in sensors] == ["pulsed", *["sine_wave"] * 3]
     (columns,) = (form for form in shown if "w1" in form)
     assert len(hybridtof.frames_from_columns(sensors[0], columns)) == 2
     (scene,) = (form for form in shown if "object" in form)
     for sensor in sensors:
         check_scene(sensor, hybridtof.parse_scene(scene))
-    assert len(shown) == 5
+    assert len(shown) == 6
 
 
 def test_front_page_is_short() -> None:

@@ -119,9 +119,9 @@ def test_hint_for_a_sine_wave(
 @pytest.mark.parametrize(
     ("suffix", "text"),
     [
-        (".csv", "comment,w1,w2,lot_number\nfirst,0.02,1.7,1\n"),
-        (".ndjson", '{"comment": "first", "w1": 0.02, "w2": 1.7, "lot_number": 1}\n'),
-        (".json", '{"comment": ["first"], "w1": [0.02], "w2": [1.7], "lot_number": [1]}'),
+        (".csv", "comment,w1,w2,temperature_c\nfirst,0.02,1.7,1\n"),
+        (".ndjson", '{"comment": "first", "w1": 0.02, "w2": 1.7, "temperature_c": 1}\n'),
+        (".json", '{"comment": ["first"], "w1": [0.02], "w2": [1.7], "temperature_c": [1]}'),
     ],
 )
 def test_columns_that_cannot_be_meant_are_passed_over(
@@ -131,7 +131,7 @@ def test_columns_that_cannot_be_meant_are_passed_over(
     said = Said(capsys, "estimate", path, "--scene", scene)
     assert said.code == 0
     assert len(said.frames) == 1
-    assert "ignored, since they are no columns: comment, lot_number\n" in said.err
+    assert "ignored, since they are no columns: comment, temperature_c\n" in said.err
     assert Said(capsys, "estimate", path, "--scene", scene, "--quiet").err == ""
 
 
