@@ -69,7 +69,7 @@ def speed(count: int = 100_000) -> None:
     for i in range(1000):
         state, _ = step(model, state, few.select(slice(i, i + 1)))
     single = (time.process_time() - begin) / 1000
-    print(f"{'':<44}{'us a frame':>12}{'ratio':>9}")
+    print(f"{'':<44}{'us a frame':>12}{'ratio':>13}")
     for name, seconds in (
         ("conventional estimate, all of it", plain / count),
         ("its division alone", bare / count),
@@ -78,7 +78,7 @@ def speed(count: int = 100_000) -> None:
         ("tracker, looking everywhere in every frame", full / count),
         ("tracker, frame by frame from Python", single),
     ):
-        print(f"{name:<44}{seconds * 1e6:>12.3f}{seconds * count / plain:>9.3f}")
+        print(f"{name:<44}{seconds * 1e6:>12.3f}{seconds * count / plain:>13.3f}")
 
 
 def particles(
