@@ -11,8 +11,6 @@ _OWN_SHADOW = (
     "That of a diffuse object has c0' near 0.75 c0, and ranges are then off without a misfit: "
     "leave `shadow` out to have it unknown, or state its c0 and c1"
 )
-
-
 _TEMPERATURE = (
     "gain and delay do not follow the temperature: temperature_k is given and not used, since the "
     "sensor states no coefficients in `temperature`"

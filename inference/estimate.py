@@ -10,7 +10,7 @@ from inference.plan import Plan, cheapest, obstacle, plan
 from inference.realtime.registry import TECHNIQUES
 from inference.shared_error import with_shared_error
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
-from inference.temperature import of_known_temperature, task_of, with_untold
+from inference.temperature import solved_where_told, task_of
 from simulator.errors import InvalidInputError, Problem, RefusedError
 from simulator.frames import Frames
 from simulator.joint_scene import around, centre
@@ -120,13 +120,9 @@ def estimate_planned(
 def _run(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> TechniqueResult | LeftOut:
     start = time.perf_counter()
     try:
-        told = of_known_temperature(sensor, frames)
-        used = frames if told is None else frames.select(told)
-        result = _solved(sensor, scene, used, name)
+        result = solved_where_told(sensor, frames, lambda used: _solved(sensor, scene, used, name))
     except RefusedError as error:
         return LeftOut(name, str(error))
-    if told is not None:
-        result = with_untold(result, told)
     return _taken(result, time.perf_counter() - start)
 
 
@@ -186,8 +182,9 @@ def all_roots(
     reason = obstacle(TECHNIQUES[technique], sensor, scene, known, frames)
     if reason is not None:
         raise InvalidInputError.at("/technique", reason)
-    told = of_known_temperature(sensor, frames)
-    used = frames if told is None else frames.select(told)
-    task = task_of(sensor, scene, used, known, physical=False, high_m=high_m)
-    found = TECHNIQUES[technique].solve(task)
-    return found if told is None else with_untold(found, told)
+
+    def solve(used: Frames) -> TechniqueResult:
+        task = task_of(sensor, scene, used, known, physical=False, high_m=high_m)
+        return TECHNIQUES[technique].solve(task)
+
+    return solved_where_told(sensor, frames, solve)

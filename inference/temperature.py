@@ -1,6 +1,7 @@
 """Frames of known temperature: what estimates of a sensor that follows it are made of."""
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,21 +16,36 @@ from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
-__all__ = ["UNKNOWN_TEMPERATURE", "of_known_temperature", "task_of", "with_untold"]
+__all__ = ["UNKNOWN_TEMPERATURE", "solved_where_told", "task_of"]
 
 Array = NDArray[np.float64]
 
 UNKNOWN_TEMPERATURE = "the sensor's temperature is not known"
 
 
-def of_known_temperature(sensor: Sensor, frames: Frames) -> NDArray[np.bool_] | None:
-    """Tell which frames can be used, shape (n,); None where all can.
+def solved_where_told(
+    sensor: Sensor, frames: Frames, solve: Callable[[Frames], TechniqueResult]
+) -> TechniqueResult:
+    """Return answers to all frames, of which those of unknown temperature are none.
+
+    Parameters
+    ----------
+    sensor, frames : Sensor, Frames
+        The request.
+    solve : callable
+        What answers the others.
 
     Raises
     ------
     RefusedError
-        Where none can.
+        Where there are no others, and what ``solve`` raises.
     """
+    told = _told(sensor, frames)
+    return solve(frames) if told is None else _with_untold(solve(frames.select(told)), told)
+
+
+def _told(sensor: Sensor, frames: Frames) -> NDArray[np.bool_] | None:
+    """Tell which frames can be used, shape (n,); None where all can."""
     if sensor.temperature is None or frames.temperature_k is None:
         return None
     told = np.isfinite(frames.temperature_k)
@@ -55,16 +71,8 @@ def task_of(sensor: Sensor, scene: Scene, frames: Frames, known: Known, **more: 
     return Task(cold, scene, frames, known, **more)
 
 
-def with_untold(result: TechniqueResult, told: NDArray[np.bool_]) -> TechniqueResult:
-    """Put the answers of frames of unknown temperature where they belong: none, and why.
-
-    Parameters
-    ----------
-    result : TechniqueResult
-        Of the others.
-    told : ndarray of bool, shape (n,)
-        Which those are.
-    """
+def _with_untold(result: TechniqueResult, told: NDArray[np.bool_]) -> TechniqueResult:
+    """Put the answers of frames of unknown temperature where they belong: none, and why."""
     reasons = (*result.reasons, UNKNOWN_TEMPERATURE)
 
     def spread(values: NDArray[Any], fill: float) -> NDArray[Any]:

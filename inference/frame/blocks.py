@@ -34,9 +34,8 @@ Flags = NDArray[np.bool_]
 # columns of frames; the last four only where something is known of ranges
 FIRST, SECOND, GAIN = 0, 1, 2
 RANGE, RATE, DISPLACEMENT, DISPLACEMENT_RATE = 3, 4, 5, 6
-WARM = (
-    7  # above the sensor's reference [K], where it follows its temperature; kernels do not see it
-)
+# above the sensor's reference [K], where it follows its temperature; kernels do not see it
+WARM = 7
 _PLAIN = 3  # columns of frames of whose ranges nothing is known
 
 

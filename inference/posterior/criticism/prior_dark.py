@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.frame.known_range import rates_of
 from inference.frame.range_prior import LEAST_INFORMATION
+from inference.frame.warmth import gains_of
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.status import Identifiability, weak_at_best
 from simulator.scene import Reference
@@ -76,7 +77,7 @@ def mark_dark(
 
 
 def _experiment(density: CollapsedDensity, z: Array, log_r: Array) -> Experiment:
-    gain, rates = density.frames[:, 2], rates_of(density.frames)
+    gain, rates = gains_of(density.frames), rates_of(density.frames)
     return Experiment(density.sensor, density.parameters, z, log_r, gain, rates=rates)
 
 
