@@ -5,8 +5,9 @@
 
 Sine waves are held to ball arithmetic. Prints a row a technique: frames, roots, frames that lie at
 a fold to within the rounding of their readings, wrong counts, and the worst root in units of its
-condition times rounding. The exit code is 1 where a count is wrong or a root is off by more than a
-thousand.
+condition times rounding. Then derivatives of mean readings and log densities, held to power series
+of balls, in the same units. The exit code is 1 where a count is wrong or something is off by more
+than a thousand.
 """
 
 import argparse
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from tests.extreme.certified import FAMILIES, tally
+from tests.extreme.slopes import worst_slopes
 from tests.extreme.tally import Tally
 from tests.extreme.waves import WAVES, tally_waves
 
@@ -27,6 +29,7 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=1200, help="scenes a technique")
     parser.add_argument("--frames", type=int, default=16, help="random ranges a scene")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--slopes", type=int, default=10_000, help="frames of the derivatives")
     rows = [*FAMILIES, *(f"{technique}, sine wave" for technique in WAVES)]
     parser.add_argument("--only", nargs="+", choices=rows, default=rows, metavar="ROW")
     options = parser.parse_args()
@@ -46,7 +49,20 @@ def main() -> None:
         rng = np.random.default_rng([options.seed, 100 + number])
         found = tally_waves(technique, max(options.scenes // 8, 1), options.frames, rng)
         failed |= _row(f"{technique}, sine wave", found)
+    if options.only == rows:
+        failed |= _slopes(options.slopes, options.seed)
     sys.exit(1 if failed else 0)
+
+
+def _slopes(frames: int, seed: int) -> bool:
+    """Print the worst error of derivatives; say whether any is off by more than the bar."""
+    worst = worst_slopes(frames, np.random.default_rng([seed, 200]))
+    print(f"\n| derivative, {frames:,} frames | worst |\n|---|---|")
+    for name, (error, where) in sorted(worst.items()):
+        print(f"| {name} | {error:.2g} |", flush=True)
+        if not error < _BAR:
+            print("OFF", name, where, file=sys.stderr)
+    return any(not error < _BAR for error, _ in worst.values())
 
 
 def _row(name: str, t: Tally[Any]) -> bool:

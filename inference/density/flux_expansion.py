@@ -7,12 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.range_integral import falls_off
-from inference.frame.arguments import FluxError, FrameScene, Pair, ReferencePrior
+from inference.frame.arguments import FluxError, FrameScene, Instrument, ReferencePrior
 from inference.frame.blocks import Block, frame_of
 from inference.frame.flux_error import cubic_weights, slope_weights
-from inference.frame.gaussian import covariance_slope, gaussian, precision_times, squared_cross
+from inference.frame.gaussian import (
+    covariance_slope,
+    gaussian,
+    precision_product,
+    squared_cross,
+)
 from inference.frame.known_range import known_information, known_log_density, known_slope
-from inference.frame.mean_readings import readings_along
+from inference.frame.mean_readings import Along, readings_along
 from inference.frame.modes import LEFT, POSITION, RIGHT, SD, TOP
 from inference.frame.range_prior import (
     LEAST_INFORMATION,
@@ -91,51 +96,46 @@ def expand(u: float, block: Block, scene: FrameScene) -> Expansion:
     r, prior, instrument = math.exp(u), scene.range_prior, scene.instrument
     first, second, gain, known = frame_of(block, 0)
     signal, signal_slope, mean, slope = readings_along(u, r, gain, scene)
-    e1, e2 = first - mean[0], second - mean[1]
-    (o1, o2), (t1, t2) = signal, slope
-    density = gaussian((e1, e2), mean, signal, instrument)
+    residual = first - mean[0], second - mean[1]
+    density = gaussian(residual, mean, signal, instrument)
     density += log_range_density(r, u, prior) + known_log_density(r, known, scene.offset)
-    pressed = precision_times(slope, mean, signal, instrument)
-    q1, q2 = precision_times(signal, mean, signal, instrument)
-    pull = precision_times((e1, e2), mean, signal, instrument)
-    along = e1 * pressed[0] + e2 * pressed[1] + prior_slope(r, u, prior)
-    along += covariance_slope(pull, mean, slope, signal, signal_slope, instrument)
+    along = precision_product(residual, slope, mean, signal, instrument) + prior_slope(r, u, prior)
+    along += covariance_slope(residual, mean, slope, signal, signal_slope, instrument)
     along += known_slope(r, known, scene.offset)
-    flux = e1 * q1 + e2 * q2
-    flux += covariance_slope(pull, mean, signal, signal, signal, instrument)
+    flux = precision_product(residual, signal, mean, signal, instrument)
+    flux += covariance_slope(residual, mean, signal, signal, signal, instrument)
     of_logarithm, of_range = prior_curvature(r, prior)
     told = known_information(r, known)
     held = of_logarithm + of_range + told
-    bend = t1 * pressed[0] + t2 * pressed[1] + held
-    mixed = t1 * q1 + t2 * q2
-    stiff = o1 * q1 + o2 * q2
+    told_by_light = precision_product(slope, slope, mean, signal, instrument)
+    bend = told_by_light + held
+    mixed = precision_product(slope, signal, mean, signal, instrument)
+    stiff = precision_product(signal, signal, mean, signal, instrument)
     # what is left once u has followed, as a sum of squares (Lagrange's identity)
     free = stiff
     if bend > 0.0:
         cross = squared_cross(slope, signal, mean, signal, instrument)
         free = (cross + held * stiff) / bend
-    information = LEAST_INFORMATION + t1 * pressed[0] + t2 * pressed[1] + told
+    information = LEAST_INFORMATION + told_by_light + told
     resolved, pushed, turn = _resolution(
-        information, signal, signal_slope, pressed, prior.reference
+        information, Along(signal, signal_slope, mean, slope), instrument, prior.reference
     )
     return Expansion(density + resolved, along, bend, flux + pushed, mixed, stiff, free, turn)
 
 
 @compiled
 def _resolution(
-    information: float,
-    signal: Pair,
-    signal_slope: Pair,
-    pressed: Pair,
-    reference: ReferencePrior | None,
+    information: float, along: Along, instrument: Instrument, reference: ReferencePrior | None
 ) -> tuple[float, float, float]:
     """Return what a reference prior adds to density, slope along log flux, and turn."""
     if reference is not None:
-        p1, p2 = pressed
+        signal, signal_slope, mean, slope = along
+        pushed = precision_product(signal_slope, slope, mean, signal, instrument)
+        turned = precision_product(signal, slope, mean, signal, instrument)
         return (
             0.5 * math.log(information / LEAST_INFORMATION),
-            (signal_slope[0] * p1 + signal_slope[1] * p2) / information,
-            (signal[0] * p1 + signal[1] * p2) / information,
+            pushed / information,
+            turned / information,
         )
     else:  # noqa: RET505  # a branch, so that it is pruned at compile time
         return 0.0, 0.0, 0.0

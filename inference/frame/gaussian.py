@@ -16,6 +16,7 @@ __all__ = [
     "empty_gaussian",
     "gaussian",
     "log_top",
+    "precision_product",
     "precision_times",
     "squared_cross",
 ]
@@ -104,6 +105,38 @@ def _precision_times(
 
 
 @compiled
+def precision_product(
+    first: Pair, second: Pair, mean: Pair, signal: Pair, instrument: Instrument
+) -> float:
+    """Return first^T V^-1 second, V the covariance; nothing cancels, also not along the signal."""
+    return _product(first, second, mean, signal, instrument, instrument.shot, instrument.relative)
+
+
+@compiled
+def _product(
+    first: Pair,
+    second: Pair,
+    mean: Pair,
+    signal: Pair,
+    instrument: Instrument,
+    shot: float | None,
+    relative: float | None,
+) -> float:
+    read = instrument.read
+    if shot is not None or relative is not None:
+        unit = read[1]
+        noise = in_units(noise_of(mean, signal, instrument), unit)
+        own1, own2, shared, s1, s2 = noise
+        a1, a2, b1, b2 = first[0] / unit, first[1] / unit, second[0] / unit, second[1] / unit
+        total = own2 * a1 * b1 + own1 * a2 * b2 + shared * ((a1 - a2) * (b1 - b2))
+        return (total + (s2 * a1 - s1 * a2) * (s2 * b1 - s1 * b2)) / determinant(noise)
+    else:  # noqa: RET505
+        return first[0] * (second[0] / read[0] / read[0]) + first[1] * (
+            second[1] / read[1] / read[1]
+        )
+
+
+@compiled
 def squared_cross(
     first: Pair, second: Pair, mean: Pair, signal: Pair, instrument: Instrument
 ) -> float:
@@ -155,7 +188,7 @@ def _common_slopes(signal_slope: Pair, relative: float | None) -> Pair:
 
 @compiled
 def covariance_slope(
-    pull: Pair,
+    residual: Pair,
     mean: Pair,
     mean_slope: Pair,
     signal: Pair,
@@ -170,13 +203,13 @@ def covariance_slope(
     own = _shot_slopes(mean, mean_slope, instrument.shot, pulsed)
     common = _common_slopes(signal_slope, instrument.relative)
     return _covariance_slope(
-        pull, mean, signal, own, common, instrument, instrument.shot, instrument.relative
+        residual, mean, signal, own, common, instrument, instrument.shot, instrument.relative
     )
 
 
 @compiled
 def _covariance_slope(
-    pull: Pair,
+    residual: Pair,
     mean: Pair,
     signal: Pair,
     own_slopes: Triple,
@@ -186,20 +219,25 @@ def _covariance_slope(
     relative: float | None,
 ) -> float:
     if shot is not None or relative is not None:
-        noise = noise_of(mean, signal, instrument)
-        own1, own2, shared, s1, s2 = noise
-        d1, d2, dk = own_slopes
-        t1, t2 = common_slopes
         unit = instrument.read[1]
-        scale = determinant(in_units(noise, unit)) * unit * unit
-        p11 = (own2 + shared + s2 * s2) / unit / unit / scale
-        p22 = (own1 + shared + s1 * s1) / unit / unit / scale
-        p12 = -(shared + s1 * s2) / unit / unit / scale
-        w1, w2 = pull
-        square = d1 * w1 * w1 + d2 * w2 * w2 + dk * ((w1 + w2) * (w1 + w2))
-        square += 2.0 * (w1 * t1 + w2 * t2) * (w1 * s1 + w2 * s2)
-        q1, q2 = precision_times((s1, s2), mean, signal, instrument)
-        trace = d1 * p11 + d2 * p22 + dk * (p11 + 2.0 * p12 + p22) + 2.0 * (t1 * q1 + t2 * q2)
-        return 0.5 * (square - trace)
+        noise = in_units(noise_of(mean, signal, instrument), unit)
+        own1, own2, shared, s1, s2 = noise
+        e1, e2 = residual[0] / unit, residual[1] / unit
+        d1, d2, dk = own_slopes
+        t1, t2 = common_slopes[0] / unit, common_slopes[1] / unit
+        area = determinant(noise)
+        turned = (s2 * e1 - s1 * e2) / area
+        w1 = (own2 * e1 + shared * (e1 - e2)) / area + s2 * turned
+        w2 = (own1 * e2 + shared * (e2 - e1)) / area - s1 * turned
+        both = (own2 * e1 + own1 * e2) / area + (s2 - s1) * turned  # w1 + w2
+        # of w and V^-1 s along s what is large cancels exactly, and is not formed
+        along = (own2 * e1 * s1 + own1 * e2 * s2 + shared * (e1 - e2) * (s1 - s2)) / area
+        across = (own2 * e1 * t1 + own1 * e2 * t2 + shared * (e1 - e2) * (t1 - t2)) / area
+        across += turned * (s2 * t1 - s1 * t2)
+        common = (own2 * s1 * t1 + own1 * s2 * t2 + shared * (s1 - s2) * (t1 - t2)) / area
+        square = d1 / unit / unit * (w1 * w1 - (own2 + shared + s2 * s2) / area)
+        square += d2 / unit / unit * (w2 * w2 - (own1 + shared + s1 * s1) / area)
+        square += dk / unit / unit * (both * both - (own1 + own2 + (s1 - s2) * (s1 - s2)) / area)
+        return 0.5 * square + along * across - common
     else:  # noqa: RET505  # a branch, so that it is pruned at compile time
         return 0.0

@@ -12,6 +12,7 @@ from inference.frame.gaussian import (
     empty_gaussian,
     gaussian,
     log_top,
+    precision_product,
     precision_times,
 )
 from inference.frame.known_range import (
@@ -45,8 +46,7 @@ _EPSILON = 2.0**-52
 def _information(u: float, gain: float, scene: FrameScene) -> float:
     """Return the Fisher information of a frame on its log r."""
     signal, _, mean, slope = readings_along(u, math.exp(u), gain, scene)
-    p1, p2 = precision_times(slope, mean, signal, scene.instrument)
-    return slope[0] * p1 + slope[1] * p2
+    return precision_product(slope, slope, mean, signal, scene.instrument)
 
 
 @compiled
@@ -107,12 +107,10 @@ def slope_and_curvature(u: float, block: Block, scene: FrameScene) -> Pair:
     for j in range(frame_count(block)):
         frame = frame_of(block, j)
         signal, signal_slope, mean, slope = readings_along(u, r, frame.gain, scene)
-        e1, e2 = frame.first - mean[0], frame.second - mean[1]
-        p1, p2 = precision_times(slope, mean, signal, instrument)
-        pull = precision_times((e1, e2), mean, signal, instrument)
-        rise += e1 * p1 + e2 * p2
-        rise += covariance_slope(pull, mean, slope, signal, signal_slope, instrument)
-        bend += slope[0] * p1 + slope[1] * p2
+        residual = frame.first - mean[0], frame.second - mean[1]
+        rise += precision_product(residual, slope, mean, signal, instrument)
+        rise += covariance_slope(residual, mean, slope, signal, signal_slope, instrument)
+        bend += precision_product(slope, slope, mean, signal, instrument)
         rise += known_slope(r, frame.known, scene.offset)
         bend += known_information(r, frame.known)
     ahead = log_resolution(u + _DIFFERENCE, block, scene, prior.reference)

@@ -20,7 +20,7 @@ __all__ = ["summaries_of_chains", "summaries_of_weights"]
 
 Array = NDArray[np.float64]
 
-_THINNED = 1000  # draws among which modes are looked for: of one walker they are far apart
+_FEWEST = 1000  # draws among which modes are looked for: of one walker they are far apart
 
 
 def summaries_of_chains(
@@ -44,11 +44,14 @@ def summaries_of_chains(
     dict of str to ParameterSummary
     """
     ensembles, walkers, steps, _ = draws.shape
-    each = min(max(math.ceil(_THINNED / (ensembles * walkers)), 1), steps)
-    thin = np.linspace(0, steps - 1, each).astype(np.intp)
     result = {}
     for j, name in enumerate(names):
         drawn, x = draws[..., j], moved[..., j]
+        ess = effective_sample_size(drawn)
+        # as many as are independent: a mode of a thousandth has ten of ten thousand
+        looked_at = max(ess, _FEWEST) if math.isfinite(ess) else _FEWEST
+        each = min(math.ceil(looked_at / (ensembles * walkers)), steps)
+        thin = np.linspace(0, steps - 1, each).astype(np.intp)
         cuts = boundaries(x[:, :, thin].ravel())
         label = labels(x, cuts)
         modes = tuple(
@@ -57,7 +60,6 @@ def summaries_of_chains(
         )
         several = cuts.size > 0
         q05, q50, q95 = quantiles(x, several)
-        ess = effective_sample_size(drawn)
         sd = float(x.std(ddof=1))
         result[name] = ParameterSummary(
             math.nan if several else float(x.mean()),
