@@ -19,7 +19,7 @@ import numpy as np
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
 from service.commands.files import read_document
-from service.requests import SystemDescription
+from service.system_description import SystemDescription
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
 from simulator.simulate import simulate

@@ -7,7 +7,7 @@ import marshal
 import threading
 from typing import Any, TypeVar
 
-from service.requests import SystemDescription
+from service.system_description import SystemDescription
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 from simulator.validated import Validated, parse

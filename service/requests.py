@@ -1,4 +1,4 @@
-"""What clients send, and what files hold: the types by which both are validated."""
+"""What clients send: the types by which it is validated."""
 
 from typing import Annotated, Literal
 
@@ -6,36 +6,24 @@ import pydantic
 
 from inference.posterior.settings import SamplerSettings
 from inference.tracking.settings import TrackingSettings
+from service.system_description import SystemDescription
 from simulator.frames import FrameColumns
-from simulator.scene import Scene
-from simulator.sensor import Sensor
 from simulator.trajectories import Trajectory
-from simulator.validated import Validated
 
 __all__ = [
-    "AnySensor",
     "EstimateRequest",
     "IdentifiabilityRequest",
     "PosteriorRequest",
     "SimulationRequest",
     "StreamRequest",
-    "SystemDescription",
     "TrackedSystem",
 ]
 
-AnySensor = Annotated[Sensor, pydantic.Field(discriminator="kind")]
 # the largest integer that every JSON reader keeps exactly
 Seed = Annotated[int, pydantic.Field(ge=0, le=2**53 - 1)]
 Name = Annotated[str, pydantic.Field(max_length=64)]
 Positive = Annotated[float, pydantic.Field(gt=0)]
 _PLANNED = pydantic.Field(min_length=1, max_length=10_000, fail_fast=True)
-
-
-class SystemDescription(Validated):
-    """A sensor and the scene before it: what every request and every scene file holds."""
-
-    sensor: AnySensor
-    scene: Scene
 
 
 class TrackedSystem(SystemDescription):

@@ -17,8 +17,8 @@ from inference.posterior.job import prepare
 from inference.posterior.settings import SamplerSettings
 from service.json_text import encode
 from service.known_systems import read_system
-from service.requests import SystemDescription
 from service.strict_json import check_bulk, decode
+from service.system_description import SystemDescription
 from simulator.errors import HybridTofError, InvalidInputError
 from simulator.frames import FrameColumns, frames_from_columns
 

@@ -209,7 +209,8 @@ class SineWaveSensor(_AnySensor):
 Sensor = PulsedSensor | SineWaveSensor
 
 _adapter: pydantic.TypeAdapter[Sensor] = pydantic.TypeAdapter(
-    Annotated[Sensor, pydantic.Field(discriminator="kind")]
+    Annotated[Sensor, pydantic.Field(discriminator="kind")],
+    config=pydantic.ConfigDict(defer_build=True),
 )
 
 

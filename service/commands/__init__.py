@@ -4,45 +4,43 @@ What a command needs is imported when it runs: worker processes import the comma
 """
 
 import argparse
-from collections.abc import Callable
+from importlib import import_module
 
-from service import reproduce
-from service.commands import (
-    calibrate,
-    convert,
-    estimate,
-    export,
-    identifiability,
-    infer,
-    keys,
-    schema,
-    serve,
-    simulate,
-    track,
-    warm,
-)
 from service.commands.command import Subparsers
-from service.demo import command as demo
-from service.report import command as report
 
-__all__ = ["COMMANDS", "AddParser"]
+__all__ = ["COMMANDS", "add_parsers"]
 
-AddParser = Callable[["Subparsers[argparse.ArgumentParser]"], None]
+COMMANDS = {
+    "serve": "service.commands.serve",
+    "simulate": "service.commands.simulate",
+    "convert": "service.commands.convert",
+    "estimate": "service.commands.estimate",
+    "infer": "service.commands.infer",
+    "calibrate": "service.commands.calibrate",
+    "track": "service.commands.track",
+    "export": "service.commands.export",
+    "identifiability": "service.commands.identifiability",
+    "keys": "service.commands.keys",
+    "schema": "service.commands.schema",
+    "warm": "service.commands.warm",
+    "reproduce": "service.reproduce",
+    "demo": "service.demo.command",
+    "report": "service.report.command",
+}
+"""Name of every command, and the module that it is in."""
 
-COMMANDS: tuple[AddParser, ...] = (
-    serve.add_parser,
-    simulate.add_parser,
-    convert.add_parser,
-    estimate.add_parser,
-    infer.add_parser,
-    calibrate.add_parser,
-    track.add_parser,
-    export.add_parser,
-    identifiability.add_parser,
-    keys.add_parser,
-    schema.add_parser,
-    warm.add_parser,
-    reproduce.add_parser,
-    demo.add_parser,
-    report.add_parser,
-)
+
+def add_parsers(
+    subparsers: "Subparsers[argparse.ArgumentParser]", command: str | None = None
+) -> None:
+    """Add a command to the command line.
+
+    Parameters
+    ----------
+    subparsers : argparse subparsers
+        Of the main parser.
+    command : str, optional
+        One of `COMMANDS`; left out: all of them.
+    """
+    for name in COMMANDS if command is None else (command,):
+        import_module(COMMANDS[name]).add_parser(subparsers)

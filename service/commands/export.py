@@ -42,7 +42,7 @@ def _run(args: argparse.Namespace) -> int:
     from service.c_export import c_text, export_c
     from service.commands.files import check_folder, naming, read_document
     from service.commands.output import write_result
-    from service.requests import SystemDescription
+    from service.system_description import SystemDescription
 
     if args.output is not None:
         check_folder("--output", args.output)

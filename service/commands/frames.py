@@ -9,7 +9,7 @@ from service.commands.command import note
 from service.commands.files import naming, read_document, read_table, source
 from service.frame_table import FrameTable
 from service.plausibility import doubts
-from service.requests import SystemDescription
+from service.system_description import SystemDescription
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor

@@ -69,7 +69,8 @@ def _run(args: argparse.Namespace) -> int:
     from service.commands.files import naming, read_document
     from service.commands.output import write_result
     from service.plausibility import doubts
-    from service.requests import IdentifiabilityRequest, SystemDescription
+    from service.requests import IdentifiabilityRequest
+    from service.system_description import SystemDescription
     from simulator.errors import InvalidInputError
     from simulator.validated import parse
 

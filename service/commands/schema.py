@@ -38,7 +38,7 @@ def _run(args: argparse.Namespace) -> int:
     import pydantic
 
     from service.commands.output import write_result
-    from service.requests import AnySensor, SystemDescription
+    from service.system_description import AnySensor, SystemDescription
     from simulator.frames import FrameColumns
     from simulator.scene import Scene
 

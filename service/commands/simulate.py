@@ -56,7 +56,8 @@ def _run(args: argparse.Namespace) -> int:
     from service.commands.output import write_result
     from service.frame_files import check_suffix, write_frames
     from service.plausibility import doubts
-    from service.requests import SimulationRequest, SystemDescription
+    from service.requests import SimulationRequest
+    from service.system_description import SystemDescription
     from simulator.errors import InvalidInputError
     from simulator.validated import parse
 

@@ -20,10 +20,11 @@ from service.exports import EXPORTS
 from service.exports.negotiation import accepted_export
 from service.lanes import while_wanted
 from service.problems import problem_responses
-from service.requests import PosteriorRequest, SystemDescription
+from service.requests import PosteriorRequest
 from service.routes.resources import Cursor, LastEventId, answered, event_of, place_of
 from service.shared import client_of, shared_of
 from service.store.record import FINISHED, JobRecord
+from service.system_description import SystemDescription
 
 __all__ = ["router"]
 
