@@ -1,12 +1,13 @@
 """Processor time of what is computed, apart from that of compiling kernels."""
 
+import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 from simulator.compiled import given_up_s, when_compiling
 
-__all__ = ["compiling_s", "timed", "watch_compiling"]
+__all__ = ["compiling_s", "timed", "uncounted", "watch_compiling"]
 
 T = TypeVar("T")
 
@@ -72,6 +73,16 @@ def _listen() -> None:
             _watch.end()
 
     register(_EVENT, Listener())
+
+
+@contextlib.contextmanager
+def uncounted() -> Iterator[None]:
+    """Let what is done inside count like compiling: it is done once in a process."""
+    _watch.begin()
+    try:
+        yield
+    finally:
+        _watch.end()
 
 
 def compiling_s() -> float:

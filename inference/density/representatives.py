@@ -11,8 +11,8 @@ space leaves out, which is looked at where an answer is given.
 import dataclasses
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from inference.density.collapsed import CollapsedDensity
 from inference.density.profile import best_ranges, linearise
@@ -75,7 +75,7 @@ def drawn_by_information(
     n, d = len(density.frames), z.size
     log_r = best_ranges(density, z[None])[0, :, 0]
     jacobian = linearise(density, z, log_r).jacobian.reshape(-1, d)
-    basis = linalg.qr(np.concatenate([jacobian, np.eye(d)]), mode="economic")[0]
+    basis = scipy.linalg.qr(np.concatenate([jacobian, np.eye(d)]), mode="economic")[0]
     told = np.square(basis[: len(jacobian)]).sum(axis=1).reshape(n, -1).sum(axis=1)
     total = told.sum()
     share = np.full(n, 1.0 / n) if not total > 0 else _EVEN / n + (1 - _EVEN) * told / total
@@ -109,7 +109,7 @@ def calibrated(by: Representatives, likelihoods: Array) -> Representatives:
     for _ in range(_ROUNDS):
         size = np.sqrt(by.weights[free])
         missing = wanted - own @ weights
-        step = linalg.lstsq(own[:, free] * size, missing, cond=_ROWS)[0]
+        step = scipy.linalg.lstsq(own[:, free] * size, missing, cond=_ROWS)[0]
         weights[free] += size * step
         low = free & (weights < _LEAST * by.weights)
         if not low.any():

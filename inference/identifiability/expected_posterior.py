@@ -4,8 +4,8 @@ import dataclasses
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from inference.frame.known_range import offset_slopes
 from inference.identifiability.experiment import Experiment
@@ -102,8 +102,8 @@ def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
     factor = np.empty((0, 0))
     if unknowns > 0:
         rows = np.concatenate([across.reshape(-1, unknowns), *extra])
-        triangle = linalg.qr(rows, mode="r")[0][:unknowns]
-        factor = np.asarray(linalg.solve_triangular(triangle, np.eye(unknowns)))
+        triangle = scipy.linalg.qr(rows, mode="r")[0][:unknowns]
+        factor = np.asarray(scipy.linalg.solve_triangular(triangle, np.eye(unknowns)))
     sd = np.linalg.norm(p.marginal(factor[:d].T), axis=0)
     range_sd = np.sqrt(variance + np.linalg.norm(response @ factor, axis=1) ** 2)
     range_sd = np.where(present, _limited(range_sd, log_range_spread(p), curved), np.nan)

@@ -19,8 +19,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from inference.frame.sensitivity import whiteners
 from inference.identifiability.experiment import Experiment
@@ -131,7 +131,7 @@ def model_response(
     followed = step.followed
     if pull is not None:
         point, step = _settled(rows, step, point, pull)
-    spread = np.asarray(linalg.solve_triangular(step.triangle, np.eye(k)))
+    spread = np.asarray(scipy.linalg.solve_triangular(step.triangle, np.eye(k)))
     along = np.square(rows.along)
     whole = along.sum(axis=1)
     if experiment.common_range:

@@ -1,8 +1,8 @@
 """How a posterior moves with errors of the effective distance where ranges are known."""
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.model_response import FluxError
@@ -46,7 +46,7 @@ def range_response(
         known[d:] = experiment.error
     step = flux_step(rows, rows.residual(readings), -known)
     k = step.across.shape[1]
-    spread = np.asarray(linalg.solve_triangular(step.triangle, np.eye(k)))
+    spread = np.asarray(scipy.linalg.solve_triangular(step.triangle, np.eye(k)))
     told = FluxError(step.coefficients(np.zeros(k)), spread)
     of = np.column_stack([told.mean, spread])
     return step.by_error[0][:d] @ of, step.by_error[1] @ of, told

@@ -5,8 +5,8 @@ import functools
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from inference.frame.delayed import delayed
 from inference.frame.sensitivity import whiteners
@@ -109,9 +109,9 @@ class Rows:
         change = np.zeros((d, k))
         if d > 0:
             own = np.concatenate([rows[:, :d], prior])
-            factor, triangle = linalg.qr(own, mode="economic", check_finite=False)
+            factor, triangle = scipy.linalg.qr(own, mode="economic", check_finite=False)
             told = factor.T @ seen
-            change = linalg.solve_triangular(triangle, told)
+            change = scipy.linalg.solve_triangular(triangle, told)
             seen = seen - factor @ told
         # `response` leaves the readings where they are: an error in them moves the range against it
         return change, response[:, :d] @ change - response[:, d:], seen
@@ -147,7 +147,7 @@ class Rows:
         if d == 0:
             return own, np.zeros(0), np.zeros(0), np.zeros(own.size)
         rows = np.concatenate([across.reshape(-1, d), prior])
-        factor = linalg.solve_triangular(linalg.qr(rows, mode="r")[0][:d], np.eye(d))
+        factor = scipy.linalg.solve_triangular(scipy.linalg.qr(rows, mode="r")[0][:d], np.eye(d))
         alone, sd = 1.0 / np.linalg.norm(rows, axis=0), np.linalg.norm(factor, axis=1)
         return own, alone, sd, np.linalg.norm(response @ factor, axis=1)
 
@@ -181,8 +181,8 @@ class FluxStep:
     def coefficients(self, before: Array) -> Array:
         """Return by how much the readings move coefficients, whose prior is standard normal."""
         told = self.across.T @ self.left - before
-        told = linalg.solve_triangular(self.triangle, told, trans="T")
-        return np.asarray(linalg.solve_triangular(self.triangle, told))
+        told = scipy.linalg.solve_triangular(self.triangle, told, trans="T")
+        return np.asarray(scipy.linalg.solve_triangular(self.triangle, told))
 
 
 def flux_step(rows: Rows, off: Array, of_prior: Array) -> FluxStep:
@@ -192,7 +192,7 @@ def flux_step(rows: Rows, off: Array, of_prior: Array) -> FluxStep:
     prior[:, k] = of_prior
     both = np.concatenate([rows.by_error, off[:, :, None]], axis=2)
     change, moved, left = rows.follow(both, prior)
-    triangle = linalg.qr(np.concatenate([left[:, :k], np.eye(k)]), mode="r")[0][:k]
+    triangle = scipy.linalg.qr(np.concatenate([left[:, :k], np.eye(k)]), mode="r")[0][:k]
     whole = np.zeros(len(left))
     whole[: off.size] = off.ravel()
     whole[off.size : off.size + of_prior.size] = of_prior

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.posterior.answer.draws import Draws
 from inference.posterior.answer.posterior import Posterior
@@ -194,7 +194,7 @@ def _distance(law: Joint, z: Array) -> float:
         share = np.zeros(n)
         for mode in law.modes:
             sd = mode.covariance[j][j] ** 0.5
-            share += mode.weight * special.ndtr((column - mode.mean[j]) / sd)
+            share += mode.weight * scipy.special.ndtr((column - mode.mean[j]) / sd)
         steps = np.arange(n + 1) / n
         greatest = max(greatest, *np.abs(share - steps[1:]), *np.abs(share - steps[:-1]))
     return float(greatest)

@@ -22,6 +22,7 @@ from typing import TypeVar
 
 from inference.posterior.archive import FORMAT
 from inference.posterior.job import Job, prepare
+from inference.posterior.libraries import import_libraries
 from inference.posterior.progress import Progress
 from inference.posterior.sampling.ensemble import Ensemble
 from inference.posterior.sampling.population import Population
@@ -82,6 +83,7 @@ def start(job: Job) -> Checkpoint:
         Where no parameters explain the frames at all, or importance sampling alone was asked for
         and cannot be trusted.
     """
+    import_libraries()
     if job.scene.optional_terms:
         return Checkpoint(Selecting(), 0)
     return begin(job)
@@ -115,6 +117,7 @@ def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float = 0.0) -> tuple[Task, .
 
 def run(task: Task) -> Piece:
     """Run one part of a chunk."""
+    import_libraries()
     return task.run()
 
 

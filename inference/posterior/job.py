@@ -14,6 +14,7 @@ from inference.frame.blocks import RANGE
 from inference.frame.known_range import columns_of
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.posterior.checks import check_scene_for_posterior
+from inference.posterior.libraries import import_libraries
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.streams import Stream
 from simulator.at_temperature import warmth
@@ -87,6 +88,7 @@ class Job:
     @classmethod
     def from_bytes(cls, data: bytes) -> "Job":
         """Read what `to_bytes` wrote."""
+        import_libraries()
         meta, arrays = unpack(data)
         return cls(
             parse_sensor(meta["sensor"]),
@@ -187,6 +189,7 @@ def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSetti
             raise RefusedError("every frame is saturated, or its temperature_k is null")
         raise RefusedError("every frame is saturated: lower the gain or the exposure")
     check_scene_for_posterior(sensor, scene, frames.select(job.usable))
+    import_libraries()
     return job
 
 

@@ -8,8 +8,8 @@ numbers from two readings (docs/model.md, learnt-error).
 import dataclasses
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from inference.frame.delayed import delayed
 from simulator.at_temperature import at_reference, warmth
@@ -87,6 +87,6 @@ def learnt_error(sensor: Sensor, terms: Terms, frames: Frames, unknowns: int) ->
     variance[:, 0] += sensor.noise.relative**2
     excess = np.maximum((errors**2 - variance).sum(axis=0), 0.0) / spare
     # so that a normal law of this size holds as much as Student's t, which few frames leave
-    wider = stats.t.ppf(_SURE, spare) / stats.norm.ppf(_SURE)
+    wider = scipy.stats.t.ppf(_SURE, spare) / scipy.stats.norm.ppf(_SURE)
     flux, range_m = (wider * np.sqrt(excess)).tolist()
     return LearntError(frames=int(usable.sum()), flux=flux, range_m=range_m)

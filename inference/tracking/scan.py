@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from inference.frame.table import KNOT_SPACING, TURN
 
@@ -91,7 +91,8 @@ def places_around_folds(positions: Array, values: Array, slopes: Array) -> Array
         size = float(np.linalg.norm(turn))
         ends = slice(k, k + 2)
         along = turn / size
-        curve = CubicHermiteSpline(positions[ends], values[ends] @ along, slopes[ends] @ along)
+        at, rising = values[ends] @ along, slopes[ends] @ along
+        curve = scipy.interpolate.CubicHermiteSpline(positions[ends], at, rising)
         curvature = size / float(positions[k + 1] - positions[k])
         side = math.sqrt(2.0 * _VISIBLE / curvature)
         for fold in curve.derivative().roots(extrapolate=False):

@@ -14,8 +14,8 @@ import functools
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from inference.density.collapsed import CollapsedDensity
 from inference.frame.blocks import DISPLACEMENT, RANGE
@@ -81,10 +81,10 @@ class ErrorBudget:
     curvature: float
 
     @functools.cached_property
-    def _tree(self) -> tuple[KDTree, Array]:
+    def _tree(self) -> "tuple[scipy.spatial.KDTree, Array]":
         sd = self.z.std(axis=0)
         unit = np.where(sd > 0, sd, 1.0)
-        return KDTree(self.z / unit), unit
+        return scipy.spatial.KDTree(self.z / unit), unit
 
     def errors(self, count: int, rng: np.random.Generator) -> Array:
         """Draw errors for draws, shape (count, 1 + k): the first is a constant one."""

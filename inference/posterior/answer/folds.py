@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from inference.density.collapsed import CollapsedDensity
 from inference.density.whitened import Whitened, whitened
@@ -107,7 +107,7 @@ def _with_unknowns(at: Whitened, present: NDArray[np.bool_]) -> Array:
     if at.beside is not None:
         own, other = at.jacobian, at.beside_jacobian
         told.append(free_of_range(at.along, at.beside.along, own, other).reshape(-1, d))
-    triangle = linalg.qr(np.concatenate(told), mode="economic")[1]
+    triangle = scipy.linalg.qr(np.concatenate(told), mode="economic")[1]
     # rows R^-1: the posterior covariance of all frames is R^-1 R^-T
     reduced = np.linalg.solve(triangle.T, at.jacobian.reshape(-1, d).T).T.reshape(-1, 2, d)
     own = np.einsum("ni,nid->nd", at.across, reduced)

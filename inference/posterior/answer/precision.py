@@ -3,16 +3,14 @@
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from inference.posterior.sampling.diagnostics import effective_sample_size
 
 __all__ = ["mean_error", "quantile_error"]
 
 Array = NDArray[np.float64]
-
-_ONE_SD = float(stats.norm.cdf(1.0))
 
 
 def _effective(draws: Array, importance_ess: float | None) -> float:
@@ -66,5 +64,6 @@ def quantile_error(draws: Array, at: float, importance_ess: float | None) -> flo
     n = _effective(below, importance_ess)
     if not math.isfinite(n):
         return math.nan
-    shares = stats.beta.ppf([1.0 - _ONE_SD, _ONE_SD], n * at + 1.0, n * (1.0 - at) + 1.0)
+    one_sd = float(scipy.special.ndtr(1.0))
+    shares = scipy.stats.beta.ppf([1.0 - one_sd, one_sd], n * at + 1.0, n * (1.0 - at) + 1.0)
     return 0.5 * float(np.ptp(np.quantile(draws, np.asarray(shares))))

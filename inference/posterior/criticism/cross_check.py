@@ -8,8 +8,8 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.diagnostics import effective_sample_size
@@ -191,7 +191,7 @@ def _principal_frame(chains: Chains) -> _Frame | None:
     centre, spread = flat.mean(axis=0), flat.std(axis=0)
     if not (spread > 0).all():
         return None
-    _, values, vectors = linalg.svd((flat - centre) / spread, full_matrices=False)
+    _, values, vectors = scipy.linalg.svd((flat - centre) / spread, full_matrices=False)
     if not values.min() > _THINNEST * values.max():
         return None
     return _Frame(centre, spread, values / math.sqrt(len(flat)), vectors)

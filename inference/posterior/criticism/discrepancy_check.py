@@ -9,8 +9,8 @@ exceeds b with a probability of at most 1/b, whatever the scene (Markov's inequa
 import dataclasses
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.density.discrepant import DiscrepantDensity
 from inference.identifiability.status import Identifiability
@@ -66,10 +66,10 @@ def larger_discrepancy(density: DiscrepantDensity, z: Array, log_r: Array) -> La
     larger = dataclasses.replace(density, discrepancy=_FACTOR * density.discrepancy)
     gain = larger.log_likelihood(z) - density.log_likelihood(z)
     gain = np.where(np.isfinite(gain), gain, -np.inf)
-    factor = float(np.exp(min(special.logsumexp(gain) - np.log(len(z)), 700.0)))
+    factor = float(np.exp(min(scipy.special.logsumexp(gain) - np.log(len(z)), 700.0)))
     if not np.isfinite(gain).any():
         return LargerDiscrepancy(factor, np.zeros(z.shape[1]), np.zeros(log_r.shape[1]))
-    weights = special.softmax(gain)
+    weights = scipy.special.softmax(gain)
     ranges = np.where(np.isfinite(log_r), log_r, 0.0)
     return LargerDiscrepancy(
         factor, weights @ z - z.mean(axis=0), weights @ ranges - ranges.mean(axis=0)

@@ -3,8 +3,8 @@
 import dataclasses
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from inference.density.collapsed import CollapsedDensity
 from inference.density.discrepant import DiscrepantDensity, with_discrepancy
@@ -205,7 +205,7 @@ def _followed(residuals: Array, rows: Array, free: int = 0) -> tuple[Array, Arra
     if d == 0:
         return np.zeros_like(residuals), np.zeros((len(residuals), 0))
     prior = np.eye(d)[: d - free]
-    basis, triangle = linalg.qr(np.concatenate([rows, prior]), mode="economic")
+    basis, triangle = scipy.linalg.qr(np.concatenate([rows, prior]), mode="economic")
     seen = residuals @ basis[: len(rows)]
-    gone = linalg.solve_triangular(triangle, seen.T).T
+    gone = scipy.linalg.solve_triangular(triangle, seen.T).T
     return np.asarray(seen @ basis[: len(rows)].T), np.asarray(gone)

@@ -10,8 +10,8 @@ is not.
 import dataclasses
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.answer.replicate import replicate_frames
@@ -45,7 +45,7 @@ def bias_of_many_frames(density: CollapsedDensity, z: Array, rng: np.random.Gene
     """
     d, n = z.shape[1], len(density.frames)
     centre = z.mean(axis=0)
-    factor = linalg.qr((z - centre) / np.sqrt(len(z)), mode="economic")[1].T
+    factor = scipy.linalg.qr((z - centre) / np.sqrt(len(z)), mode="economic")[1].T
     sets = int(np.clip(_EVALUATIONS // (2 * d * n), _FEWEST, _MOST))
     log_r = density.draw_log_ranges(centre[None], rng)
     points = np.concatenate([centre + factor.T, centre - factor.T])
@@ -78,7 +78,7 @@ def following(bias: Array, z: Array, log_r: Array) -> PriorSensitivity:
     ranges = np.where(present, log_r, 0.0)
     scale = log_r[:, present].mean(axis=1) if present.any() else np.zeros(len(z))
     columns = np.column_stack([scale, ranges])
-    slope = linalg.lstsq(z - z.mean(axis=0), columns - columns.mean(axis=0))[0]
+    slope = scipy.linalg.lstsq(z - z.mean(axis=0), columns - columns.mean(axis=0))[0]
     moved, sd = bias @ slope, z.std(axis=0)
     spread = float(scale.std())
     return PriorSensitivity(

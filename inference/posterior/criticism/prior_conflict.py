@@ -17,8 +17,8 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg, special
 
 from inference.density.collapsed import CollapsedDensity
 from inference.density.profile import best_ranges, linearise
@@ -100,7 +100,7 @@ def scores(jacobian: Array, residual: Array, z: Array) -> Array:
         column = matrix[:, j]
         if d > 1:
             rest = matrix[:, others] / scale[others]
-            column = column - rest @ linalg.lstsq(rest, column)[0]
+            column = column - rest @ scipy.linalg.lstsq(rest, column)[0]
         length = float(np.linalg.norm(column))
         if length > 1e-9 * scale[j]:
             result[j] = -float(column @ target) / length * math.copysign(1.0, z[j])
@@ -128,7 +128,7 @@ def parameter_conflicts(
     """
     reasons = []
     middle = np.median(z, axis=0)  # beyond a point where more than half of the draws are
-    near = np.abs(middle) > -float(special.ndtri(_OUTER))
+    near = np.abs(middle) > -float(scipy.special.ndtri(_OUTER))
     pulls = np.zeros(len(names))
     if near.any():
         chosen = _few(z)
@@ -176,7 +176,7 @@ def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
     distribution = _distribution(density.parameters.range_prior)
     with np.errstate(invalid="ignore"):
         middle = np.exp(np.median(log_r, axis=0))
-    ends = distribution.from_normal(special.ndtri([_OUTER, 1 - _OUTER]))
+    ends = distribution.from_normal(scipy.special.ndtri([_OUTER, 1 - _OUTER]))
     near = [middle < ends[0], middle > ends[1]]
     if not (near[0].any() or near[1].any()):
         return ()
@@ -185,7 +185,8 @@ def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
     gain = np.median(_best_fit(wide, chosen) - _best_fit(density, chosen), axis=0)
     out = _deviations(distribution, np.where(np.isnan(middle), ends.mean(), middle))
     # at most 1.1e-5 of runs in each direction, however many frames there are
-    tail = -float(special.ndtri(special.ndtr(-_TAIL) / max(np.isfinite(middle).sum(), 1)))
+    share = scipy.special.ndtr(-_TAIL) / max(np.isfinite(middle).sum(), 1)
+    tail = -float(scipy.special.ndtri(share))
     reasons = []
     for here, side in zip(near, ("lower", "upper"), strict=True):
         beyond = here & (out > tail)
@@ -240,7 +241,7 @@ def _distribution(law: Distribution | Stroke | Reference) -> Distribution:
 
 def _without_ends(density: CollapsedDensity, law: Distribution) -> CollapsedDensity:
     """Return the density under a law that goes on where this one ends, as far as sensors see."""
-    ends = law.from_normal(special.ndtri([_OUTER, 1 - _OUTER]))
+    ends = law.from_normal(scipy.special.ndtri([_OUTER, 1 - _OUTER]))
     wave = density.instrument.wave
     farthest = density.sensor.max_range_m if wave is None else 2 * math.pi / wave[0]
     high = min(_BEYOND * float(ends[1]), farthest)

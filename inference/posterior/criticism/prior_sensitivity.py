@@ -9,8 +9,8 @@ are spread, an answer that the readings themselves give stays where it is.
 import dataclasses
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.density.collapsed import CollapsedDensity
 from inference.density.static import StaticDensity
@@ -113,7 +113,7 @@ def prior_sensitivity(density: CollapsedDensity, z: Array, log_r: Array) -> Prio
     if present.any():
         scale = log_r[:, present].mean(axis=1)
     columns = np.column_stack([z, scale, ranges])
-    weights = special.softmax(gain)
+    weights = scipy.special.softmax(gain)
     moved, sd = weights @ columns - columns.mean(axis=0), columns.std(axis=0)
     if np.square(weights).sum() * _FEWEST_LEFT > 1.0:
         finite = np.isfinite(gain)

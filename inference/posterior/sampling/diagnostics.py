@@ -8,8 +8,8 @@ correlation the walkers have among themselves.
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft, special, stats
 
 __all__ = [
     "autocorrelation_time",
@@ -28,8 +28,8 @@ def _autocovariance(series: Array, common: bool) -> Array:
     """Autocovariance along the first axis of (steps, m), about each column's mean or all's."""
     steps = series.shape[0]
     centred = series - (series.mean() if common else series.mean(axis=0))
-    spectrum = fft.rfft(centred, n=2 * fft.next_fast_len(steps), axis=0)
-    power = fft.irfft((spectrum * spectrum.conj()).real, axis=0)[:steps]
+    spectrum = scipy.fft.rfft(centred, n=2 * scipy.fft.next_fast_len(steps), axis=0)
+    power = scipy.fft.irfft((spectrum * spectrum.conj()).real, axis=0)[:steps]
     return np.asarray(power / steps)
 
 
@@ -86,8 +86,8 @@ def effective_sample_size(draws: Array) -> float:
 
 def rank_normalise(draws: Array) -> Array:
     """Replace draws by normal scores of their ranks (Vehtari et al. 2021), same shape."""
-    ranks = stats.rankdata(draws, axis=None).reshape(draws.shape)
-    return np.asarray(special.ndtri((ranks - 0.375) / (draws.size + 0.25)))
+    ranks = scipy.stats.rankdata(draws, axis=None).reshape(draws.shape)
+    return np.asarray(scipy.special.ndtri((ranks - 0.375) / (draws.size + 0.25)))
 
 
 def tail_effective_sample_size(draws: Array) -> float:

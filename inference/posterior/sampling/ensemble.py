@@ -4,7 +4,6 @@ import dataclasses
 import math
 from typing import Any
 
-import emcee
 import numpy as np
 from numpy.typing import NDArray
 
@@ -129,6 +128,8 @@ def _moves(proposal: Proposal) -> list[tuple[Any, float]]:
     acceptance has half the exponent of ter Braak and Vrugt (2008), so that it leaves a standard
     normal in nine dimensions with three quarters of its variance.
     """
+    import emcee  # brings scipy.stats, see `inference.posterior.libraries`
+
     rest = 1.0 - proposal.share
     short = _SHORT * 2.38 / math.sqrt(2.0 * proposal.optima.centres.shape[1])
     return [
@@ -160,6 +161,8 @@ def advance(
     Ensemble
         With the steps appended.
     """
+    import emcee
+
     walkers, d = ensemble.coords.shape
 
     def log_density(x: Array) -> Array:

@@ -4,8 +4,8 @@ import dataclasses
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.proposal import Mixture, Proposal
@@ -77,7 +77,7 @@ def generalised_pareto(excess: Array) -> tuple[float, float]:
     b = 1 / x[-1] + (1 - np.sqrt(m / (j - 0.5))) / (3 * quartile)
     shape = np.log1p(-b[:, None] * x).mean(axis=1)
     profile = n * (np.log(-b / shape) - shape - 1)
-    weights = special.softmax(profile)
+    weights = scipy.special.softmax(profile)
     best = float(np.sum(b * weights))
     k = float(np.log1p(-best * x).mean())
     # weak prior of shape 0.5, worth ten observations (Vehtari et al. 2024)
@@ -177,7 +177,7 @@ def draw_weighted(
     log_density = density(z)
     log_weights = log_density - proposal.log_density(z)
     k_hat = pareto_k_hat(log_weights)
-    total = float(special.logsumexp(log_weights))
+    total = float(scipy.special.logsumexp(log_weights))
     if not math.isfinite(total):
         return WeightedDraws(z, log_density, np.full(n, 1 / n), math.inf, -math.inf)
     weights = np.exp(log_weights - total)

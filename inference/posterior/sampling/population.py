@@ -13,8 +13,8 @@ import dataclasses
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import optimize
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.effort import Effort, Move
@@ -107,7 +107,8 @@ def _next_power(log_likelihood: Array, power: float) -> float:
         return 1.0
     # a step can be far below 1e-12 where the first population fits very badly
     lower = np.log(rest) - 80.0
-    found = optimize.brentq(lambda x: surplus(float(np.exp(x))), lower, np.log(rest), xtol=1e-3)
+    upper = np.log(rest)
+    found = scipy.optimize.brentq(lambda x: surplus(float(np.exp(x))), lower, upper, xtol=1e-3)
     return power + float(np.exp(found))
 
 

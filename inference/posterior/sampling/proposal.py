@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.posterior.sampling.start import Optimum
 from inference.posterior.sampling.transport import TriangularMap
@@ -42,7 +42,7 @@ class Mixture:
     def log_density(self, z: Array) -> Array:
         """Return the log density at z of shape (n, d), shape (n,)."""
         d = self.centres.shape[1]
-        constant = special.gammaln((_DEGREES + d) / 2) - special.gammaln(_DEGREES / 2)
+        constant = scipy.special.gammaln((_DEGREES + d) / 2) - scipy.special.gammaln(_DEGREES / 2)
         constant -= 0.5 * d * math.log(_DEGREES * math.pi)
         logdet = np.log(np.diagonal(self.factors, axis1=1, axis2=2)).sum(axis=1)
         tail = -0.5 * (_DEGREES + d) * np.log1p(self._squares(z) / _DEGREES)
@@ -107,7 +107,8 @@ def student(random: np.random.Generator | np.random.RandomState, n: int, d: int)
 def log_student(x: Array) -> Array:
     """Return the log density of a standard Student-t law at x of shape (n, d), shape (n,)."""
     d = x.shape[1]
-    constant = special.gammaln((_MAP_DEGREES + d) / 2) - special.gammaln(_MAP_DEGREES / 2)
+    constant = scipy.special.gammaln((_MAP_DEGREES + d) / 2)
+    constant -= scipy.special.gammaln(_MAP_DEGREES / 2)
     constant -= 0.5 * d * math.log(_MAP_DEGREES * math.pi)
     tail = np.log1p(np.einsum("ni,ni->n", x, x) / _MAP_DEGREES)
     return np.asarray(constant - 0.5 * (_MAP_DEGREES + d) * tail)

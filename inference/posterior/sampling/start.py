@@ -8,8 +8,8 @@ import dataclasses
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from inference.density.collapsed import CollapsedDensity
 from inference.density.profile import best_ranges, linearise
@@ -53,7 +53,7 @@ class Optimum:
 
     def is_near(self, z: Array) -> bool:
         """Tell whether z of shape (d,) lies within half a standard deviation."""
-        step = linalg.solve_triangular(self.factor, z - self.z, lower=True)
+        step = scipy.linalg.solve_triangular(self.factor, z - self.z, lower=True)
         return bool(np.linalg.norm(step) < _NEAR)
 
 
@@ -95,13 +95,13 @@ def climb(
         if not (np.isfinite(matrix).all() and np.isfinite(target).all()):
             break
         scale = np.linalg.norm(matrix, axis=0)
-        q, r = linalg.qr(matrix / scale, mode="economic")
+        q, r = scipy.linalg.qr(matrix / scale, mode="economic")
         right = q.T @ target
         improved = False
         for _ in range(10):
             # damped in scaled columns: the augmented system, never the normal equations
             stacked = np.concatenate([r, np.sqrt(damping) * np.eye(d)])
-            step = linalg.lstsq(stacked, np.concatenate([right, np.zeros(d)]))[0] / scale
+            step = scipy.linalg.lstsq(stacked, np.concatenate([right, np.zeros(d)]))[0] / scale
             trial = z + np.clip(step, -2.0, 2.0)
             trial_value, trial_positions = (part[0] for part in _profile(density, trial[None]))
             if trial_value > value:
@@ -123,8 +123,8 @@ def _curvature_factor(density: CollapsedDensity, z: Array) -> Array:
     positions = best_ranges(density, z[None])[0, :, 0]
     line = linearise(density, z, positions)
     matrix = np.concatenate([line.jacobian.reshape(-1, z.size), np.eye(z.size)])
-    r = linalg.qr(matrix, mode="economic")[1]
-    return np.asarray(linalg.solve_triangular(r, np.eye(z.size)))
+    r = scipy.linalg.qr(matrix, mode="economic")[1]
+    return np.asarray(scipy.linalg.solve_triangular(r, np.eye(z.size)))
 
 
 def _derivatives(density: CollapsedDensity, z: Array, frame: Array) -> tuple[float, Array, Array]:
@@ -194,7 +194,7 @@ def refine(density: CollapsedDensity, z: Array) -> Optimum | None:
         return None
     values, vectors = np.linalg.eigh(-hessian)
     spread = frame @ (vectors / np.sqrt(np.maximum(values, 1e-2)))
-    factor = linalg.qr(spread.T, mode="r")[0][:d].T
+    factor = scipy.linalg.qr(spread.T, mode="r")[0][:d].T
     factor = factor * np.sign(np.diagonal(factor))
     return Optimum(z, best, factor)
 

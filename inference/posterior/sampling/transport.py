@@ -10,8 +10,8 @@ import dataclasses
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from inference.density.triangular import update_factor
 from inference.posterior.sampling.reparametrisation import Reparametrisation
@@ -192,14 +192,14 @@ def _regression(features: Array, target: Array, strength: float, copies: float) 
     along = factor[1:k, k]
     noise = _DOUBT * copies * factor[k, k] ** 2 / max(n - k, 1)
     along *= np.maximum(0.0, 1.0 - noise / np.maximum(along**2, 1e-300))
-    return np.asarray(linalg.solve_triangular(factor[:k, :k], factor[:k, k]) / scale)
+    return np.asarray(scipy.linalg.solve_triangular(factor[:k, :k], factor[:k, k]) / scale)
 
 
 def _principal_axes(draws: Array) -> tuple[Array, Array]:
     """Return the centre of a sample and its principal axes times their standard deviations."""
     centre = draws.mean(axis=0)
     # singular values, not eigenvalues of the covariance: thin sheets keep their digits
-    _, singular, rows = linalg.svd(draws - centre, full_matrices=False)
+    _, singular, rows = scipy.linalg.svd(draws - centre, full_matrices=False)
     sd = singular / math.sqrt(len(draws))
     return centre, rows.T * np.maximum(sd, 1e-12 * sd[0] + 1e-300)
 

@@ -11,8 +11,8 @@ import math
 from collections.abc import Callable, Iterator
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from inference.posterior.sampling.diagnostics import (
     autocorrelation_time,
@@ -198,7 +198,7 @@ def _means(chains: Chains) -> str | None:
         square = float(((centre - centre.mean()) ** 2).sum()) / error
         # the error itself is estimated, from steps / tau independent values an ensemble
         freedom = max(ensembles * (steps / tau - 1), 1.0)
-        p = float(stats.f.sf(square / (ensembles - 1), ensembles - 1, freedom))
+        p = float(scipy.stats.f.sf(square / (ensembles - 1), ensembles - 1, freedom))
         if p < _DISAGREEMENT / tests:
             return f"the ensembles' means of {quantity} differ by more than their errors"
     return None

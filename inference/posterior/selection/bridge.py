@@ -7,8 +7,8 @@ its constant (Meng and Wong 1996).
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.posterior.sampling.proposal import Mixture, Proposal
 
@@ -26,9 +26,9 @@ def _estimate(walked: Array, drawn: Array, share: float) -> float:
     first, second = math.log(share), math.log1p(-share)
     value = 0.0
     for _ in range(1000):
-        above = special.logsumexp(b - np.logaddexp(first + b, second + value)) - math.log(b.size)
-        below = special.logsumexp(-np.logaddexp(first + a, second + value)) - math.log(a.size)
-        before, value = value, float(above - below)
+        above = scipy.special.logsumexp(b - np.logaddexp(first + b, second + value))
+        below = scipy.special.logsumexp(-np.logaddexp(first + a, second + value))
+        before, value = value, float((above - math.log(b.size)) - (below - math.log(a.size)))
         if not abs(value - before) > 1e-9:
             break
     return value + top

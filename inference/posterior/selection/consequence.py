@@ -8,8 +8,8 @@ demand, though ranges far away hang on it. So a term goes only where its going c
 import dataclasses
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.selection.evidence import Weighed
@@ -77,7 +77,7 @@ def reported(
     if not np.isfinite(weighed.evidence.log_evidence) or not len(weighed.z):
         return None
     most = max(_MOST_EVALUATIONS // len(density.frames), _LEAST_DRAWS)
-    weights = special.softmax(weighed.log_weights)
+    weights = scipy.special.softmax(weighed.log_weights)
     z = weighed.z[rng.choice(len(weighed.z), size=min(_DRAWS, most), p=weights)]
     values = np.concatenate(
         [density.parameters.natural(z), np.exp(density.draw_log_ranges(z, rng))], axis=1

@@ -7,8 +7,8 @@ proposal is adapted to the posterior without it.
 import dataclasses
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.importance import draw_weighted
@@ -65,7 +65,7 @@ def _predict(
             logs = np.log(weighted.weights[inside])
             found = _given_others(density, weighted.z[inside], frame)
             calls += len(found)
-            best, k_hat = float(special.logsumexp(logs + found)), weighted.k_hat
+            best, k_hat = float(scipy.special.logsumexp(logs + found)), weighted.k_hat
         if k_hat < MAX_K_HAT or not np.isfinite(weighted.log_evidence):
             break
         pilot = weighted.z[resample(weighted, rng, _DRAWS)]
@@ -79,7 +79,7 @@ def _draws(weighed: Weighed, independent: bool, rng: np.random.Generator) -> tup
     if independent:
         chosen = np.linspace(0, kept.size - 1, min(kept.size, _DRAWS)).astype(int)
         return weighed.z[kept[chosen]], logs[chosen]
-    chosen = rng.choice(kept.size, size=_DEPENDENT_DRAWS, p=special.softmax(logs))
+    chosen = rng.choice(kept.size, size=_DEPENDENT_DRAWS, p=scipy.special.softmax(logs))
     return weighed.z[kept[chosen]], np.zeros(_DEPENDENT_DRAWS)
 
 

@@ -11,9 +11,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
-from scipy.stats import qmc
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.effort import effort_of, scouts
@@ -108,10 +107,10 @@ def log_prior_mass(parameters: Parameters, rng: np.random.Generator) -> tuple[fl
         return 0.0, 0.0
     means = []
     for _ in range(_PRIOR_REPEATS):
-        points = qmc.Sobol(d, rng=rng).random_base2(_PRIOR_POINTS)
-        z = special.ndtri(np.clip(points, 1e-12, 1 - 1e-12))
+        points = scipy.stats.qmc.Sobol(d, rng=rng).random_base2(_PRIOR_POINTS)
+        z = scipy.special.ndtri(np.clip(points, 1e-12, 1 - 1e-12))
         excess = parameters.log_prior(z) + 0.5 * np.einsum("ij,ij->i", z, z)
-        means.append(float(special.logsumexp(excess)) - math.log(len(z)))
+        means.append(float(scipy.special.logsumexp(excess)) - math.log(len(z)))
     return _pool(np.array(means))
 
 
@@ -238,7 +237,7 @@ def weigh(
     if not len(members):
         # the prior hardly ever explains the frames: only the optima are known, and two accounts of
         # them are as far off as they differ
-        rough = float(special.logsumexp([optimum.log_mass for optimum in optima]))
+        rough = float(scipy.special.logsumexp([optimum.log_mass for optimum in optima]))
         apart = abs(weighted.log_evidence - rough)
         return _by_importance(
             weighted, laplace, (constant, math.hypot(constant_error, apart)), calls

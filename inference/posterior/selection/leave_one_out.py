@@ -8,8 +8,8 @@ import dataclasses
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.posterior.sampling.importance import generalised_pareto
 
@@ -65,7 +65,8 @@ def _smooth(log_weights: Array) -> tuple[Array, float]:
         return log_weights, -math.inf if excess.max() <= _EQUAL else math.inf
     shape, scale = generalised_pareto(np.maximum(excess, _TINY))
     probability = (np.arange(tail) + 0.5) / tail
-    step = special.boxcox1p(-probability, -shape)  # ((1 - p)^-k - 1) / -k, good at k = 0 as well
+    # ((1 - p)^-k - 1) / -k, good at k = 0 as well
+    step = scipy.special.boxcox1p(-probability, -shape)
     smoothed = log_weights.copy()
     # never above the largest raw weight: the fit may reach beyond it
     smoothed[largest] = np.minimum(np.log(cut - scale * step) + top, top)
@@ -97,5 +98,6 @@ def leave_one_out(log_likelihoods: Array, log_weights: Array | None = None) -> L
         if not np.isfinite(likelihood).all() or likelihood.size <= 2 * _LEAST_TAIL:
             continue
         weights, k_hat[j] = _smooth(base - likelihood)
-        log_predictive[j] = special.logsumexp(weights + likelihood) - special.logsumexp(weights)
+        log_predictive[j] = scipy.special.logsumexp(weights + likelihood)
+        log_predictive[j] -= scipy.special.logsumexp(weights)
     return LeaveOneOut(log_predictive, k_hat)

@@ -9,8 +9,8 @@ weights cannot be trusted, or a few places are all there is, nothing stands.
 import dataclasses
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from inference.posterior.sampling.importance import WeightedDraws, smoothed
 from inference.posterior.sampling.population import Population
@@ -86,7 +86,7 @@ def _weighted(population: Population) -> WeightedDraws:
     rest = (1.0 - population.power) * likelihood
     log_weights, k_hat = smoothed(rest)
     log_weights = log_weights + np.log(copies)
-    total = float(special.logsumexp(log_weights))
+    total = float(scipy.special.logsumexp(log_weights))
     return WeightedDraws(
         population.z[first],
         likelihood + population.log_prior[first],
