@@ -11,6 +11,7 @@ from numba.core import caching, sigutils
 from simulator.compile_lock import turn
 from simulator.inner_code import InnerCompiler, rebuilt
 from simulator.kernel_cache import CacheFolder, base_folder
+from simulator.quick_compiler import quicken, rare_collections
 
 __all__ = ["dispatcher", "is_none", "is_number", "overload", "unliteral"]
 
@@ -24,6 +25,8 @@ _normalized: Any = sigutils.normalize_signature
 
 _overload: Any = extending.overload
 unliteral: Any = types.unliteral
+
+quicken()
 
 
 def overload(function: Callable[..., Any]) -> Callable[[F], F]:
@@ -113,6 +116,7 @@ def dispatcher(
         **for_kernels,
     )(function)
     made.targetoptions.update(hidden)
+    made.compile = rare_collections()(made.compile)
     if folder is not None:
         made._cache = _Cache(function, folder, inner)
         if folder.writable:
