@@ -13,8 +13,10 @@ applied 20 s later.
 
 For each: calibrations asked for and taken, scenes given up, the share of frames with one range, and
 of them the median relative error, the share of 90 % intervals that hold the truth, their median
-width over the range; the longest stretch that is sure and wrong (one range, five standard
-deviations off, no `misfit`); of frames without an object before the wall, the share with a range.
+width over the range; the share of all frames that have one range and hold it; both shares in the
+90 s after the wall has come; the longest stretch without an interval that holds, and that is sure
+and wrong (one range, five standard deviations off, no `misfit`); of frames without an object before
+the wall, the share with a range.
 """
 
 import argparse
@@ -54,6 +56,7 @@ STATED: dict[str, Any] = {
 SETTINGS = TrackingSettings(rate_sd=0.5)
 _Z = 1.6448536269514722  # of a 90 % interval
 _WRONG = 5.0
+_BEHIND_S = 90.0  # after the wall has come
 _COLORS = {"taken": "tab:green", "not_taken": "tab:orange", "doubted": "tab:red"}
 
 
@@ -203,6 +206,7 @@ def figures(of: Course, said: Followed) -> dict[str, float]:
     taken = sum(event["kind"] == "taken" for event in said.events)
     ghosts = ~there & said.unique
     bare = ~there & (t < of.wall_s)
+    behind = there & (t >= of.wall_s) & (t < of.wall_s + _BEHIND_S)
     return {
         "asked": said.asked,
         "taken": taken,
@@ -212,7 +216,11 @@ def figures(of: Course, said: Followed) -> dict[str, float]:
         "error": float(np.median((error / of.range_m)[asked])),
         "held": float(held[asked].mean()),
         "width": float(np.median((2 * _Z * said.sd_m / of.range_m)[asked])),
+        "right": float(held[asked].sum() / there.sum()),
+        "wall held": float(held[asked & behind].mean()) if (asked & behind).any() else 0.0,
+        "wall right": float((held & asked)[behind & there].mean()) if behind.any() else 0.0,
         "misfit": float(said.misfit[there].mean()),
+        "missed s": longest_s(asked & ~held & ~said.misfit),
         "wrong s": longest_s(wrong_of(of, said)),
         "wrong": float(wrong_of(of, said)[there].mean()),
         "ghosts": float(ghosts[bare].mean()) if bare.any() else 0.0,

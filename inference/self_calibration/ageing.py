@@ -6,6 +6,7 @@ import numpy as np
 import scipy
 
 from inference.self_calibration.calibration import Asked
+from inference.self_calibration.change import has_changed
 from inference.self_calibration.drift import (
     Drift,
     Means,
@@ -25,6 +26,7 @@ from simulator.scene import Scene
 
 __all__ = [
     "EMPTY_ENOUGH",
+    "changed",
     "further",
     "in_force",
     "known_since",
@@ -42,8 +44,9 @@ _AHEAD = 1.5  # times its age for which a law is widened at once
 _LEAST_AHEAD_S = 1.0
 _RENEWED_S = 4.0  # age from which on frames without the object renew a law
 _FALSE_ALARM = 1e-6  # of the mean of empty frames
-_JUMPS = (0.3, 0.9)  # of the crosstalk: steps of a law that frames contradict
+_JUMPS = (0.4, 0.9)  # of the crosstalk: steps of a law that frames contradict
 _EXPLAINED = 2.0  # running surprise, in the mean and at last, of frames that a wider law explains
+_BETWEEN_S = 5.0  # between frames before and after a change
 _WORN = 1.0  # times its standard deviation that the crosstalk may have walked since
 
 
@@ -87,6 +90,28 @@ def wide_enough(
             return drift
         drift = further(drift)
     return drift
+
+
+def changed(plan: Plan, state: CalibrationState) -> Drift | None:
+    """Return a law that is wider by a step, where the last frames lie on another curve.
+
+    Parameters
+    ----------
+    plan, state : Plan, CalibrationState
+        The stream, calibrated.
+    """
+    kept = state.recent.select(slice(-max(state.count - state.since, 1), None))
+    if (drift := state.drift) is None or not drift.until_s < float("inf") or kept.frames is None:
+        return None
+    known = crosstalk_of(plan.sensor, drift.law)
+    walk = drift_sd(plan.sensor, drift, _BETWEEN_S, plan.settings.crosstalk_drift)
+    if known is None or walk is None:
+        return None
+    widest = _JUMPS[-1] * (np.abs(known[0]) + known[1])
+    model = plan.tracker(state.scene)
+    if not has_changed(model, kept.frames, kept.kind >= 0, walk, widest):
+        return None
+    return drift._replace(jump=max(drift.jump, _JUMPS[0]))
 
 
 def settled(plan: Plan, state: CalibrationState) -> TrackState:

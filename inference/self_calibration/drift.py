@@ -14,11 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.self_calibration.mixing import with_modes
 from inference.self_calibration.scenes import prior_scene
 from inference.tracking.tabulate import empty_readings
 from simulator.errors import InvalidInputError
 from simulator.parameters import Parameters, parameters_of
-from simulator.scene import Scene, parse_scene
+from simulator.scene import Scene
 from simulator.sensor import Sensor
 
 __all__ = ["Drift", "Means", "aged", "conditioned", "crosstalk_of", "drift_sd", "walked"]
@@ -205,7 +206,7 @@ def aged(scene: Scene, names: tuple[str, ...], sd: Array) -> Scene:
             step = float(sides.mean()) if sides.size else _FARTHEST
             matrix[j, j] += min(step, _FARTHEST) ** 2
         modes.append({"weight": mode.weight, "mean": list(mode.mean), "covariance": matrix})
-    return _with_modes(scene, modes)
+    return with_modes(scene, modes)
 
 
 def conditioned(sensor: Sensor, scene: Scene, means: Means) -> tuple[Scene, float]:
@@ -264,7 +265,7 @@ def conditioned(sensor: Sensor, scene: Scene, means: Means) -> tuple[Scene, floa
         if weight > _RIDGE
     ]
     try:
-        return _with_modes(scene, kept), min(surprises)
+        return with_modes(scene, kept), min(surprises)
     except InvalidInputError:  # farther from its priors than a scene may state
         return scene, math.inf
 
@@ -282,14 +283,3 @@ def _without_object(sensor: Sensor, parameters: Parameters, z: Array, gain: floa
 def _root(covariance: Array) -> Array:
     scale = np.sqrt(np.diagonal(covariance))
     return np.asarray(scale[:, None] * np.linalg.cholesky(covariance / scale[:, None] / scale))
-
-
-def _with_modes(scene: Scene, modes: list[dict[str, object]]) -> Scene:
-    document = scene.model_dump(mode="json", exclude_none=True)
-    total = sum(float(str(mode["weight"])) for mode in modes)
-    for mode in modes:
-        matrix = np.asarray(mode["covariance"])
-        mode["covariance"] = (0.5 * (matrix + matrix.T)).tolist()
-        mode["weight"] = min(float(str(mode["weight"])) / total, 1.0)
-    document["joint"]["modes"] = modes
-    return parse_scene(document)

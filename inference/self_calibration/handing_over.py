@@ -9,6 +9,7 @@ from inference.self_calibration.ageing import known_since, last_time, settled, w
 from inference.self_calibration.calibration import Outcome
 from inference.self_calibration.drift import Drift
 from inference.self_calibration.looking import EVERY
+from inference.self_calibration.mixing import mixed
 from inference.self_calibration.plan import Plan
 from inference.self_calibration.scenes import knowledge, prior_scene, trackable
 from inference.self_calibration.state import CalibrationState
@@ -119,6 +120,8 @@ def _next(
         rest = [s for name, s in outcome.statuses.items() if name != "range_m"]
         known = of_ranges != "not_identified" or all(s == "identified" for s in rest)
         known = known and drift.jump == 0.0
+        if state.doubts and state.drift is not None and state.calibrated:
+            drift = drift._replace(law=mixed(drift.law, state.drift.law))
         drift, scene = widened(plan, drift, last_time(state))
         return scene, {
             "drift": drift,
@@ -126,6 +129,7 @@ def _next(
             "known": known,
             "trusts_empty": known and all(s == "identified" for s in crosstalk),
             "failures": 0,
+            "doubts": max(state.doubts - 1, 0),
             "surprised": 0,
             "surprises": 0,
             "taken_at": state.count,

@@ -5,6 +5,7 @@ import math
 
 from inference.self_calibration.ageing import (
     EMPTY_ENOUGH,
+    changed,
     further,
     in_force,
     last_time,
@@ -26,6 +27,7 @@ EVERY = 30
 _OLDEST = 5400  # numbers behind the last one that still tell of the scene as it is
 _DOUBTFUL = 2  # looks one after the other at which most frames surprise
 _LASTING = 600  # frames after which a scene that is given up was true of the object at least
+_HALVED = 2  # calibrations after a doubt that share what is known with the scene before
 _STEPS, _STEPS_BESIDE_OBJECT = 8, 6
 _STILL = 150  # frames without an amplitude that is new, after which more is not waited for
 _REFRESHED = 3600  # frames after which a scene that is worn is calibrated again
@@ -66,6 +68,9 @@ def look(plan: Plan, state: CalibrationState, sequence: int) -> CalibrationState
             return _doubted(plan, state, sequence, moved)
         if surprised >= (_DOUBTFUL if further(state.drift) is None else 1):
             return _contradicted(plan, state, sequence)
+        if state.known and (wider := changed(plan, state)) is not None:
+            state = dataclasses.replace(state, drift=wider)
+            return _doubted(plan, state, sequence, "the readings of all ranges have moved")
     if state.asked is None and state.switch is None:
         return _asking(plan, state, sequence)
     return state
@@ -102,6 +107,7 @@ def _doubted(plan: Plan, state: CalibrationState, sequence: int, reason: str) ->
         not_before=state.count,
         points=0,
         failures=0,
+        doubts=_HALVED,
     )
 
 

@@ -70,6 +70,9 @@ class CalibrationState:
         Worth of the frames of the last one.
     failures : int
         Calibrations that were not taken since one was.
+    doubts : int
+        Calibrations to come that are mixed with the scene in force: whether what changed is all
+        that they take it for, no frame may show.
     surprises : int
         Frames since the last look that speak against the scene in force.
     surprised : int
@@ -103,6 +106,7 @@ class CalibrationState:
     not_before: int = 0
     points: int = 0
     failures: int = 0
+    doubts: int = 0
     surprises: int = 0
     surprised: int = 0
     number: int = 0
@@ -117,7 +121,7 @@ class CalibrationState:
 
 _PLAIN = (
     "calibrated", "known", "trusts_empty", "count", "since", "not_before", "points", "failures",
-    "surprises", "surprised", "number", "taken_at", "steps", "grew_at",
+    "doubts", "surprises", "surprised", "number", "taken_at", "steps", "grew_at",
 )  # fmt: skip
 
 

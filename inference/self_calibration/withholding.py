@@ -40,7 +40,7 @@ def withheld(model: Tracker, frames: Frames, track: Track) -> Track:
         one &= np.isnan(frames.known_range_m)
     if not one.any() or model.observed.by_rate:
         return track
-    empty = _surprise_of_empty(model, frames.select(one))
+    empty = surprise_of_empty(model, frames.select(one))
     used = int(np.sum(model.observed.used))
     may = np.zeros(len(track), dtype=bool)
     may[one] = empty <= scipy.stats.chi2.isf(_MAY_BE_EMPTY, used)
@@ -51,7 +51,7 @@ def withheld(model: Tracker, frames: Frames, track: Track) -> Track:
     return dataclasses.replace(track, status=status.astype(np.uint8), present=present)
 
 
-def _surprise_of_empty(model: Tracker, frames: Frames) -> NDArray[np.float64]:
+def surprise_of_empty(model: Tracker, frames: Frames) -> NDArray[np.float64]:
     """Return how much readings surprise the empty scene: a chi-square, shape (n,)."""
     table, empty = model.model.table, model.model.places.empty
     used = np.asarray(model.observed.used)

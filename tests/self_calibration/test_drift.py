@@ -207,6 +207,6 @@ def test_a_law_is_as_wide_as_frames_demand() -> None:
     assert right.jump == 0.0
     off = wide_enough(still, Drift(known((0.0014, 0.0078)), at, at), frames, at)
     assert off is not None
-    assert off.jump == 0.3
+    assert off.jump == 0.4
     far = Drift(known((0.0, -0.002)), at, at)
     assert wide_enough(still, far, frames, at) is None

@@ -305,3 +305,25 @@ def test_what_no_law_names_has_its_prior() -> None:
     assert isinstance(PLAN, Plan)
     with pytest.raises(InvalidInputError, match="/state"):
         calibration_from_bytes(b"something else")
+
+
+def test_readings_that_move_within_the_law_are_a_doubt() -> None:
+    """Crosstalk is known to a fifth, and shifts by less than that: nothing contradicts the law."""
+    plan = plan_of(SENSOR, known(TRUTH, 1.2e-3), STILL, 7)
+    _, rows, events = run(course((0.0014, 0.0068)), None, plan=plan)
+    doubted = events[0]
+    assert (doubted["kind"], doubted["reason"]) == (
+        "doubted",
+        "the readings of all ranges have moved",
+    )
+    # the object is back at ranges where it was before within half of its period of 9 s
+    assert CHANGE < doubted["sequence"] <= CHANGE + 6 * EVERY
+    state, _, again = run(course((0.0014, 0.0068)), None, (200, 400), stored=True, plan=plan)
+    assert again == events
+    assert (state.doubts, state.known) == (2, False)
+    truth = np.exp(np.log(0.67) + 0.8 * np.sin(2 * np.pi * np.arange(N) / 30 / 9))
+    late = slice(doubted["sequence"], None)
+    answered = np.isfinite(rows[late, 0])
+    assert answered.any()
+    # the shift is less than a standard deviation of what the intervals hold
+    assert (np.abs(rows[late, 0] - truth[late]) <= 3 * rows[late, 1])[answered].all()

@@ -1,0 +1,203 @@
+"""Has the curve of the readings moved? The trace of a change that the law of the scene would hide.
+
+The readings of all ranges lie on one curve in their plane. What is unknown of a scene bends and
+shifts it, by the same in every frame; noise of single frames moves no curve. So frames before and
+after a change lie on two curves, to within the noise, though either may lie well within what the
+law of the scene allows: a wall that nobody stated is a shift of five read noises in each frame and
+of one standard deviation of the crosstalk. Each frame gives one residual, across the curve, after
+its range has been fitted; what is unknown is fitted to all of them within its law, and to those
+after a split a shift of the crosstalk besides, linear in all of it.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from inference.frame.arguments import instrument_of
+from inference.frame.noise import covariances
+from inference.self_calibration.withholding import surprise_of_empty
+from inference.tracking.readings_table import MEAN, NUISANCE, SIGNAL, SPREAD
+from inference.tracking.tracker import Tracker
+from simulator.frames import Frames
+
+__all__ = ["FEWEST", "Residuals", "has_changed", "surprise_of"]
+
+Array = NDArray[np.float64]
+
+FEWEST = 8
+"""Usable frames on either side of a split."""
+
+_SPLITS = (15, 30, 60, 120)  # frames after the change
+_FALSE_ALARM = 1e-6  # of a look, over all splits
+_STARTS = 128  # places along the curve from which ranges are fitted
+_TURNS = 3
+_FARTHEST = 0.3  # of log r, in one turn
+_SURELY_THERE = 50.0  # chi-square of readings without the object
+_BRIGHT = 5.0  # read noises by which the readings change with log r: darker frames tell no range
+
+
+class Residuals(NamedTuple):
+    """Of n frames across the curve, in units of their noise.
+
+    Attributes
+    ----------
+    values : ndarray, shape (n,)
+        Where all that is unknown is at its centre.
+    changes : ndarray, shape (n, p)
+        Change with each unknown by a standard deviation.
+    across : ndarray, shape (n, 2)
+        Change with the crosstalk by a read noise.
+    """
+
+    values: Array
+    changes: Array
+    across: Array
+
+
+def has_changed(
+    model: Tracker, frames: Frames, usable: NDArray[np.bool_], walk: Array, widest: Array
+) -> bool:
+    """Tell whether the last frames lie on another curve than those before.
+
+    Parameters
+    ----------
+    model : Tracker
+        Of the scene in force.
+    frames : Frames
+        The last ones.
+    usable : ndarray of bool, shape (n,)
+        Which may hold the object.
+    walk, widest : ndarray, shape (2,)
+        Standard deviation of what the crosstalk does anyway meanwhile, and of a change [reading
+        units].
+
+    Returns
+    -------
+    bool
+        Of a scene and a walk as stated at most once in a million looks, to first order in what is
+        unknown: what a free shift gains is a chi-square of two degrees of freedom, and a shift
+        that is held gains less. False where nothing would show it.
+    """
+    if not all(model.observed.used) or model.observed.by_rate:
+        return False  # one number a frame lies on any curve
+    found = _residuals(model, frames, usable & ~_maybe_empty(model, frames))
+    if found is None:
+        return False
+    bright, at = found
+    walk, widest = walk * model.observed.scale, widest * model.observed.scale
+    limit = scipy.stats.chi2.isf(_FALSE_ALARM / len(_SPLITS), 2)
+    place = np.arange(len(frames))[bright]
+    for count in _SPLITS:
+        behind = place >= len(frames) - count
+        sizes = np.count_nonzero(behind), np.count_nonzero(~behind)
+        if min(sizes) >= FEWEST:
+            shifted = behind[:, None] * at.across
+            if surprise_of(at, shifted * walk) - surprise_of(at, shifted * widest) > limit:
+                return True
+    return False
+
+
+def surprise_of(at: Residuals, shifted: Array) -> float:
+    """Return the chi-square of residuals.
+
+    Parameters
+    ----------
+    at : Residuals
+        With what the unknowns do to them.
+    shifted : ndarray, shape (n, 2)
+        What a standard deviation of each component of a shift does to them.
+    """
+    n, p = at.changes.shape
+    table = np.zeros((n + p + 2, p + 3))
+    table[:n, :p], table[:n, p:-1], table[:n, -1] = at.changes, shifted, at.values
+    table[n:, :-1] = np.eye(p + 2)
+    left = float(np.asarray(np.linalg.qr(table, mode="r"))[-1, -1])
+    return left * left
+
+
+def _residuals(
+    model: Tracker, frames: Frames, usable: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], Residuals] | None:
+    """Fit all ranges, and what is unknown; return which frames tell theirs, and what is left."""
+    table = model.model.table
+    knots, count = table.knots, (table.knots.shape[1] - NUISANCE) // 2
+    readings = frames.readings * model.observed.scale
+    readings = readings - np.array([table.crosstalk1, table.crosstalk2])
+    if frames.gain is not None:
+        readings = readings / frames.gain[:, None]
+    u = _nearest(knots, readings) * table.step
+    unknown = np.zeros(count)
+    bright = usable
+    for _ in range(_TURNS):
+        mean, slope, jacobian = _curve(knots, u / table.step, count)
+        slope = slope / table.step
+        speed = np.hypot(slope[:, 0], slope[:, 1])
+        bright = usable & (speed > _BRIGHT) & np.isfinite(readings).all(axis=1)
+        if bright.sum() < 2 * FEWEST:
+            return None
+        with np.errstate(divide="ignore", invalid="ignore"):
+            normal = np.column_stack([-slope[:, 1], slope[:, 0]]) / speed[:, None]
+        off = readings - mean
+        noise = _noise(model, frames, knots, u / table.step, normal)
+        values = np.einsum("ni,ni->n", normal, off) / noise
+        changes = np.einsum("npi,ni->np", jacobian, normal) / noise[:, None]
+        system = np.vstack([changes[bright], np.eye(count)])
+        right = np.concatenate([values[bright], np.zeros(count)])
+        unknown = np.linalg.lstsq(system, right)[0]
+        left = off - np.einsum("npi,p->ni", jacobian, unknown)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            along = np.einsum("ni,ni->n", slope, left) / np.square(speed)
+        along = np.where(speed > 0, along, 0.0)
+        u = np.clip(u + np.clip(along, -_FARTHEST, _FARTHEST), 0.0, (len(knots) - 1) * table.step)
+    gain = np.ones(len(frames)) if frames.gain is None else frames.gain
+    across = normal / (noise * gain)[:, None]
+    return bright, Residuals(values[bright], changes[bright], across[bright])
+
+
+def _maybe_empty(model: Tracker, frames: Frames) -> NDArray[np.bool_]:
+    """Tell which frames an empty scene explains, or nearly: they have no range to be fitted."""
+    return np.asarray(surprise_of_empty(model, frames) < _SURELY_THERE)
+
+
+def _nearest(knots: Array, readings: Array) -> Array:
+    """Return the knots that explain readings best within what the unknowns allow."""
+    every = -(-len(knots) // _STARTS)
+    some = knots[::every]
+    r11, r21, r22 = some[:, SPREAD : SPREAD + 3].T
+    # of I + R R^T, whose root whitens
+    a, b, c = 1.0 + r11**2, r11 * r21, 1.0 + r21**2 + r22**2
+    first = np.sqrt(a)
+    second = np.sqrt(c - (b / first) ** 2)
+    off1 = (readings[:, None, 0] - some[:, MEAN]) / first
+    off2 = (readings[:, None, 1] - some[:, MEAN + 1] - (b / first) * off1) / second
+    return np.asarray(every * np.argmin(off1**2 + off2**2, axis=1), dtype=np.float64)
+
+
+def _curve(knots: Array, at: Array, count: int) -> tuple[Array, Array, Array]:
+    """Return means, their slopes by knots, and what p unknowns do to them, shape (n, p, 2)."""
+    i = np.minimum(at.astype(np.int64), len(knots) - 2)
+    t = (at - i)[:, None]
+    a, left = knots[i, MEAN : MEAN + 2], knots[i, MEAN + 2 : MEAN + 4]
+    b, right = knots[i + 1, MEAN : MEAN + 2], knots[i + 1, MEAN + 2 : MEAN + 4]
+    bend, twist = 3.0 * (b - a) - 2.0 * left - right, left + right - 2.0 * (b - a)
+    mean = a + t * (left + t * (bend + t * twist))
+    slope = left + t * (2.0 * bend + 3.0 * t * twist)
+    jacobian = knots[i, NUISANCE:] + t * (knots[i + 1, NUISANCE:] - knots[i, NUISANCE:])
+    return mean, slope, jacobian.reshape(len(at), count, 2)
+
+
+def _noise(model: Tracker, frames: Frames, knots: Array, at: Array, normal: Array) -> Array:
+    """Return the standard deviation of the noise across the curve, in units of the read noise."""
+    gain = np.ones(len(frames)) if frames.gain is None else frames.gain
+    if model.model.table.noise.plain:
+        return 1.0 / gain
+    i = np.rint(at).astype(np.int64)
+    units = np.asarray(model.observed.units)
+    table = model.model.table
+    still = np.array([table.crosstalk1, table.crosstalk2])
+    means = (gain[:, None] * knots[i, MEAN : MEAN + 2] + still) * units
+    signals = gain[:, None] * knots[i, SIGNAL : SIGNAL + 2] * units
+    found = covariances(instrument_of(model.sensor), means, signals) / np.outer(units, units)
+    return np.asarray(np.sqrt(np.einsum("ni,nij,nj->n", normal, found, normal)) / gain)
