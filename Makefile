@@ -72,6 +72,9 @@ stress: $(READY) ## Extreme and stiff cases against exact arithmetic, 100,000 fr
 mutations: $(READY) ## Plant faults in a copy of the source, one at a time: which tests notice; goes on where it stopped
 	$(BIN)/python -m benchmarks.mutations
 
+# every process of the tests would compile all that it imports: a second more for a service
+unexport PYTHONDONTWRITEBYTECODE
+
 # two processes on two cores: a library that starts threads of its own only makes them wait
 notebook-seeds calibrate coverage stress test fast: export OPENBLAS_NUM_THREADS = 1
 

@@ -91,34 +91,34 @@ def test_goes_in_by_the_front_door(name: str) -> None:
 # the kernel's machinery warns about itself
 @pytest.mark.filterwarnings("default")
 def test_runs_in_jupyter() -> None:
+    """One of them: a kernel takes three times what the cells of the others take in this process."""
     from nbclient import NotebookClient
 
-    notebook = read(DIAGNOSTICS)
-    stored = quantiles(printed(notebook))
+    notebook = read("two_roots.ipynb")
     resources = {"metadata": {"path": str(NOTEBOOKS)}}
     NotebookClient(notebook, timeout=300, kernel_name="python3", resources=resources).execute()
-    check_truth(printed(notebook))
-    anew = quantiles(printed(notebook))
-    assert stored
-    assert stored.keys() == anew.keys()
-    for parameter, (low, middle, high) in anew.items():
-        # a third of a standard deviation: five standard errors of a median of 400 draws
-        assert abs(middle - stored[parameter][1]) < 0.1 * (high - low), parameter
+    assert "truth held: True" in printed(notebook)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in NAMES if name != DIAGNOSTICS])
+@pytest.mark.filterwarnings("ignore::FutureWarning:arviz")  # of its own next version
+@pytest.mark.parametrize("name", NAMES)
 def test_holds_its_truth(name: str) -> None:
-    """Its cells in this process, which takes a third of the time of a kernel of its own.
-
-    `make notebook-seeds` counts the same intervals over 20 seeds.
-    """
+    """`make notebook-seeds` counts the same intervals over 20 seeds."""
     names, said, passed = executed(name)
     assert passed
     assert "truth held: True" in said
     for flags in held_by(name, names).values():
         assert flags.size
         assert flags.mean() > 0.5
+    if name == DIAGNOSTICS:
+        check_truth(said)
+        stored, anew = quantiles(printed(read(name))), quantiles(said)
+        assert stored
+        assert stored.keys() == anew.keys()
+        for parameter, (low, middle, high) in anew.items():
+            # a third of a standard deviation: five standard errors of a median of 400 draws
+            assert abs(middle - stored[parameter][1]) < 0.1 * (high - low), parameter
 
 
 def test_other_seeds_change_all_that_is_drawn() -> None:

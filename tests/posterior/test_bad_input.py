@@ -1,6 +1,7 @@
 """Bad input of the posterior: refused before any sampling, or answered with what is wrong said."""
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from inference.posterior import checks, fold
+from inference.posterior.answer.posterior import Posterior
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
 from simulator.errors import InvalidInputError, RefusedError
@@ -293,16 +295,23 @@ def test_priors_and_readings_that_contradict_one_another_are_named(name: str) ->
     assert posterior.verdict.converged, posterior.verdict.reasons
 
 
+WEIGHTED = SamplerSettings(seed=3, method="importance")
+SEEN = data(SENSOR, {"crosstalk": [0.002, 0.01]}).frames
+
+
+@functools.cache
+def in_one_unit() -> Posterior:
+    scene = {"crosstalk": [{"prior": "normal", "mean": 0.0, "sd": 0.02}] * 2}
+    return infer(SENSOR, parse_scene(scene), SEEN, WEIGHTED)
+
+
 @pytest.mark.parametrize("factor", [1e-12, 1e12])
 def test_no_answer_depends_on_the_unit_of_readings(factor: float) -> None:
-    settings = SamplerSettings(seed=3, method="importance")
-    scene = {"crosstalk": [{"prior": "normal", "mean": 0.0, "sd": 0.02}] * 2}
     scaled = {"crosstalk": [{"prior": "normal", "mean": 0.0, "sd": 0.02 * factor}] * 2}
     noise = {"read": [read * factor for read in SENSOR.noise.read]}
     sensor = parse_sensor({**SENSOR.model_dump(exclude_none=True), "gain": factor, "noise": noise})
-    frames = data(SENSOR, {"crosstalk": [0.002, 0.01]}).frames
-    plain = infer(SENSOR, parse_scene(scene), frames, settings)
-    other = infer(sensor, parse_scene(scaled), Frames(frames.readings * factor), settings)
+    plain = in_one_unit()
+    other = infer(sensor, parse_scene(scaled), Frames(SEEN.readings * factor), WEIGHTED)
     # rounding differs, and each step of a climb multiplies it; draws themselves are as good as 1 %
     assert other.range_m.q50 == pytest.approx(plain.range_m.q50, rel=1e-4)
     assert other.parameters["object.c0"].mean == pytest.approx(

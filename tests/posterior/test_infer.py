@@ -1,5 +1,6 @@
 """The whole posterior: held to quadrature, to the truth, to docs/http.md, posteriors."""
 
+import functools
 import json
 import math
 from typing import Any
@@ -42,10 +43,15 @@ def test_one_unknown_agrees_with_quadrature(kind: str, snr: float) -> None:
     assert summary.sd == pytest.approx(sd, rel=5 * 1.5 / math.sqrt(2 * summary.ess_bulk))
 
 
+@functools.cache
+def walked(kind: str, crosstalk: bool) -> Posterior:
+    return infer(*example(kind, crosstalk, frames=40), SamplerSettings(seed=1))
+
+
 @pytest.mark.parametrize("crosstalk", [False, True])
 @pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
 def test_converges_at_n_40(kind: str, crosstalk: bool) -> None:
-    posterior = infer(*example(kind, crosstalk, frames=40), SamplerSettings(seed=1))
+    posterior = walked(kind, crosstalk)
     assert posterior.verdict.converged, posterior.verdict.reasons
     for summary in posterior.parameters.values():
         assert summary.ess_bulk >= 400
@@ -54,8 +60,24 @@ def test_converges_at_n_40(kind: str, crosstalk: bool) -> None:
     assert not posterior.fit.misfit
 
 
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+def test_importance_agrees_with_ensembles(kind: str) -> None:
+    request = example(kind, crosstalk=True, frames=40)
+    weighted = infer(*request, SamplerSettings(method="importance", seed=3))
+    drawn = walked(kind, crosstalk=True)
+    assert weighted.runtime.k_hat is not None
+    assert weighted.runtime.k_hat < 0.5
+    assert drawn.verdict.converged
+    for name, summary in drawn.parameters.items():
+        other = weighted.parameters[name]
+        error = np.hypot(summary.mcse_mean, other.mcse_mean)
+        # five parameters, two kinds: a false alarm once in 5e4 runs
+        assert abs(summary.mean - other.mean) < 4.9 * error
+        assert other.rhat is None
+
+
 def test_the_shape_is_the_contract_s() -> None:
-    document = infer(*example("pulsed", crosstalk=True), SamplerSettings(seed=1)).to_json()
+    document = walked("pulsed", crosstalk=True).to_json()
     text = json.dumps(document, allow_nan=False)
     assert json.loads(text) == document
     assert set(document) == {

@@ -73,7 +73,7 @@ def test_the_same_answer_from_a_call_and_from_the_service(
     plate = {name: OBJECT[name] for name in ("c0", "c1")}
     request = sensor, parse_scene({"object": plate, "crosstalk": crosstalk}), frames
     target = 1_000_000 if max_seconds < 100 else 50
-    settings = SamplerSettings(seed=7, target_ess=target, max_seconds=max_seconds)
+    settings = SamplerSettings(seed=7, ensembles=2, target_ess=target, max_seconds=max_seconds)
     called = inference.posterior.infer.infer(*request, settings).to_json()
     monkeypatch.setattr(service.job_runner, "time", _Clock())
     monkeypatch.setattr(service.job_runner, "timed", timed)

@@ -5,6 +5,8 @@ import functools
 import itertools
 import json
 import math
+import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -133,12 +135,17 @@ def test_readings_have_what_the_scene_says() -> None:
         assert longer[0] == (1.0 if not BY_NAME[name].plate else pytest.approx(1.19, abs=0.01))
 
 
-def measured(tmp_path: Path, names: tuple[str, ...]) -> list[Row]:
-    scenes = [BY_NAME[name] for name in names]
-    return list(rows_of(scenes, TINY, 1, tmp_path / "part"))
+MEASURED = ("Unknown crosstalk", "Through the fold")
 
 
-def uncosted(rows: list[Row]) -> list[Row]:
+@functools.cache
+def measured() -> tuple[Row, ...]:
+    scenes = [BY_NAME[name] for name in MEASURED]
+    with tempfile.TemporaryDirectory() as folder:
+        return tuple(rows_of(scenes, TINY, 1, Path(folder) / "part"))
+
+
+def uncosted(rows: Sequence[Row]) -> list[Row]:
     """What depends on the seed alone."""
     return [dataclasses.replace(row, costs=Costs()) for row in rows]
 
@@ -146,10 +153,8 @@ def uncosted(rows: list[Row]) -> list[Row]:
 def test_same_seed_same_errors_and_a_killed_run_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "other").mkdir()
-    names = ("Unknown crosstalk", "Through the fold")
-    whole = measured(tmp_path / "other", names)
-    scenes = [BY_NAME[name] for name in names]
+    whole = measured()
+    scenes = [BY_NAME[name] for name in MEASURED]
     first = list(itertools.islice(rows_of(scenes, TINY, 1, tmp_path / "part"), 9))
     with (tmp_path / "part").open("a") as file:
         file.write('{"key": "cut sh')
@@ -174,8 +179,8 @@ def test_same_seed_same_errors_and_a_killed_run_goes_on(
         assert row_from(json.loads(json.dumps(row.to_json(), allow_nan=False))) == row
 
 
-def test_what_is_not_told_misleads(tmp_path: Path) -> None:
-    rows = measured(tmp_path, ("Unknown crosstalk",))
+def test_what_is_not_told_misleads() -> None:
+    rows = [row for row in measured() if row.scene == "Unknown crosstalk"]
     by = {(row.method, row.told != ""): row for row in rows if row.scores is not None}
     blind = by["time of flight alone", True].scores
     # crosstalk of half the signal: no interval of the noise has room for it
@@ -236,11 +241,11 @@ def test_the_method_to_take_is_cheap_near_the_best_and_honest() -> None:
 
 
 def test_page(tmp_path: Path) -> None:
-    rows = measured(tmp_path, ("Unknown crosstalk", "Through the fold"))
+    rows = measured()
     scenes = [BY_NAME[name] for name in dict.fromkeys(row.scene for row in rows)]
     least = {scene.name: least_error(scene) for scene in scenes}
     terms = (TermCost("object alone", 3, 9000.0, 5e-6), TermCost("+ wall", 4, 9500.0, 6e-6))
-    report = Report(machine(), 1, tuple(rows), least, 3e-10, terms)
+    report = Report(machine(), 1, rows, least, 3e-10, terms)
     pictures = {name: svg(draw_scene(report, name)) for name in report.scenes}
     made = page(report, pictures, svg(draw_terms(terms)), None)
     # one file, and nothing from elsewhere

@@ -61,7 +61,8 @@ def test_in_every_stage(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     truth, scene, method, frames, most, stages = CASES[name]
     sensor = sensor_of("pulsed")
     simulated = data(sensor, truth, frames)
-    settings = SamplerSettings.model_validate({"seed": 7, "target_ess": 50, "method": method})
+    quick = {"seed": 7, "target_ess": 50, "ensembles": 2}
+    settings = SamplerSettings.model_validate(quick | {"method": method})
     job = fold.prepare(sensor, parse_scene(scene), simulated.frames, settings)
     stored_job = job.to_bytes()
     checkpoint, seen = fold.start(job), []
