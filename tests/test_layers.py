@@ -46,7 +46,8 @@ ALLOWED: dict[str, str] = {
         "inference.posterior.sampling inference.density inference.frame"
     ),
     "inference/posterior/stages": _POSTERIOR,
-    "inference/self_calibration": "inference.tracking inference.posterior inference.estimates",
+    "inference/self_calibration": "inference.tracking inference.posterior inference.estimates "
+    "inference.frame",
     "inference/tracking": f"{_POSTERIOR} inference.estimates",
     "service": "service inference simulator.optics",
     "service/adapters": "service.errors",
