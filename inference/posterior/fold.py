@@ -12,8 +12,10 @@ Between chunks a checkpoint may be stored and read again: the result is the same
 
 Where weighted draws from the Laplace shapes at the optima, or from maps fitted to them, are even
 and points from the prior do not contradict them, ensembles walk at once. Where not, populations are
-first carried from the prior to the posterior, a map is fitted to them, and ensembles walk in
-its coordinates. What each stage does is in `inference.posterior.stages`.
+first carried from the prior to the posterior, and maps are fitted to them and to weighted draws
+from these maps, in rounds. Such draws are the answer with the method `auto`, where they agree with
+the populations; otherwise ensembles walk in the last map's coordinates. What each stage does is in
+`inference.posterior.stages`.
 """
 
 import dataclasses
@@ -39,7 +41,7 @@ from inference.posterior.stages.stage import (
     Weighted,
 )
 from inference.posterior.stages.starting import StartTask, begin
-from inference.posterior.stages.tempering import TemperTask
+from inference.posterior.stages.tempering import SetOutTask, TemperTask
 from inference.posterior.stages.walking import WalkTask
 from inference.posterior.summary import draw, summarise
 
@@ -60,7 +62,7 @@ __all__ = [
     "tasks",
 ]
 
-Task = AssessTask | StartTask | TemperTask | WalkTask
+Task = AssessTask | StartTask | TemperTask | SetOutTask | WalkTask
 Piece = Candidate | Checkpoint | Population | Ensemble
 P = TypeVar("P")
 
@@ -129,10 +131,9 @@ def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoi
             selection, used = selecting.merge(job, _all(Candidate, pieces))
             return Checkpoint(Starting(), calls + used, selection)
         case Starting():
-            (started,) = _all(Checkpoint, pieces)
-            return dataclasses.replace(
-                started, calls=calls + started.calls, selection=checkpoint.selection
-            )
+            return _after(checkpoint, pieces)
+        case Tempering() as stage if stage.arrived:
+            return _after(checkpoint, pieces)
         case Tempering() as stage:
             carried = _all(Population, pieces)
             after, used = tempering.merge(sampled(job, checkpoint), stage, carried)
@@ -143,6 +144,13 @@ def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoi
             return dataclasses.replace(checkpoint, stage=after, calls=calls + used)
         case Weighted() | Settled():
             raise ValueError("the job is finished: there is nothing to take in")
+
+
+def _after(checkpoint: Checkpoint, pieces: Sequence[object]) -> Checkpoint:
+    """Return where a task that decides on the next stage has come to."""
+    (reached,) = _all(Checkpoint, pieces)
+    calls = checkpoint.calls + reached.calls
+    return dataclasses.replace(reached, calls=calls, selection=checkpoint.selection)
 
 
 def _all(kind: type[P], pieces: Sequence[object]) -> tuple[P, ...]:

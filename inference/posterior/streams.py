@@ -38,5 +38,7 @@ class Stream(enum.IntEnum):
     """Frames that are sampled in the name of all."""
     PARTS = 14
     """Which frames of many are judged together, and the draws of their ranges."""
+    ROUNDS = 15
+    """Importance draws from maps that are fitted to populations, and to those before."""
     CANDIDATES = 1000
     """Assessment of the models with and without optional terms, each by its number."""

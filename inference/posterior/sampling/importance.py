@@ -2,16 +2,17 @@
 
 import dataclasses
 import math
+from typing import Protocol
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.posterior.sampling.proposal import Mixture, Proposal
 
 __all__ = [
     "MAX_K_HAT",
+    "Law",
     "WeightedDraws",
     "draw_weighted",
     "generalised_pareto",
@@ -24,6 +25,18 @@ Array = NDArray[np.float64]
 MAX_K_HAT = 0.5
 _LEAST_EXCESS = 5  # weights above the cut that a shape is fitted to
 _EQUAL = 1e-9  # of the largest weight, by which equal ones differ through rounding
+
+
+class Law(Protocol):
+    """What draws come from: a mixture, a proposal, a blend of proposals."""
+
+    def draw(self, rng: np.random.Generator, n: int, /) -> Array:
+        """Draw n points, shape (n, d)."""
+        ...
+
+    def log_density(self, z: Array, /) -> Array:
+        """Return the log density at z of shape (n, d), shape (n,)."""
+        ...
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -153,7 +166,7 @@ def smoothed(log_weights: Array) -> tuple[Array, float]:
 
 
 def draw_weighted(
-    density: CollapsedDensity, proposal: Mixture | Proposal, rng: np.random.Generator, n: int
+    density: CollapsedDensity, proposal: Law, rng: np.random.Generator, n: int
 ) -> WeightedDraws:
     """Draw from a proposal and weight by the collapsed density.
 
@@ -161,7 +174,7 @@ def draw_weighted(
     ----------
     density : CollapsedDensity
         Target.
-    proposal : Mixture or Proposal
+    proposal : Law
         Proposal.
     rng : numpy.random.Generator
         Source of randomness.

@@ -4,8 +4,8 @@
 
     Selecting -> Starting -+-> Weighted
                            +-> Settled
-                           +-> Tempering -> Walking
-                           +-> Walking -> (Tempering -> Walking)
+                           +-> Tempering -> Weighted or Walking
+                           +-> Walking -> (Tempering -> Weighted or Walking)
 
 A job without optional terms begins behind `Starting`. Ensembles that hardly move call for
 populations, once.
@@ -79,6 +79,11 @@ class Tempering(_NotBegun):
     populations: tuple[Population | None, ...]
     verdict: Verdict
     weighted: WeightedDraws | None = None
+
+    @property
+    def arrived(self) -> bool:
+        """Whether no population is on its way any more."""
+        return all(each is not None and each.ended for each in self.populations)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

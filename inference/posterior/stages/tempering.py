@@ -1,4 +1,8 @@
-"""The stage in which populations are carried from the prior to the posterior."""
+"""The stage in which populations are carried from the prior to the posterior.
+
+Those that arrived are what importance sampling in rounds begins with, and is held to. Its draws are
+the answer where they may be; otherwise they say from where, and through which map, ensembles walk.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -10,14 +14,20 @@ from inference.posterior.sampling.effort import effort_of
 from inference.posterior.sampling.ensemble import WALKERS
 from inference.posterior.sampling.population import Population, first_population, temper
 from inference.posterior.sampling.reparametrisation import reparametrisation_of
+from inference.posterior.sampling.rounds import Rounds, in_rounds
 from inference.posterior.sampling.transport import fit_map
+from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.sampling.warm import MAP_SHARE
+from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.chunk import evaluations
 from inference.posterior.stages.ensembles import new_ensembles
-from inference.posterior.stages.stage import Tempering, Walking
+from inference.posterior.stages.stage import Tempering, Walking, Weighted
 from inference.posterior.streams import Stream
 
-__all__ = ["TemperTask", "merge", "tasks"]
+__all__ = ["SetOutTask", "TemperTask", "merge", "tasks"]
+
+_SHARE = 0.5  # of what the populations took, that importance sampling behind them may take
+_MOST_DRAWS = (8000, 40_000)  # but so many at least, and at most
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -57,8 +67,31 @@ class TemperTask:
         return self.job.stream(Stream.POPULATIONS, self.index, temperature)
 
 
-def tasks(job: Job, stage: Tempering) -> tuple[TemperTask, ...]:
-    """Return the populations that are still on their way."""
+@dataclasses.dataclass(frozen=True, eq=False)
+class SetOutTask:
+    """Importance sampling from populations that arrived, and what comes of it.
+
+    Attributes
+    ----------
+    job : Job
+        The job.
+    stage : Tempering
+        With populations of which at least one has arrived.
+    """
+
+    job: Job
+    stage: Tempering
+
+    def run(self) -> Checkpoint:
+        """Return the answer, or ensembles that set out."""
+        after, calls = _set_out(self.job, self.stage)
+        return Checkpoint(after, calls, None, self.job.representatives)
+
+
+def tasks(job: Job, stage: Tempering) -> tuple[TemperTask | SetOutTask, ...]:
+    """Return the populations that are still on their way; behind them what comes of them."""
+    if stage.arrived:
+        return (SetOutTask(job, stage),)
     return tuple(
         TemperTask(job, population, k, evaluations(job))
         for k, population in enumerate(stage.populations)
@@ -69,7 +102,7 @@ def tasks(job: Job, stage: Tempering) -> tuple[TemperTask, ...]:
 def merge(
     job: Job, stage: Tempering, carried: Sequence[Population]
 ) -> tuple[Tempering | Walking, int]:
-    """Take in populations; set up ensembles where all have arrived, or died on the way.
+    """Take in populations; set up ensembles where all died on the way.
 
     Parameters
     ----------
@@ -93,14 +126,37 @@ def merge(
         new = next(rest)
         calls += new.calls - (0 if old is None else old.calls)
         found.append(new)
-    if not all(population.ended for population in found):
-        return dataclasses.replace(stage, populations=tuple(found)), calls
-    walking = _set_out(job, stage, [population for population in found if len(population.z)])
+    stage = dataclasses.replace(stage, populations=tuple(found))
+    if any(len(population.z) or not population.ended for population in found):
+        return stage, calls
+    walking = _walking(job, stage, [], None)
     return walking, calls + WALKERS * len(walking.ensembles)
 
 
-def _set_out(job: Job, stage: Tempering, arrived: list[Population]) -> Walking:
-    """Fit a map to the populations that arrived, and set up ensembles in its coordinates.
+def _set_out(job: Job, stage: Tempering) -> tuple[Weighted | Walking, int]:
+    """Sample by importance from the populations that arrived; set up ensembles where it fails."""
+    members = [each for each in stage.populations if each is not None and len(each.z)]
+    density = job.density()
+    most = int(_SHARE * sum(each.calls for each in members))
+    found = in_rounds(
+        density,
+        dataclasses.replace(stage.proposal, share=MAP_SHARE),
+        tuple(each.z for each in members),
+        job.stream(Stream.ROUNDS),
+        job.settings.target_ess,
+        int(np.clip(most, *_MOST_DRAWS)),
+    )
+    enough = found.trusted and found.draws.ess >= job.settings.target_ess
+    if enough and job.settings.method == "auto":
+        return Weighted(found.proposal.optima, found.draws, Verdict(True, ())), found.calls
+    walking = _walking(job, stage, members, found)
+    return walking, found.calls + WALKERS * len(walking.ensembles)
+
+
+def _walking(
+    job: Job, stage: Tempering, arrived: list[Population], found: Rounds | None
+) -> Walking:
+    """Set up ensembles in the coordinates of the best map that there is.
 
     The last ensemble starts around the optima of the multistart, the others from populations that
     came from the prior and know nothing of them: they can contradict one another.
@@ -119,5 +175,9 @@ def _set_out(job: Job, stage: Tempering, arrived: list[Population]) -> Walking:
             turn, which = divmod(k, len(members))
             order = np.roll(orders[which], -(turn * len(members[which]) // sharing))
             starts[k] = members[which][order]
+    trusted = found is not None and found.trusted
+    if found is not None and trusted:
+        proposal = found.proposal
     ensembles = new_ensembles(density, proposal, tuple(starts), job.seeds(Stream.ENSEMBLES))
-    return Walking(proposal, ensembles, stage.verdict, adaptations=1)
+    weighted = found.draws if found is not None and trusted else None
+    return Walking(proposal, ensembles, stage.verdict, adaptations=1, weighted=weighted)

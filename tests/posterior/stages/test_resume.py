@@ -40,7 +40,7 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any], str, int, int, tuple[type
         {"background": UNKNOWN_WALL},
         "emcee",
         3,
-        5,
+        6,
         (Tempering, Walking),
     ),
     "weighted": (

@@ -1,5 +1,6 @@
 """Where ensembles begin, and what is said before they have moved."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -13,8 +14,8 @@ from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.start import find_optima
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages.stage import Tempering, Walking
-from inference.posterior.stages.tempering import merge
+from inference.posterior.stages.stage import Stage, Tempering, Walking, Weighted
+from inference.posterior.stages.tempering import SetOutTask, tasks
 from simulator.frames import frames_from_columns
 from simulator.scene import parse_scene
 from tests.posterior.scenes import UNKNOWN_CROSSTALK, example, sensor_of
@@ -32,8 +33,16 @@ def test_ensembles_begin_in_different_members_from_all_over_a_population() -> No
         for z in np.array_split(members[np.argsort(members[:, 0])], 2)
     )
     before = Tempering(Proposal(optima, None, 0.5), populations, Verdict(False, ()))
-    after, _ = merge(job, before, ())
+    (task,) = tasks(job, before)
+    after = _stage_after(task)
     assert isinstance(after, Walking)
+    assert after.weighted is not None  # what the walkers are held to
+    settings = job.settings.model_copy(update={"method": "auto"})
+    (task,) = tasks(dataclasses.replace(job, settings=settings), before)
+    answer = _stage_after(task)
+    assert isinstance(answer, Weighted)
+    assert answer.verdict.converged
+    assert np.array_equal(answer.draws.z, after.weighted.z)
     starts = [after.proposal.bend(ensemble.coords)[0] for ensemble in after.ensembles[:-1]]
     for k, start in enumerate(starts):
         population = populations[k % 2].z
@@ -42,6 +51,11 @@ def test_ensembles_begin_in_different_members_from_all_over_a_population() -> No
         assert abs(start[:, 0].mean() - population[:, 0].mean()) < 4.5 * error
     together = np.concatenate(starts[::2]).round(9)
     assert len(np.unique(together, axis=0)) == len(together)
+
+
+def _stage_after(task: object) -> Stage:
+    assert isinstance(task, SetOutTask)
+    return task.run().stage
 
 
 def test_one_frame_a_discrepancy_and_an_optional_term_are_answered() -> None:

@@ -1,0 +1,283 @@
+"""Importance sampling in rounds: every proposal is fitted to the draws of all rounds before it.
+
+Adaptive multiple importance sampling (Cornuet et al. 2012): a draw of any round is weighted by the
+mixture of all proposals (Owen and Zhou 2000), so that what one of them leaves out another holds.
+Besides a map, every round has a law around the place where the target exceeds the mixture most
+(incremental mixtures, Raftery and Bao 2010): no polynomial follows a narrow second mode. Members of
+populations that came from the prior begin it, and are what it is held to. The draws that count are
+made at the end, from proposals that are fitted no more.
+"""
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, optimize, special
+
+from inference.density.collapsed import CollapsedDensity
+from inference.posterior.sampling.importance import (
+    MAX_K_HAT,
+    Law,
+    WeightedDraws,
+    draw_weighted,
+    pareto_k_hat,
+)
+from inference.posterior.sampling.proposal import Mixture, Proposal
+from inference.posterior.sampling.reparametrisation import reparametrisation_of
+from inference.posterior.sampling.transport import TriangularMap, fit_map
+
+__all__ = ["Blend", "Local", "Rounds", "in_rounds"]
+
+Array = NDArray[np.float64]
+
+_DRAWS = 1000  # of a round
+_LOCAL_SHARE = 0.25  # of them, from around the place that the others hold least of
+_NEIGHBOURS = 10  # for every unknown, that such a law is fitted to; or
+_NEAR = 0.05  # of all draws
+_LONGEST = 4  # times as many may count before the draws are spent
+_LEAST = 2000  # draws that count: the shape of their weights' tail is known to 0.13
+_SURE = 0.45  # k-hat in the rounds from which that of the draws that count is worth a trial
+_MOST_DISSENT = 0.1  # of a population's members beyond every weight
+_SPARE = 1.3  # times the draws that are foreseen
+_FITTED = 2000  # draws that a map is fitted to
+_LEAST_ESS = 150.0  # of them, and
+_PER_PAIR = 4.0  # times the square of the unknowns: weights are flattened until there are as many
+
+
+class Blend(NamedTuple):
+    """A mixture of laws.
+
+    Attributes
+    ----------
+    laws : tuple of Law
+        What it is made of.
+    counts : tuple of int
+        Draws of each, to which their shares are in proportion.
+    """
+
+    laws: tuple[Law, ...]
+    counts: tuple[int, ...]
+
+    def log_density(self, z: Array) -> Array:
+        """Return the log density at z of shape (n, d), shape (n,)."""
+        return _mixed(np.array([law.log_density(z) for law in self.laws]), self.counts)
+
+    def draw(self, rng: np.random.Generator, n: int) -> Array:
+        """Draw n points, shape (n, d): from each law its share, rounded."""
+        ends = np.cumsum((0, *self.counts)) * n // sum(self.counts)
+        parts = zip(self.laws, np.diff(ends).tolist(), strict=True)
+        return np.concatenate([law.draw(rng, count) for law, count in parts if count])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Local:
+    """A Student-t law in the coordinates of a map."""
+
+    transport: TriangularMap
+    law: Mixture
+
+    def log_density(self, z: Array) -> Array:
+        """Return the log density at z of shape (n, d), shape (n,)."""
+        x, log_det = self.transport.unbend(z)
+        return self.law.log_density(x) + log_det
+
+    def draw(self, rng: np.random.Generator, n: int) -> Array:
+        """Draw n points, shape (n, d)."""
+        return self.transport.bend(self.law.draw(rng, n))[0]
+
+
+class _Pool(NamedTuple):
+    """Draws of all rounds, and the law of them all.
+
+    Attributes
+    ----------
+    z : ndarray, shape (n, d)
+        Draws; members of the populations come first.
+    target : ndarray, shape (n,)
+        Their log density.
+    laws : tuple of Law
+        What they were drawn from, the members apart.
+    counts : tuple of int
+        How many from each.
+    each : ndarray, shape (laws, n)
+        Log density of every law.
+    """
+
+    z: Array
+    target: Array
+    laws: tuple[Law, ...]
+    counts: tuple[int, ...]
+    each: Array
+
+    @property
+    def blend(self) -> Blend:
+        """The law of them all."""
+        return Blend(self.laws, self.counts)
+
+    @property
+    def log_ratios(self) -> Array:
+        """Log of the target over that law, shape (n,)."""
+        return np.asarray(self.target - _mixed(self.each, self.counts))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Rounds:
+    """What importance sampling in rounds came to.
+
+    Attributes
+    ----------
+    proposal : Proposal
+        With the last map.
+    draws : WeightedDraws
+        Those that count.
+    dissent : float
+        Largest share of a population's members at which the target exceeds the proposals by more
+        than at any draw.
+    calls : int
+        Density evaluations.
+    """
+
+    proposal: Proposal
+    draws: WeightedDraws
+    dissent: float
+    calls: int
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the draws stand for the posterior, however many they are."""
+        return self.draws.k_hat < MAX_K_HAT and self.dissent < _MOST_DISSENT
+
+
+def in_rounds(
+    density: CollapsedDensity,
+    proposal: Proposal,
+    populations: tuple[Array, ...],
+    rng: np.random.Generator,
+    target_ess: int,
+    most: int,
+) -> Rounds:
+    """Draw by importance, in rounds that follow what was drawn.
+
+    Parameters
+    ----------
+    density : CollapsedDensity
+        Target.
+    proposal : Proposal
+        With the optima that are known.
+    populations : tuple of ndarray, shape (m, d) each
+        Members of populations that came from the prior, of finite density.
+    rng : numpy.random.Generator
+        Source of randomness.
+    target_ess : int
+        Effective sample size wanted.
+    most : int
+        Draws that may be spent; those that count are 2000 in any case.
+
+    Returns
+    -------
+    Rounds
+        The last that were made where none are trusted before the draws are spent.
+    """
+    members = np.concatenate(populations)
+    ends = np.cumsum([len(one) for one in populations])
+    proposal, calls = _fitted(proposal, members, density), len(members) + _DRAWS
+    pool = _Pool(members, density(members), (), (), np.empty((0, len(members))))
+    pool = _with(pool, (proposal,), (_DRAWS,), density, rng)
+    while True:
+        excess, log_weights = np.split(pool.log_ratios, ends[-1:])
+        beyond = excess > log_weights.max()
+        share = _effective(log_weights) / len(log_weights)
+        count = int(min(max(_SPARE * target_ess / share, _LEAST), most))
+        over = calls + _DRAWS + count > most
+        settled = pareto_k_hat(log_weights) < _SURE and _worst(beyond, ends) < _MOST_DISSENT
+        if over or (settled and count <= _LONGEST * _LEAST):
+            count = max(min(count, most - calls), _LEAST)
+            draws = draw_weighted(density, pool.blend, rng, count)
+            calls += count
+            most_drawn = np.max(draws.log_density - pool.blend.log_density(draws.z))
+            found = Rounds(proposal, draws, _worst(excess > most_drawn, ends), calls)
+            if over or (found.trusted and draws.ess >= target_ess):
+                return found
+        sample = _sample(pool.z[ends[-1] :], log_weights, members[beyond], len(members), rng)
+        proposal, local = _fitted(proposal, sample, density), int(_LOCAL_SHARE * _DRAWS)
+        laws = (proposal, _around(proposal, pool.z, pool.log_ratios))
+        pool = _with(pool, laws, (_DRAWS - local, local), density, rng)
+        calls += _DRAWS
+
+
+def _with(
+    pool: _Pool,
+    laws: tuple[Law, ...],
+    counts: tuple[int, ...],
+    density: CollapsedDensity,
+    rng: np.random.Generator,
+) -> _Pool:
+    """Return a pool with draws from more laws."""
+    new = np.concatenate([law.draw(rng, n) for law, n in zip(laws, counts, strict=True)])
+    z, laws = np.concatenate([pool.z, new]), pool.laws + laws
+    old = [law.log_density(new) for law in pool.laws]
+    each = np.concatenate([pool.each, np.reshape(old, (len(old), len(new)))], axis=1)
+    more = [law.log_density(z) for law in laws[len(pool.laws) :]]
+    target = np.concatenate([pool.target, density(new)])
+    return _Pool(z, target, laws, pool.counts + counts, np.concatenate([each, more]))
+
+
+def _mixed(each: Array, counts: tuple[int, ...]) -> Array:
+    """Return the log density of a mixture, its laws in proportion to counts."""
+    shares = np.log(np.array(counts) / sum(counts))
+    return np.asarray(special.logsumexp(each + shares[:, None], axis=0))
+
+
+def _fitted(proposal: Proposal, sample: Array, density: CollapsedDensity) -> Proposal:
+    return dataclasses.replace(proposal, transport=fit_map(sample, reparametrisation_of(density)))
+
+
+def _effective(log_weights: Array) -> float:
+    weights: Array = special.softmax(log_weights)
+    return float(1.0 / np.sum(weights**2))
+
+
+def _worst(beyond: NDArray[np.bool_], ends: NDArray[np.intp]) -> float:
+    """Return the largest share of any population's members."""
+    return max(float(part.mean()) for part in np.split(beyond, ends[:-1]))
+
+
+def _sample(
+    z: Array, log_weights: Array, beyond: Array, members: int, rng: np.random.Generator
+) -> Array:
+    """Return what the next map is fitted to: draws by flattened weights, and members beyond them.
+
+    Members are as many as stand for their share of the populations.
+    """
+    finite = np.isfinite(log_weights)
+    z, log_weights = z[finite], log_weights[finite]
+    least = min(max(_LEAST_ESS, _PER_PAIR * z.shape[1] ** 2), 0.5 * len(z))
+
+    def surplus(power: float) -> float:
+        return _effective(power * log_weights) - least
+
+    power = 1.0 if surplus(1.0) >= 0 else float(optimize.brentq(surplus, 0.0, 1.0, xtol=1e-9))
+    weights = special.softmax(power * log_weights)
+    drawn = z[rng.choice(len(z), size=_FITTED, p=weights)]
+    return np.concatenate([drawn, np.repeat(beyond, max(round(_FITTED / members), 1), axis=0)])
+
+
+def _around(proposal: Proposal, z: Array, values: Array) -> Local:
+    """Return a law around the point of the highest log weight, as wide as its neighbours lie."""
+    transport = proposal.transport
+    if transport is None:
+        raise ValueError("a proposal without a map")
+    finite = np.isfinite(values)
+    x, values = transport.unbend(z[finite])[0], values[finite]
+    d, centre = x.shape[1], x[np.argmax(values)]
+    apart = x - centre
+    count = max(_NEIGHBOURS * d, round(_NEAR * len(x)))
+    nearest = np.argsort(np.einsum("ni,ni->n", apart, apart))[:count]
+    rows = np.sqrt(special.softmax(values[nearest]))[:, None] * apart[nearest]
+    scale = math.sqrt(float(np.mean(rows**2)))
+    rows = np.concatenate([rows, 1e-6 * scale * np.eye(d)])
+    factor = linalg.qr(rows, mode="r")[0][:d].T
+    factor = factor * np.sign(np.diagonal(factor))
+    return Local(transport, Mixture(centre[None], factor[None], np.ones(1)))
