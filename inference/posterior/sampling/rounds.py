@@ -236,7 +236,7 @@ def _fitted(proposal: Proposal, sample: Array, density: CollapsedDensity) -> Pro
 
 def _effective(log_weights: Array) -> float:
     weights: Array = special.softmax(log_weights)
-    return float(1.0 / np.sum(weights**2))
+    return 1.0 / float(np.sum(weights**2))
 
 
 def _worst(beyond: NDArray[np.bool_], ends: NDArray[np.intp]) -> float:
