@@ -253,7 +253,7 @@ def _sample(
     """
     finite = np.isfinite(log_weights)
     z, log_weights = z[finite], log_weights[finite]
-    least = min(max(_LEAST_ESS, _PER_PAIR * z.shape[1] ** 2), 0.5 * len(z))
+    least: float = min(max(_LEAST_ESS, _PER_PAIR * z.shape[1] ** 2), 0.5 * len(z))
 
     def surplus(power: float) -> float:
         return _effective(power * log_weights) - least
