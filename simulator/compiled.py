@@ -9,6 +9,7 @@ more than twice of what it must. `KERNELS_COMPILE=always` compiles at the first 
 
 import contextlib
 import functools
+import math
 import os
 import threading
 import time
@@ -35,9 +36,10 @@ __all__ = [
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# what making machine code takes, about: to import numba and start it, for each function that a
-# kernel is made of, and to read from the disk what was made before [s]
-_START_S, _MAKE_S, _LOAD_S = 0.4, 0.1, 0.04
+# what it takes, about, to import numba and start it, and to read from the disk what was made [s]
+_START_S, _LOAD_S = 0.4, 0.04
+# time between looks for machine code on the disk [s]
+_LOOK_S = 0.05
 # share of the time of making machine code for which the interpreter may try what is called often
 _HOT = 0.1
 # more elements than the interpreter gets through in such times
@@ -158,7 +160,7 @@ class Kernel:
         self._spent_s: dict[Any, float] = {}
         # kinds of calls that the interpreter does not answer in a moment
         self._long: set[Any] = set()
-        self._found = False
+        self._found, self._looked_s = False, -math.inf
 
     def __reduce__(self) -> str:
         return self._function.__qualname__
@@ -180,7 +182,12 @@ class Kernel:
                 if self._for_both:
                     self._answer_calls(made)
                     self._below = made
-                compile_now, made.compile_now = made._compile_for_args, made._compile_for_args
+                compile_at_once = made._compile_for_args
+
+                def compile_now(*args: Any, **kwargs: Any) -> Any:
+                    answered = compile_at_once(*args, **kwargs)
+                    self._note_made(args)
+                    return answered
 
                 # asked where there is no machine code for the types of a call
                 def found(*args: Any) -> Any:
@@ -234,25 +241,30 @@ class Kernel:
 
         called.get_call_template = of_types
 
-    @functools.cached_property
-    def _make_s(self) -> float:
-        """What making machine code for a call would take [s]."""
-        from simulator.uncompiled import reach
+    def _note_made(self, args: tuple[Any, ...]) -> None:
+        from simulator import compiling_cost, uncompiled
 
-        return _MAKE_S * reach(self._function)
+        compiling_cost.note_made(self._function, uncompiled.kind_of(args))
 
     def _kept(self) -> bool:
         """Tell whether there is machine code on the disk, be it since a short while."""
-        if not self._found and self._folder is not None:
+        now_s = time.monotonic()
+        if not self._found and self._folder is not None and now_s > self._looked_s + _LOOK_S:
             name = self._function.__qualname__
             self._found = any(self._folder.path.glob(f"*.{name}-*.nbi"))
+            self._looked_s = now_s
         return self._found
 
     def _left_s(self, kind: object) -> float:
         """Return for how long the interpreter may still try to answer such calls [s]."""
+        from simulator import compiling_cost
+
         start_s = 0.0 if _machine else _START_S
         patience = min(self.patience, _HOT) if self in _soon() else self.patience
-        cost_s = start_s + (_LOAD_S if self._kept() else patience * self._make_s)
+        make_s = _LOAD_S
+        if not self._kept():
+            make_s = patience * compiling_cost.make_s(self._function, kind)
+        cost_s = start_s + make_s
         return cost_s - self._spent_s.get(kind, 0.0)
 
     def _may_try(self, args: tuple[Any, ...]) -> bool:

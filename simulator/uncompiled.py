@@ -18,7 +18,7 @@ import numpy as np
 
 from simulator.by_arrays import by_arrays
 
-__all__ = ["NotSoError", "free", "kind_of", "reach", "run", "size", "twin"]
+__all__ = ["NotSoError", "free", "kind_of", "run", "size", "twin", "used"]
 
 _Float = np.float64
 # packages whose functions are run so wherever they are used
@@ -181,11 +181,12 @@ def _code(code: CodeType) -> CodeType:
     return code.replace(co_consts=tuple(map(_constant, code.co_consts)))
 
 
-def _used(code: CodeType) -> set[str]:
+def used(code: CodeType) -> set[str]:
+    """Return the names that a function uses, and those within it."""
     names = set(code.co_names)
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
-            names |= _used(constant)
+            names |= used(constant)
     return names
 
 
@@ -202,26 +203,10 @@ def twin(function: Any) -> Callable[..., Any]:
         plain = FunctionType(_code(function.__code__), names, function.__name__, defaults)
         made = by_arrays(function, plain)
         _twins[function] = made  # before its names are looked up: kernels may call one another
-        for name in _used(function.__code__):
+        for name in used(function.__code__):
             if name in function.__globals__ and name not in names:
                 names[name] = _seen(function.__globals__[name])
     return made
-
-
-def reach(function: Any) -> int:
-    """Return how many functions a kernel is made of."""
-    seen: set[Any] = set()
-    ahead = [function]
-    while ahead:
-        one = ahead.pop()
-        if one in seen:
-            continue
-        seen.add(one)
-        for name in _used(one.__code__):
-            found = getattr(one.__globals__.get(name), "__wrapped__", None)
-            if isinstance(found, FunctionType):
-                ahead.append(found)
-    return len(seen)
 
 
 def kind_of(value: Any) -> Any:

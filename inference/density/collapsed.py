@@ -101,6 +101,7 @@ class CollapsedDensity:
             terms.crosstalk,
             terms.background,
             terms.ranges,
+            ReferencePrior(False) if self._reference else None,
             offsets=terms.offset,
             lags=terms.lag,
         )
@@ -108,9 +109,11 @@ class CollapsedDensity:
     def integral_rows(self, terms: Terms) -> Rows:
         """Return parameter vectors for kernels that integrate ranges out, or draw them."""
         rows = self.rows(terms)
-        if isinstance(self.parameters.range_prior, Reference):
-            return rows._replace(reference=ReferencePrior(True))
-        return rows
+        return rows._replace(reference=ReferencePrior(True)) if self._reference else rows
+
+    @property
+    def _reference(self) -> bool:
+        return isinstance(self.parameters.range_prior, Reference)
 
     def _of_rows(self, rows: Rows, data: Data) -> Array:
         """Return log p(block of frames | vector), shape (n, blocks)."""

@@ -129,6 +129,8 @@ def _resolution(
 ) -> tuple[float, float, float]:
     """Return what a reference prior adds to density, slope along log flux, and turn."""
     if reference is not None:
+        if not reference.resolves:
+            return 0.0, 0.0, 0.0
         signal, signal_slope, mean, slope = along
         pushed = precision_product(signal_slope, slope, mean, signal, instrument)
         turned = precision_product(signal, slope, mean, signal, instrument)

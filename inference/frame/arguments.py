@@ -82,7 +82,14 @@ class Background(NamedTuple):
 
 
 class ReferencePrior(NamedTuple):
-    """Marks ranges whose density is that of the reference prior: that of what a frame resolves."""
+    """Marks ranges whose density is that of the reference prior: that of what a frame resolves.
+
+    Attributes
+    ----------
+    resolves : bool
+        False for maxima over ranges, where the density is flat in log r. It is a number and no
+        type, so that one machine code integrates and maximises.
+    """
 
     resolves: bool
 

@@ -62,6 +62,8 @@ def log_resolution(
     log-uniform one where they do so to worse than I0 = `LEAST_INFORMATION`; 0 for any other prior.
     """
     if reference is not None:
+        if not reference.resolves:
+            return 0.0
         total = 0.0
         for j in range(frame_count(block)):
             frame = frame_of(block, j)

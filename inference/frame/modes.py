@@ -120,7 +120,7 @@ def _top_value(
 ) -> float:
     """Return the density at a knot: a table holds another frame's reference prior."""
     if reference is not None:
-        return log_density(u, block, scene)
+        return log_density(u, block, scene) if reference.resolves else value
     else:  # noqa: RET505
         return value
 

@@ -3,7 +3,7 @@
 import math
 
 from inference.frame.arguments import Pair, RangePrior
-from simulator.compiled import compiled, compiled_for_both
+from simulator.compiled import compiled
 
 __all__ = [
     "LEAST_INFORMATION",
@@ -57,7 +57,7 @@ def prior_curvature(r: float, prior: RangePrior) -> Pair:
     )
 
 
-@compiled_for_both
+@compiled
 def integration_bounds(prior: RangePrior) -> Pair:
     """Return the interval of u = log r that holds all the mass but rounding.
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from inference.fits.likelihood.arguments import CROSSTALK, SLOTS, Bounds, Layout, Place, Static
 from inference.frame.arguments import Pair
 from inference.frame.sensitivity import Value
-from simulator.compiled import compiled, compiled_for_both
+from simulator.compiled import compiled
 
 __all__ = ["KNOWN", "SAME", "SHAPES", "bounds_of", "chain", "move_inside", "physical"]
 
@@ -51,7 +51,7 @@ def _bare_slopes(distance: float, static: Static) -> Pair:
     return (1.0 / static.r0 if distance < static.r0 else 0.0), 0.0
 
 
-@compiled_for_both
+@compiled
 def physical(values: Array, x: Array, layout: Layout) -> bool:
     """Fill the physical values; tell whether they are numbers.
 
@@ -89,7 +89,7 @@ def physical(values: Array, x: Array, layout: Layout) -> bool:
     return bool(good)
 
 
-@compiled_for_both
+@compiled
 def bounds_of(bounds: Bounds, values: Array, layout: Layout) -> None:
     """Fill the least and largest value of each coordinate.
 
@@ -133,7 +133,7 @@ def move_inside(place: Place, bounds: Bounds, layout: Layout) -> bool:
     return physical(place.values, x, layout)
 
 
-@compiled_for_both
+@compiled
 def chain(out: Array, values: Array, x: Array, layout: Layout, bounds: Bounds) -> None:
     """Fill the derivative of every physical value along every coordinate.
 
