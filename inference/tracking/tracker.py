@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from inference.frame.arguments import prior_of
 from inference.posterior.answer.posterior import Posterior
 from inference.tracking.first_state import first_state
-from inference.tracking.hypotheses import Hypotheses, learns_crosstalk
+from inference.tracking.hypotheses import WITHOUT_CROSSTALK, Hypotheses
 from inference.tracking.model_error import sd_by_derivatives
 from inference.tracking.motion import Rules
 from inference.tracking.nuisance import nuisance_of
@@ -84,7 +84,8 @@ class Tracker:
     @property
     def learns_crosstalk(self) -> bool:
         """Whether the crosstalk is part of the state."""
-        return learns_crosstalk(self.first.hypotheses)
+        # not by the kernel: whoever asks it of every batch would wait for the interpreter's clock
+        return bool(self.first.hypotheses.X.shape[1] > WITHOUT_CROSSTALK)
 
 
 def tracker(

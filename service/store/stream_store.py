@@ -17,6 +17,41 @@ __all__ = ["StreamStore"]
 _LEASE_S = 15.0
 _MOST_KEPT = 4 * 2**20
 _COLUMNS = tuple(STREAM.c)
+# made once: to make a statement takes several times as long as to run it
+_id: sa.BindParameter[str] = sa.bindparam("stream")
+_old: sa.BindParameter[int] = sa.bindparam("old")
+_GET = sa.select(*_COLUMNS).where(STREAM.c.id == _id)
+_OF_STREAM = STREAM_ANSWER.c.stream_id == _id
+_UP_TO = _OF_STREAM & (STREAM_ANSWER.c.sequence <= _old)
+_FREED = sa.select(sa.func.coalesce(sa.func.sum(STREAM_ANSWER.c.size), 0)).where(_UP_TO)
+_FORGET = sa.delete(STREAM_ANSWER).where(_UP_TO)
+_INSERT = sa.insert(STREAM_ANSWER)
+_CHANGE = (
+    sa.update(STREAM)
+    .where(STREAM.c.id == _id, STREAM.c.number == sa.bindparam("before"))
+    .values(
+        number=sa.bindparam("after"),
+        state=sa.bindparam("state"),
+        sequence=sa.bindparam("sequence"),
+        counts=sa.bindparam("counts"),
+        last=sa.bindparam("last"),
+        kept_bytes=STREAM.c.kept_bytes + sa.bindparam("added") - _FREED.scalar_subquery(),
+        touched=sa.bindparam("now"),
+        holder=sa.bindparam("holder"),
+        held_until=sa.bindparam("held_until"),
+    )
+    .returning(STREAM.c.kept_bytes)
+)
+_SIZES = (
+    sa.select(STREAM_ANSWER.c.sequence, STREAM_ANSWER.c.size)
+    .where(_OF_STREAM)
+    .order_by(STREAM_ANSWER.c.sequence.desc())
+)
+_LESS = (
+    sa.update(STREAM)
+    .where(STREAM.c.id == _id)
+    .values(kept_bytes=STREAM.c.kept_bytes - _FREED.scalar_subquery())
+)
 
 
 def _record(row: sa.Row[Any]) -> StreamRecord:
@@ -118,8 +153,7 @@ class StreamStore:
     def get(self, stream_id: str) -> StreamRecord | None:
         """Return a stream as it stands, or None."""
         with self._database.read() as connection:
-            query = sa.select(*_COLUMNS).where(STREAM.c.id == stream_id)
-            row = connection.execute(query).one_or_none()
+            row = connection.execute(_GET, {"stream": stream_id}).one_or_none()
         return None if row is None else _record(row)
 
     def page(self, client: str, after: int | None, limit: int) -> list[StreamRecord]:
@@ -166,56 +200,46 @@ class StreamStore:
         return done
 
     def _apply(self, connection: sa.Connection, change: StreamChange, now: float) -> bool:
-        same = (STREAM.c.id == change.id, STREAM.c.number == change.number)
         size = len(change.answers)
+        of_stream = {"stream": change.id, "old": change.sequence - self._window}
         changed = connection.execute(
-            sa.update(STREAM)
-            .where(*same)
-            .values(
-                number=change.number + 1,
-                state=change.state,
-                sequence=change.sequence,
-                counts=json.dumps(change.counts),
-                last=change.last,
-                kept_bytes=STREAM.c.kept_bytes + size,
-                touched=now,
-                holder=change.holder,
-                held_until=now + _LEASE_S if change.holder else 0.0,
-            )
-            .returning(STREAM.c.kept_bytes)
+            _CHANGE,
+            of_stream
+            | {
+                "before": change.number,
+                "after": change.number + 1,
+                "state": change.state,
+                "sequence": change.sequence,
+                "counts": json.dumps(change.counts),
+                "last": change.last,
+                "added": size,
+                "now": now,
+                "holder": change.holder,
+                "held_until": now + _LEASE_S if change.holder else 0.0,
+            },
         )
         kept = changed.scalar_one_or_none()
         if kept is None:
             return False
-        of_stream = STREAM_ANSWER.c.stream_id == change.id
+        connection.execute(_FORGET, of_stream)
         if size:
             row = {"stream_id": change.id, "sequence": change.sequence, "size": size}
-            connection.execute(sa.insert(STREAM_ANSWER).values(**row, bytes=change.answers))
-        old = STREAM_ANSWER.c.sequence <= change.sequence - self._window
-        kept -= self._forget(connection, change.id, of_stream, old)
+            connection.execute(_INSERT, row | {"bytes": change.answers})
         if kept > _MOST_KEPT:
-            total, first = 0, change.sequence
-            sizes = sa.select(STREAM_ANSWER.c.sequence, STREAM_ANSWER.c.size).where(of_stream)
-            for row_of in connection.execute(sizes.order_by(STREAM_ANSWER.c.sequence.desc())):
-                total += row_of.size
-                if total > _MOST_KEPT:
-                    break
-                first = row_of.sequence
-            self._forget(connection, change.id, of_stream, STREAM_ANSWER.c.sequence < first)
+            self._forget_most(connection, change)
         return True
 
     @staticmethod
-    def _forget(connection: sa.Connection, stream_id: str, *which: sa.ColumnElement[bool]) -> int:
-        """Forget answers; return how many bytes they had."""
-        gone = connection.scalars(
-            sa.delete(STREAM_ANSWER).where(*which).returning(STREAM_ANSWER.c.size)
-        ).all()
-        if gone:
-            less = STREAM.c.kept_bytes - sum(gone)
-            connection.execute(
-                sa.update(STREAM).where(STREAM.c.id == stream_id).values(kept_bytes=less)
-            )
-        return sum(gone)
+    def _forget_most(connection: sa.Connection, change: StreamChange) -> None:
+        """Forget all answers but the last ones that there is room for, and those of the change."""
+        total = 0
+        for row in connection.execute(_SIZES, {"stream": change.id}).all():
+            total += row.size
+            if total > _MOST_KEPT and row.sequence < change.sequence:
+                old = {"stream": change.id, "old": row.sequence}
+                connection.execute(_LESS, old)
+                connection.execute(_FORGET, old)
+                return
 
     def release(self, stream_id: str, holder: str) -> None:
         """Let others send to a stream."""

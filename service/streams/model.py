@@ -17,6 +17,7 @@ from simulator.validated import parse
 __all__ = ["model_of", "request_of", "seeded"]
 
 
+@functools.lru_cache(maxsize=256)
 def request_of(raw: bytes) -> StreamRequest:
     """Return the request that made a stream, from its bytes."""
     return parse(StreamRequest, decode(raw))

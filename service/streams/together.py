@@ -5,6 +5,7 @@ line and says what is wrong with it. The answers are the same either way.
 """
 
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from simulator.frames import Frames
 
 __all__ = ["Together", "together"]
 
+_DROPPED = attrgetter("dropped")
 _FEW = 4  # fewer are answered as quickly one by one
 
 
@@ -65,7 +67,7 @@ def together(
         None where a closer look at each line is needed.
     """
     raws = [line.raw for line in lines if line.raw is not None]
-    if len(lines) < _FEW or len(raws) < len(lines) or any(line.dropped for line in lines[1:]):
+    if len(lines) < _FEW or len(raws) < len(lines) or any(map(_DROPPED, lines[1:])):
         return None
     try:
         frames = form.frames_in(raws)
