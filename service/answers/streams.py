@@ -130,6 +130,7 @@ class StreamLine(pydantic.BaseModel):
     misfit: bool | None = None
     latency_s: float | None = None
     calibration: CalibrationEvent | None = None
+    assumptions: list[str] | None = None
     error: _Error | None = None
 
 

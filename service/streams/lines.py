@@ -6,7 +6,15 @@ from typing import Any, NamedTuple, Protocol
 from inference.self_calibration.state import CalibrationState
 from inference.tracking.state import TrackState
 
-__all__ = ["COUNTS", "LARGEST", "WINDOW", "Earlier", "Line", "Place", "Taken"]
+__all__ = [
+    "COUNTS",
+    "LARGEST",
+    "WINDOW",
+    "Earlier",
+    "Line",
+    "Place",
+    "Taken",
+]
 
 WINDOW = 4096
 """Numbers behind the last one whose answers are kept."""
@@ -59,6 +67,8 @@ class Place:
         The last answer; empty before the first.
     calibration : dict or None
         What is told of a stream that calibrates itself.
+    supposed : bool
+        Whether a line was told what its answer supposes.
     """
 
     state: TrackState | CalibrationState
@@ -72,6 +82,7 @@ class Place:
     misfit: bool = False
     last: bytes = b""
     calibration: dict[str, Any] | None = None
+    supposed: bool = False
 
 
 class Earlier(Protocol):

@@ -11,13 +11,15 @@ from typing import Any
 
 import numpy as np
 
+from inference.assumptions import unused_temperature
 from inference.self_calibration.following import Piece
 from service.errors import BodyTooLargeError, ConflictError, GoneError
 from service.streams.answered import answers_of, encoded, error_of, more_of
 from service.streams.cutting import LONGEST
 from service.streams.followers import Follower
 from service.streams.forms import Form
-from service.streams.lines import COUNTS, LARGEST, WINDOW, Earlier, Line, Place, Taken
+from service.streams.lines import COUNTS, WINDOW, Earlier, Line, Place, Taken
+from service.streams.numbering import missing_before, number_in
 from service.streams.said import Said, said_of, said_to_bytes
 from service.streams.shapes import (
     Shape,
@@ -36,6 +38,8 @@ __all__ = ["take"]
 # a frame that waits for the tracker, together with others of its shape: where its answer goes, its
 # number, time and arrival, its values, and what else is to be said
 _Waiting = tuple[int, int, float, float, tuple[Any, ...], dict[str, Any] | None]
+
+_More = Sequence[dict[str, Any] | None] | None
 
 
 def take(
@@ -85,6 +89,7 @@ class _Batch:
         self._unnumbered = place.unnumbered
         self._counts = dict.fromkeys(COUNTS, 0)
         self._surprise, self._misfit = place.surprise, place.misfit
+        self._supposed = place.supposed
         self._answers: list[bytes] = []
         self._kept: bytes | None = None
         self._at: dict[int, int] = {}
@@ -111,6 +116,7 @@ class _Batch:
             misfit=self._misfit,
             last=new[-1] if new else self._place.last,
             calibration=self._follower.told(self._state),
+            supposed=self._supposed,
             **{name: getattr(self._place, name) + n for name, n in self._counts.items()},
         )
         kept = self._kept
@@ -131,7 +137,7 @@ class _Batch:
         except InvalidInputError:
             return False
         also = found.passed
-        told = _also(found.sequences[0] - after if self._sequence >= 0 else 0, lines[0])
+        told = missing_before(found.sequences[0] - after if self._sequence >= 0 else 0, lines[0])
         if told:
             also = also or [None] * len(lines)
             also[0] = told | (also[0] or {})
@@ -144,7 +150,8 @@ class _Batch:
         arrivals = [line.arrived for line in lines]
         self._state = state
         every = range(len(lines))
-        said = self._say(pieces, every, found.sequences, found.times, arrivals, also)
+        more = self._supposing(found.frames, also)
+        said = self._say(pieces, every, found.sequences, found.times, arrivals, more)
         if len(pieces) == 1:
             self._kept = said_to_bytes(said)
         return True
@@ -160,16 +167,16 @@ class _Batch:
             if line.raw is None:
                 raise BodyTooLargeError(f"the line has more than {LONGEST} bytes")
             frame = self._form.frame_in(line.raw)
-            sequence = _number(frame, after)
+            sequence = number_in(frame, after)
         except HybridTofError as error:
             # the number is free still: a line that states it may follow
             self._unnumbered += line.dropped + 1
-            self._refuse(at, after, error, _also(0, line), frame)
+            self._refuse(at, after, error, missing_before(0, line), frame)
             return
         if sequence <= self._sequence:
             self._repeats.append((at, sequence, self._sequence))
             return
-        also = _also(sequence - after if self._sequence >= 0 else 0, line)
+        also = missing_before(sequence - after if self._sequence >= 0 else 0, line)
         self._counts["gaps"] += also.get("gap", 0)
         self._sequence, self._unnumbered = sequence, 0
         self._at[sequence] = at
@@ -235,8 +242,19 @@ class _Batch:
                 raise _UnsoundError from None
             self._time = self._follower.time_of(self._state)
             raise of_one_frame(error) from None
-        some = also if any(also) else None
+        some = self._supposing(frames, also if any(also) else None)
         self._say(pieces, at, sequences, times, arrivals, some)
+
+    def _supposing(self, frames: Frames, also: _More) -> _More:
+        """Tell what answers suppose, once a stream: with the first frame where it plays a part."""
+        told = None if self._supposed else unused_temperature(self._model.sensor, frames)
+        if told is None:
+            return also
+        self._supposed = True
+        more = list(also or [None] * len(frames))
+        at, reason = told
+        more[at] = (more[at] or {}) | {"assumptions": [reason]}
+        return more
 
     def _say(
         self,
@@ -245,7 +263,7 @@ class _Batch:
         sequences: Sequence[int],
         times: Sequence[float],
         arrivals: Sequence[float],
-        also: Sequence[dict[str, Any] | None] | None,
+        also: _More,
     ) -> Said:
         """Answer frames by what follows the stream said of them; return the last piece."""
         latencies, start = time.perf_counter() - np.array(arrivals), 0
@@ -277,23 +295,3 @@ class _Batch:
                 return before
             error = ConflictError(f"it comes too late: {last} was answered before")
         return encoded({"sequence": sequence, "error": error_of(error)})
-
-
-def _number(frame: dict[str, Any], after: int) -> int:
-    """Return the number that a line states, or else the one that comes next."""
-    own = frame.get("sequence")
-    if own is None:
-        return after
-    if type(own) is not int or not 0 <= own <= LARGEST:
-        raise InvalidInputError.at("/sequence", "must be an integer from 0 to 2^53 - 1")
-    return own
-
-
-def _also(gap: int, line: Line) -> dict[str, Any]:
-    """Return what is missing before a line."""
-    also = {}
-    if gap > 0:
-        also["gap"] = gap
-    if line.dropped:
-        also["dropped"] = line.dropped
-    return also

@@ -306,3 +306,21 @@ def test_kept_numbers_are_the_same_answers(model: Tracker) -> None:
     plain = [Line(frame(n), 0.0) for n in range(1, 40)]
     small = take(Plain(model), Place(model.first), plain, JsonLines(), Kept())
     assert 2 * len(small.kept) < sum(map(len, small.answers))
+
+
+def test_a_temperature_that_nothing_uses_is_told_once(model: Tracker) -> None:
+    """With the first frame that has one, however the lines are cut."""
+    kelvin = [None, None, 300.0, 301.0, 302.0, None, 303.0, 304.0]
+    lines = [frame(n, temperature_k=value) for n, value in enumerate(kelvin, start=1)]
+    whole = answered(model, [lines])
+    assert ["assumptions" in line for line in whole] == [n == 2 for n in range(8)]
+    (said,) = whole[2]["assumptions"]
+    assert "temperature_k is given and not used" in said
+    for cuts in ([1], [2], [3, 4], [1, 2, 3, 4, 5, 6, 7]):
+        edges = [0, *cuts, len(lines)]
+        parts = [lines[a:b] for a, b in itertools.pairwise(edges)]
+        assert answered(model, parts) == whole
+    warm = SENSOR | {"temperature": {"reference_k": 300.0, "gain_drift_per_k": 1e-3}}
+    follows = tracker(parse_sensor(warm), parse_scene(SCENE | {"discrepancy": 0}))
+    assert not any("assumptions" in line for line in answered(follows, [lines]))
+    assert not any("assumptions" in line for line in answered(model, [[frame(1), frame(2)]]))
