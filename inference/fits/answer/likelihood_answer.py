@@ -19,7 +19,8 @@ from inference.fits.answer.inflation import inflation, shift_of
 from inference.fits.answer.profile_scan import profile_scan
 from inference.fits.answer.ranges import DECIDED, WITHIN, Answer, frame_ranges
 from inference.fits.answer.report import FALSE_ALARM, describe, fit_report, p_value_of, spoiled
-from inference.fits.likelihood.erring import contradicting, erring_maxima, softened
+from inference.fits.likelihood.erring import Erring, contradicting, erring_maxima, softened
+from inference.fits.likelihood.erring_valley import valleys
 from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.law_mode import law_modes
 from inference.fits.likelihood.maximum import TOP, Maximum, maximum_from
@@ -168,6 +169,14 @@ def _erring_answer(
     if not found:
         raise RefusedError(_NO_LIKELIHOOD)
     found.sort(key=lambda end: end.deviance)
+    along: list[Erring] = []
+    for _ in range(_WALKS):
+        mode = found[0].clean.mode
+        alike = [one for one in found if one.clean.mode is mode]
+        along, better = valleys(dataclasses.replace(problem, mode=mode), alike)
+        if better is None or not better.deviance < found[0].deviance:
+            break
+        found.insert(0, better)
     top = found[0]
     _, facts = residuals_and_information(top.clean, top.x, top.positions)
     if not problem.law and problem.known is None:
@@ -177,7 +186,7 @@ def _erring_answer(
     if not contradicted:
         wider = math.hypot(1.0, off_the_top(top))
         refuse_if_open(top.clean, top, top.facts, wider, whole=top.whole)
-    near = [one for one in found[1:] if one.deviance - top.deviance <= DECIDED]
+    near = [one for one in (*found[1:], *along) if one.deviance - top.deviance <= DECIDED]
     # another mode of the law is another answer; near in the same mode, a wider one
     others = {id(one.clean.mode): one for one in reversed(near) if one.clean.mode is not None}
     others.pop(id(top.clean.mode), None)

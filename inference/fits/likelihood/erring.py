@@ -37,7 +37,7 @@ from inference.fits.likelihood.told import Told, contradictions, eliminated, imp
 from inference.identifiability.elimination import eliminate
 from inference.identifiability.information import Information
 
-__all__ = ["Erring", "contradicting", "erring_maxima", "softened"]
+__all__ = ["Erring", "contradicting", "end_of", "erring_maxima", "softened"]
 
 Array = NDArray[np.float64]
 
@@ -201,7 +201,7 @@ def erring_maxima(problem: FitProblem, starts: Iterable[Maximum]) -> list[Erring
     if ends:
         ends += [climbed(problem, at, _STEPS) for at in larger(problem, ends[0][0])]
         ends.sort(key=lambda end: end[0].deviance)
-    return [_end(problem, at, remaining) for at, remaining in ends]
+    return [end_of(problem, at, remaining) for at, remaining in ends]
 
 
 def contradicting(top: Erring, problem: FitProblem) -> list[int]:
@@ -227,7 +227,7 @@ def contradicting(top: Erring, problem: FitProblem) -> list[int]:
         known = known.without(named[-1])
         rest = dataclasses.replace(problem, known=known, mode=top.clean.mode)
         begin = point_at(rest, top.x, top.positions, top.a)
-        top = _end(rest, *climbed(rest, begin, _STEPS))
+        top = end_of(rest, *climbed(rest, begin, _STEPS))
     return sorted(named)
 
 
@@ -259,8 +259,8 @@ def _errors_known(
     return eliminated(problem.names, jacobian, along, errors, told)
 
 
-def _end(problem: FitProblem, at: Point, remaining: float) -> Erring:
-    """Return what is told at the end of a climb."""
+def end_of(problem: FitProblem, at: Point, remaining: float) -> Erring:
+    """Return what is told at the end of a climb; `remaining` is what a step would still gain."""
     _, jacobian, along, errors, whitener = linearised(problem, at.x, at.u)
     slopes = slopes_of_priors(problem, at.x)
     facts = _with_priors(_errors_known(problem, jacobian, along, at.told), slopes)

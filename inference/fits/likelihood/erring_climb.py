@@ -89,10 +89,12 @@ def begun(problem: FitProblem, x: Array, positions: Array) -> Point:
     return _settled(problem, _settled(problem, point_at(problem, x, u, np.zeros(k))))
 
 
-def climbed(problem: FitProblem, at: Point, steps: int) -> tuple[Point, float]:
+def climbed(
+    problem: FitProblem, at: Point, steps: int, held: int | None = None
+) -> tuple[Point, float]:
     """Climb by Levenberg-Marquardt steps of the unknowns, ranges and errors following.
 
-    Returns also the deviance that a whole step would still gain.
+    One of the unknowns may be held. Returns also the deviance that a whole step would still gain.
     """
     k, damping, remaining = at.a.size, 1e-3, math.inf
     for _ in range(steps if math.isfinite(at.deviance) else 0):
@@ -108,6 +110,8 @@ def climbed(problem: FitProblem, at: Point, steps: int) -> tuple[Point, float]:
         )
         triangle = scipy.linalg.qr(rows, mode="r")[0]
         of_x, wanted = triangle[k : k + d, k:-1], triangle[k : k + d, -1]
+        if held is not None:
+            of_x = np.where(np.arange(d) == held, 0.0, of_x)
         size = np.linalg.norm(of_x, axis=0)
         size = np.where(size > 0, size, 1.0)
         remaining = float(wanted @ wanted)
