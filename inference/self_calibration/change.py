@@ -9,10 +9,11 @@ its range has been fitted; what is unknown is fitted to all of them within its l
 after a split a shift of the crosstalk besides, linear in all of it.
 """
 
+import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from inference.frame.arguments import instrument_of
@@ -22,7 +23,7 @@ from inference.tracking.readings_table import MEAN, NUISANCE, SIGNAL, SPREAD
 from inference.tracking.tracker import Tracker
 from simulator.frames import Frames
 
-__all__ = ["FEWEST", "Residuals", "has_changed", "surprise_of"]
+__all__ = ["FEWEST", "Residuals", "has_changed", "surprises_of", "without_unknowns"]
 
 Array = NDArray[np.float64]
 
@@ -87,34 +88,56 @@ def has_changed(
         return False
     bright, at = found
     walk, widest = walk * model.observed.scale, widest * model.observed.scale
-    limit = scipy.stats.chi2.isf(_FALSE_ALARM / len(_SPLITS), 2)
     place = np.arange(len(frames))[bright]
-    for count in _SPLITS:
-        behind = place >= len(frames) - count
-        sizes = np.count_nonzero(behind), np.count_nonzero(~behind)
-        if min(sizes) >= FEWEST:
-            shifted = behind[:, None] * at.across
-            if surprise_of(at, shifted * walk) - surprise_of(at, shifted * widest) > limit:
-                return True
-    return False
+    behind = [place >= len(frames) - count for count in _SPLITS]
+    told = [k for k in behind if min(np.count_nonzero(k), np.count_nonzero(~k)) >= FEWEST]
+    left = without_unknowns(at, told)
+    gained = surprises_of(left, walk) - surprises_of(left, widest)
+    # a chi-square of two degrees of freedom is beyond -2 log p with probability p
+    return bool((gained > -2.0 * math.log(_FALSE_ALARM / len(_SPLITS))).any())
 
 
-def surprise_of(at: Residuals, shifted: Array) -> float:
-    """Return the chi-square of residuals.
+def without_unknowns(at: Residuals, behind: Sequence[NDArray[np.bool_]]) -> Array:
+    """Return what residuals tell of shifts, whatever the unknowns are within their law.
 
     Parameters
     ----------
     at : Residuals
-        With what the unknowns do to them.
-    shifted : ndarray, shape (n, 2)
-        What a standard deviation of each component of a shift does to them.
+        Of n frames.
+    behind : sequence of ndarray of bool, each of shape (n,)
+        Of k splits, which frames are shifted.
+
+    Returns
+    -------
+    ndarray, shape (2 k + 1, 2 k + 1)
+        A triangle: to its columns, two a split and the residuals' own, the surprise is least
+        squares as it is to all frames.
     """
     n, p = at.changes.shape
-    table = np.zeros((n + p + 2, p + 3))
-    table[:n, :p], table[:n, p:-1], table[:n, -1] = at.changes, shifted, at.values
-    table[n:, :-1] = np.eye(p + 2)
-    left = float(np.asarray(np.linalg.qr(table, mode="r"))[-1, -1])
-    return left * left
+    shifted = [k[:, None] * at.across for k in behind]
+    table = np.zeros((n + p, p + 2 * len(behind) + 1))
+    table[:n] = np.column_stack([at.changes, *shifted, at.values])
+    table[n:, :p] = np.eye(p)
+    return np.asarray(np.linalg.qr(table, mode="r"))[p:, p:]
+
+
+def surprises_of(left: Array, sd: Array) -> Array:
+    """Return the chi-square of residuals that may be shifted behind one of k splits, shape (k,).
+
+    Parameters
+    ----------
+    left : ndarray, shape (2 k + 1, 2 k + 1)
+        From `without_unknowns`.
+    sd : ndarray, shape (2,)
+        Standard deviations of the shift's components [read noises].
+    """
+    rows = len(left)
+    table = np.zeros((rows // 2, rows + 2, 3))
+    table[:, :-2, :2] = left[:, :-1].reshape(rows, -1, 2).transpose(1, 0, 2) * sd
+    table[:, :-2, 2] = left[:, -1]
+    table[:, -2:, :2] = np.eye(2)
+    upper = np.asarray(np.linalg.qr(table, mode="r"))
+    return np.asarray(np.square(upper[:, -1, -1]))
 
 
 def _residuals(

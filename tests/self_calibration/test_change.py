@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from inference.self_calibration.change import Residuals, has_changed, surprise_of
+from inference.self_calibration.change import (
+    Residuals,
+    has_changed,
+    surprises_of,
+    without_unknowns,
+)
 from inference.self_calibration.mixing import mixed, with_modes
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.tracker import tracker
@@ -72,10 +77,14 @@ def test_surprise_against_dense_covariances() -> None:
     rng = np.random.default_rng(1)
     n, p = 40, 5
     at = Residuals(rng.standard_normal(n), rng.standard_normal((n, p)), rng.standard_normal((n, 2)))
-    shifted = 3.0 * at.across
-    covariance = np.eye(n) + at.changes @ at.changes.T + shifted @ shifted.T
-    wanted = at.values @ np.linalg.solve(covariance, at.values)
-    assert surprise_of(at, shifted) == pytest.approx(wanted, rel=1e-10)
+    behind = [np.arange(n) >= n - 20, np.arange(n) >= n - 9]
+    left = without_unknowns(at, behind)
+    for split, some in enumerate(behind):
+        sd = np.array([3.0, 0.7])
+        shifted = some[:, None] * at.across * sd
+        covariance = np.eye(n) + at.changes @ at.changes.T + shifted @ shifted.T
+        wanted = at.values @ np.linalg.solve(covariance, at.values)
+        assert surprises_of(left, sd)[split] == pytest.approx(wanted, rel=1e-10)
 
 
 def test_a_wall_within_the_law_is_noticed() -> None:
