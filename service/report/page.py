@@ -5,6 +5,7 @@ import html
 from collections.abc import Mapping, Sequence
 from string import Template
 
+from service.report.honesty import WIDE, judged
 from service.report.light import LIGHT
 from service.report.row import Row
 from service.report.run import Report
@@ -91,12 +92,12 @@ def _best(rows: Sequence[Row]) -> Row | None:
 
 
 def _class(row: Row) -> str:
-    held = row.scores.coverage if row.scores else None
-    if held is None:
+    if row.scores is None or row.scores.coverage is None:
         return "none"
-    if row.family in ("many frames", "posterior"):
+    holds = judged(row.scores)
+    if holds is None:
         return "few"
-    return "bad" if held < 0.8 else "good" if held <= 0.97 else "wide"
+    return "bad" if not holds else "good" if row.scores.coverage <= WIDE else "wide"
 
 
 def _glance(report: Report) -> str:
