@@ -55,11 +55,11 @@ def peak_bytes(action: Callable[[], object]) -> int:
 
 
 def alone(calls: list[Callable[[], object]]) -> tuple[float, float]:
-    """Return median and 99 % quantile of the time of calls one by one [s]."""
+    """Return median and 99 % quantile of the processor time of calls one by one [s]."""
     seconds = []
     for call in calls:
-        begin = time.perf_counter()
+        begin = time.process_time()
         call()
-        seconds.append(time.perf_counter() - begin)
+        seconds.append(time.process_time() - begin)
     middle, tail = np.quantile(seconds, [0.5, 0.99]).tolist()
     return float(middle), float(tail)

@@ -4,7 +4,7 @@ import numpy as np
 
 from service.report.scores import Scores
 
-__all__ = ["LEAST", "WIDE", "band_in_words", "judged"]
+__all__ = ["LEAST", "WIDE", "band_in_words", "judged", "range_in_words"]
 
 LEAST = 0.8
 """Of a 90 % interval: the least share that counts as holding the truth."""
@@ -34,6 +34,9 @@ def judged(scores: Scores) -> bool | None:
 def band_in_words(scores: Scores) -> str:
     """Return the band of the share in percent, ends rounded outwards."""
     low, high = scores.coverage_low, scores.coverage_high
-    if low is None or high is None:
-        return "-"
+    return "-" if low is None or high is None else range_in_words(low, high)
+
+
+def range_in_words(low: float, high: float) -> str:
+    """Return a band in percent, ends rounded outwards."""
     return f"{np.floor(100 * low):.0f}-{np.ceil(100 * high):.0f} %"

@@ -145,8 +145,9 @@ def scores_of(
         np.quantile(error[single], [0.5, 0.95]).tolist() if single.any() else (None, None)
     )
     relative = crps / truth
+    along = sets is None
     of = blocks_of(truth.size) if sets is None else sets
-    band = share_band(held, of)
+    band = share_band(held, of, along)
 
     def mean(values: Array) -> float | None:
         there = values[np.isfinite(values)]
@@ -163,11 +164,11 @@ def scores_of(
         several,
         max(1.0 - alone - several, 0.0),
         sets=np.unique(of).size,
-        median_se=error_of_quantile(error, 0.5, of),
-        p95_se=error_of_quantile(error, 0.95, of),
-        crps_se=error_of_mean(relative, of),
-        ambiguous_se=error_of_mean(doubled.astype(float), of),
-        refused_se=error_of_mean((~single & ~ambiguous).astype(float), of),
+        median_se=error_of_quantile(error, 0.5, of, along),
+        p95_se=error_of_quantile(error, 0.95, of, along),
+        crps_se=error_of_mean(relative, of, along),
+        ambiguous_se=error_of_mean(doubled.astype(float), of, along),
+        refused_se=error_of_mean((~single & ~ambiguous).astype(float), of, along),
         coverage_low=None if band is None else band[0],
         coverage_high=None if band is None else band[1],
     )

@@ -73,7 +73,7 @@ def measure_single(cell: Cell, seed: int) -> Row:
         return dataclasses.replace(
             row,
             told=told,
-            knob=f"{len(made.frames)} frames a sweep",
+            knob=f"{len(made.frames):,} frames a sweep",
             order=float(cell.frames),
             scores=_scores_of_results(sweeps, [f.results[0] for f in (found, *others)]),
             costs=Costs(
