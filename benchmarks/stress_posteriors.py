@@ -4,8 +4,8 @@
 
 Pulses and sine waves, 1 to 8 frames, signal-to-noise ratios of 0.1 to 1e7, priors with the truth at
 an end. Every finished case is a line of DIR/posteriors.ndjson, and is not done again; the cases are
-those of their number. Prints a row of counts and what is wrong; the exit code is 1 where a mean is
-more than 6 MCSE off, or a standard deviation as far, of an answer that is called converged.
+those of their number. Prints a row of counts and what is wrong; the exit code is 1 where a number
+is more than 6 of its Monte Carlo errors off, of an answer that is called converged.
 """
 
 import argparse
@@ -47,7 +47,7 @@ def main() -> None:
     print("|---|" + "---|" * len(outcomes) + "---|---|")
     counts = " | ".join(str(sum(row["outcome"] == name for row in rows)) for name in outcomes)
     span = f"{np.min(precision):.2g} to {np.max(precision):.2g}" if precision else ""
-    print(f"| {len(rows)} | {counts} | {np.max(worst, initial=0.0):.2g} MCSE | {span} |")
+    print(f"| {len(rows)} | {counts} | {np.max(worst, initial=0.0):.2g} errors | {span} |")
     wrong = [row for row in rows if row["outcome"] == "wrong"]
     for row in wrong:
         print(row, file=sys.stderr)
