@@ -1,8 +1,10 @@
 """Joint laws of scenes: with other modes, or with the object of another."""
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
+from simulator.errors import InvalidInputError
 from simulator.joint import Joint
 from simulator.scene import Scene, parse_scene
 
@@ -26,7 +28,8 @@ def mixed(found: Scene, before: Scene) -> Scene:
     Returns
     -------
     Scene
-        As found, where either knows no object.
+        As found, where either knows no object, or what comes of it lies farther out than a scene
+        may state.
     """
     if found.joint is None or before.joint is None:
         return found
@@ -36,18 +39,40 @@ def mixed(found: Scene, before: Scene) -> Scene:
         return found
     mean, covariance = _moments(found.joint, names)
     other, spread = _moments(before.joint, own)
-    at = [names.index(name) for name in own]
-    # all unknowns follow the object's as far as they are correlated
-    follow = np.linalg.solve(covariance[np.ix_(at, at)], covariance[at]).T
-    mean = mean + follow @ (other - mean[at])
-    covariance = covariance + follow @ (spread - covariance[np.ix_(at, at)]) @ follow.T
+    mean, covariance = _given(mean, covariance, [names.index(name) for name in own], other, spread)
     modes = [
         {"weight": mode.weight, "mean": list(mode.mean), "covariance": np.array(mode.covariance)}
         for mode in found.joint.modes
     ]
     total = sum(mode.weight for mode in found.joint.modes)
     modes.append({"weight": total, "mean": mean.tolist(), "covariance": covariance})
-    return with_modes(found, modes)
+    try:
+        return with_modes(found, modes)
+    except InvalidInputError:  # farther from its priors than a scene may state
+        return found
+
+
+def _given(
+    mean: Array, covariance: Array, at: list[int], other: Array, spread: Array
+) -> tuple[Array, Array]:
+    """Return a normal law whose unknowns ``at`` have another law; the rest given them is the same.
+
+    Its covariance is a product of factors, positive definite however nearly some unknowns agree.
+    """
+    sd = np.sqrt(np.diagonal(covariance))
+    k = len(at)
+    order = at + [j for j in range(len(mean)) if j not in at]
+    scaled = (covariance / sd[:, None] / sd)[np.ix_(order, order)]
+    factor = np.linalg.cholesky(scaled)
+    # all unknowns follow the first ones as far as they are correlated
+    follow = scipy.linalg.solve_triangular(factor[:k, :k], factor[:, :k].T, trans="T", lower=True).T
+    factor[:, :k] = follow @ np.linalg.cholesky(spread / sd[at][:, None] / sd[at])
+    moved = np.empty_like(mean)
+    moved[order] = follow @ ((other - mean[at]) / sd[at])
+    root = np.empty_like(factor)
+    root[order] = factor
+    root *= sd[:, None]
+    return mean + sd * moved, root @ root.T
 
 
 def _moments(joint: Joint, names: tuple[str, ...]) -> tuple[Array, Array]:

@@ -1,5 +1,6 @@
 """Methods that HTTP gives to every resource: HEAD where GET is, OPTIONS, a 405 that says which."""
 
+import functools
 import re
 from collections.abc import Sequence
 
@@ -42,10 +43,11 @@ class Methods:
             for method in route.methods or ()
         }
         # most requests are for a path without parameters
+        self._of_parameters = functools.lru_cache(maxsize=1024)(self._found)
         self._fixed = {path: self._found(path) for _, path, _ in self._routes if "{" not in path}
 
     def _known(self, path: str) -> tuple[str, frozenset[str]] | None:
-        return self._fixed[path] if path in self._fixed else self._found(path)
+        return self._fixed[path] if path in self._fixed else self._of_parameters(path)
 
     def _found(self, path: str) -> tuple[str, frozenset[str]] | None:
         """Return the template of a path and all its methods; None where no route has it."""

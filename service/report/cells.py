@@ -12,7 +12,7 @@ __all__ = ["FULL", "QUICK", "Cell", "Effort", "cells_of"]
 
 @dataclasses.dataclass(frozen=True)
 class Effort:
-    """How much is measured.
+    """How much is measured: of what is cheap much, of what is dear as few sets as tell something.
 
     Attributes
     ----------
@@ -23,13 +23,13 @@ class Effort:
     sets : int
         Data sets of a fit over many frames.
     steps : tuple of int
-        Frames of a sweep whose derivatives are formed.
+        Frames of a sweep whose derivatives are formed; of short ones many are measured.
     frames : tuple of int
         Frames of a fit.
-    posterior_frames : tuple of int
-        Frames of a posterior.
+    posterior_sets : tuple of tuple of int
+        Frames of a posterior, and its data sets: first where it does best.
     draws : tuple of int
-        Effective draws wanted of a posterior of 40 frames.
+        Effective draws wanted of a posterior of 40 frames, on the scenes of the quick report.
     hypotheses : tuple of int
         That a tracker keeps.
     """
@@ -39,25 +39,27 @@ class Effort:
     sets: int
     steps: tuple[int, ...]
     frames: tuple[int, ...]
-    posterior_frames: tuple[int, ...]
+    posterior_sets: tuple[tuple[int, int], ...]
     draws: tuple[int, ...]
     hypotheses: tuple[int, ...]
 
 
-QUICK = Effort(2000, 60, 2, (40, 400), (10, 40), (10, 40), (), (1, 12))
+QUICK = Effort(2000, 60, 6, (40, 400), (10, 40), ((40, 2), (10, 1)), (), (1, 12))
 FULL = Effort(
     20_000,
     300,
-    8,
+    20,
     (20, 100, 500, 2500),
     (6, 12, 40, 160),
-    (6, 12, 40, 160),
-    (100, 1600, 6400),
+    ((40, 2), (8, 1), (100, 1)),
+    (6400,),
     (1, 2, 4, 12),
 )
 
 _DRAWS = 400
 _FRAMES = 40
+# frames in all of short sweeps, and the most sweeps
+_SWEPT, _SWEEPS = 1000, 25
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,7 +75,9 @@ class Cell:
     frames : int
         With an object.
     value : int
-        Effective draws, hypotheses, or data sets.
+        Effective draws, hypotheses, or frames that come one by one.
+    sets : int
+        Data sets.
     seconds : float
         What it takes, about: of use only as a share of all.
     """
@@ -83,13 +87,19 @@ class Cell:
     name: str
     frames: int
     value: int
+    sets: int
     seconds: float
 
     @property
     def key(self) -> str:
         """What it is called in the file of what is done."""
         return "|".join(
-            [self.scene.name, self.family, self.name, str(self.frames), str(self.value)]
+            [
+                self.scene.name,
+                self.family,
+                self.name,
+                *map(str, (self.frames, self.value, self.sets)),
+            ]
         )
 
 
@@ -109,15 +119,27 @@ def cells_of(scene: ReportScene, effort: Effort) -> Iterator[Cell]:
     """
     for name, technique in TECHNIQUES.items():
         for frames in effort.steps if technique.differential else (effort.batch,):
-            yield Cell(scene, "single", name, frames, effort.alone, 0.3)
+            sweeps = min(max(_SWEPT // frames, 1), _SWEEPS)
+            seconds = 0.1 + 5e-4 * effort.alone
+            yield Cell(scene, "single", name, frames, effort.alone, sweeps, seconds)
     for value in effort.hypotheses:
-        yield Cell(scene, "tracker", "", effort.batch, value, 0.5)
-    unknowns = 3 + 2 * ("unknown" in scene.name.lower())
+        yield Cell(scene, "tracker", "", effort.batch, value, 1, 0.1 + 2e-5 * effort.batch)
+    wall = scene.free.background
+    # these leave a posterior no shape that draws can be weighted to
+    hard = wall is not None and wall.shadow != "object" and wall.shadow.c0 is None
+    exact = scene.free.discrepancy == 0
     for name in FITS:
         for frames in effort.frames:
-            yield Cell(scene, "fit", name, frames, effort.sets, 0.1 * effort.sets)
-    for frames in effort.posterior_frames:
-        yield Cell(scene, "importance", "", frames, _DRAWS, 1.0 + frames / 40)
-        yield Cell(scene, "emcee", "", frames, _DRAWS, unknowns * (0.3 + frames / 40))
-    for draws in effort.draws:
-        yield Cell(scene, "emcee", "", _FRAMES, draws, unknowns * (0.3 + draws / 800))
+            seconds = effort.sets * (0.01 + 2e-4 * frames) * (0.1 if exact else 1.0)
+            yield Cell(scene, "fit", name, frames, 1, effort.sets, seconds)
+
+    def sampled(family: str, frames: int, draws: int, sets: int) -> Cell:
+        each = (1.0 + frames / 20 + draws / 1600) * (10 if hard and family == "emcee" else 1)
+        seconds = sets * each * (0.5 if family == "importance" else 1.0)
+        return Cell(scene, family, "", frames, draws, sets, seconds)
+
+    for frames, sets in effort.posterior_sets:
+        for family in ("importance", "emcee"):
+            yield sampled(family, frames, _DRAWS, sets)
+    for draws in effort.draws if scene.quick else ():
+        yield sampled("emcee", _FRAMES, draws, 1)

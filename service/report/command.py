@@ -4,9 +4,14 @@ import argparse
 import itertools
 import json
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from service.commands.command import Subparsers, add_command, can_draw, note
+
+if TYPE_CHECKING:
+    from service.report.row import Row
 
 __all__ = ["add_parser"]
 
@@ -49,8 +54,9 @@ def _report(args: argparse.Namespace, drawing: bool) -> int:
     args.out.mkdir(parents=True, exist_ok=True)
     from service.report.cells import FULL, QUICK
     from service.report.light import light_rows
+    from service.report.pace import Spent
     from service.report.page import markdown_page, page
-    from service.report.run import report_of, rows_of
+    from service.report.run import measured, report_of
     from service.report.scenes import SCENES
     from service.report.table import LEGEND, heading, line
 
@@ -59,8 +65,15 @@ def _report(args: argparse.Namespace, drawing: bool) -> int:
     rows = []
     scene = ""
     effort = QUICK if args.quick else FULL
-    measured = rows_of(scenes, effort, args.seed, kept, lambda text: note(args, text))
-    for row in itertools.chain(measured, light_rows(effort)):
+    spent = Spent()
+
+    def counted() -> Iterator["Row"]:
+        nonlocal spent
+        for one in measured(scenes, effort, args.seed, kept, lambda text: note(args, text)):
+            spent = spent.plus(one.seconds, one.compiling_s)
+            yield one.row
+
+    for row in itertools.chain(counted(), light_rows(effort)):
         if row.scene != scene:
             scene = row.scene
             sys.stdout.write(heading(scene) + "\n")
@@ -69,7 +82,7 @@ def _report(args: argparse.Namespace, drawing: bool) -> int:
             sys.stdout.flush()
         rows.append(row)
     note(args, "what each term costs")
-    report = report_of(rows, scenes, args.seed)
+    report = report_of(rows, scenes, args.seed, spent)
     sys.stdout.write(f"\n{LEGEND}\n")
     pictures: dict[str, str] = {}
     terms, snr = "", None

@@ -10,7 +10,7 @@ from inference.estimate import estimate
 from inference.estimates import Status, TechniqueResult
 from service.report.cells import Cell
 from service.report.clock import peak_bytes, timed
-from service.report.readings import Readings, readings_of, told_of_object
+from service.report.readings import Readings, sets_of, told_of_object
 from service.report.row import Costs, Row
 from service.report.said import in_words, said
 from service.report.scores import scores_of_roots
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 def measure_fit(cell: Cell, seed: int) -> Row:
     """Measure a fit on several data sets; one that needs the object known is told it."""
     scene, name = cell.scene, cell.name
-    sets = [readings_of(scene, cell.frames, seed + k, scene.empty) for k in range(cell.value)]
+    sets = sets_of(scene, cell.frames, seed, cell.sets)
     row = Row(
         scene.name,
         said(name),
@@ -68,6 +68,7 @@ def measure_fit(cell: Cell, seed: int) -> Row:
                 roots,
                 sd,
                 np.where(np.isfinite(roots), 1.0, np.nan),
+                np.repeat(np.arange(len(parts)), [part[0].size for part in parts]),
             ),
             costs=Costs(
                 frame_s=float(np.median(seconds)) / cell.frames,

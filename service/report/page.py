@@ -2,9 +2,11 @@
 
 import base64
 import html
+import re
 from collections.abc import Mapping, Sequence
 from string import Template
 
+from service.report.honesty import WIDE, judged, range_in_words
 from service.report.light import LIGHT
 from service.report.row import Row
 from service.report.run import Report
@@ -14,10 +16,11 @@ from service.report.table import (
     cells_of_row,
     left_out,
     markdown,
-    method_to_take,
     percent,
     time_of,
 )
+from service.report.taking import method_to_take
+from service.report.together import together
 
 __all__ = ["markdown_page", "page"]
 
@@ -25,14 +28,16 @@ _PAGE = Template("""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Error against run time</title>
 <meta name="viewport" content="width=device-width">
 <style>
-body{font:15px/1.45 system-ui,sans-serif;max-width:1360px;margin:2em auto;padding:0 1em;color:#222}
+body{font:15px/1.45 system-ui,sans-serif;max-width:1500px;margin:2em auto;padding:0 1em;color:#222}
 h1{margin:0 0 .2em}h2{margin:2em 0 .3em;border-top:1px solid #ccc;padding-top:.8em}
 table{border-collapse:collapse;font-size:12.5px;margin:.6em 0}
 th,td{padding:.2em .55em;text-align:right;border-bottom:1px solid #eee}
 th{font-weight:600;vertical-align:bottom;border-bottom:1px solid #999}
 td:first-child,th:first-child,td:nth-child(2),th:nth-child(2),td:last-child{text-align:left}
-td{white-space:nowrap}td:last-child{white-space:normal;min-width:17em}td small{color:#555}
+td{white-space:nowrap;line-height:1.15}td:last-child{white-space:normal;min-width:13em}
+td small{color:#555}
 .glance{font-size:11.5px}.glance td,.glance th{text-align:center;padding:.2em .35em}
+.together td:last-child,.together th:last-child{text-align:left}
 .glance td:first-child{text-align:left;white-space:normal}.glance td:last-child{min-width:0}
 .good{background:#d8efdf}.wide{background:#e3edf7}.bad{background:#f8d3c5}.none{color:#999}
 .small{color:#555;font-size:13px}svg,img{max-width:100%;height:auto}.scroll{overflow-x:auto}
@@ -49,11 +54,18 @@ model, told to be exact, or from the light of a real plate, added up over its su
 <p>Median relative error of each kind of method at its best setting, and processor time a frame.
 <span class="good">Green</span>: its 90 % intervals hold the truth in 80 to 97 % of frames;
 <span class="wide">blue</span>: in more; <span class="bad">red</span>: in less, so that it is more
-confident than it may be. Without colour: fits and posteriors, whose frames err together, so that
-of the few measured here it cannot be told. $star</p>
+confident than it may be. Coloured only where the 95 % band of that share lies on one side of 80 %:
+frames of one set err together, and of what has no colour there are too few sets here to tell.
+$star</p>
 <div class="scroll">$glance</div>
-<p>Which to take: of the methods whose intervals hold the truth in 80 % of frames or more, the one
-of least time that errs by at most twice the least.</p><ul>$take</ul>
+<p>Which to take: of the methods whose intervals are shown to hold the truth in 80 % of frames or
+more, the one of least time that errs by at most twice the least. What would err less by more than
+half, but of which too few sets tell, is named beside it.</p><ul>$take</ul>
+<h2>Intervals over all scenes</h2>
+<p>In what share of frames the 90 % intervals of a method hold the truth, all scenes and settings
+together that tell it what is so and whose readings the object model made, or that claim nothing of
+it; each set of frames counts once.</p>
+<div class="scroll">$together</div>
 <h2>What each term costs</h2>
 <p>One evaluation of the density that posteriors and fits ask, by what the scene has. A term that
 a scene lacks costs nothing there: the dashed line is the object alone.
@@ -91,12 +103,12 @@ def _best(rows: Sequence[Row]) -> Row | None:
 
 
 def _class(row: Row) -> str:
-    held = row.scores.coverage if row.scores else None
-    if held is None:
+    if row.scores is None or row.scores.coverage is None:
         return "none"
-    if row.family in ("many frames", "posterior"):
+    holds = judged(row.scores)
+    if holds is None:
         return "few"
-    return "bad" if held < 0.8 else "good" if held <= 0.97 else "wide"
+    return "bad" if not holds else "good" if row.scores.coverage <= WIDE else "wide"
 
 
 def _glance(report: Report) -> str:
@@ -122,6 +134,32 @@ def _glance(report: Report) -> str:
     return f'<table class="glance">{"".join(lines)}</table>'
 
 
+_TOGETHER = ("method", "scenes", "sets", "90 % interval holds", "95 % band", "too confident on")
+
+
+def _together(report: Report) -> list[tuple[str, ...]]:
+    return [
+        (
+            one.method,
+            str(one.scenes),
+            str(one.sets),
+            f"{100 * one.coverage:.1f} %",
+            range_in_words(one.low, one.high),
+            "; ".join(one.misled) or "none",
+        )
+        for one in together(report.rows)
+    ]
+
+
+def _together_table(report: Report) -> str:
+    head = "".join(f"<th>{name}</th>" for name in _TOGETHER)
+    lines = [
+        f"<tr>{''.join(f'<td>{html.escape(text)}</td>' for text in cells)}</tr>"
+        for cells in _together(report)
+    ]
+    return f'<table class="together"><tr>{head}</tr>{"".join(lines)}</table>'
+
+
 def _short(report: Report) -> list[str]:
     """Say in a sentence a scene what misleads and what does not."""
     found = []
@@ -142,20 +180,40 @@ def _short(report: Report) -> list[str]:
     return found
 
 
+_HOLDS = COLUMNS.index("90 % interval holds")
+
+
+def _cell(text: str) -> str:
+    """Return a text with its Monte Carlo error or its band below it, smaller."""
+    value, mark, off = html.escape(text).partition(" ±")
+    if mark:
+        return (
+            f"{value} %<br><small>±{off}</small>"
+            if "%" in off
+            else f"{value}<br><small>±{off} %</small>"
+        )
+    return re.sub(r" \((\d+-\d+ %)\)$", r"<br><small>\1</small>", value)
+
+
 def _table(rows: Sequence[Row]) -> str:
     head = "".join(f"<th>{name}</th>" for name in (*COLUMNS, "remark"))
     lines = [f"<tr>{head}</tr>"]
     for row in rows:
         if row.scores is None:
             continue
-        cells = [f"<td>{html.escape(text)}</td>" for text in (*cells_of_row(row), row.remark)]
-        cells[4] = cells[4].replace("<td>", f'<td class="{_class(row)}">')
+        cells = [f"<td>{_cell(text)}</td>" for text in (*cells_of_row(row), row.remark)]
+        cells[_HOLDS] = cells[_HOLDS].replace("<td>", f'<td class="{_class(row)}">')
         lines.append(f"<tr>{''.join(cells)}</tr>")
     return f'<div class="scroll"><table>{"".join(lines)}</table></div>'
 
 
 def _machine(report: Report) -> str:
-    return "Measured on: " + ", ".join(f"{k} {v}" for k, v in report.machine.items()) + "."
+    spent = report.spent
+    took = (
+        f" {spent.measurements:,} measurements took {spent.processor_s / 60:.1f} minutes of "
+        f"processor time, and compiling {spent.compiling_s:.0f} s beside."
+    )
+    return "Measured on: " + ", ".join(f"{k} {v}" for k, v in report.machine.items()) + "." + took
 
 
 def page(report: Report, pictures: Mapping[str, str], terms: str, snr: str | None) -> str:
@@ -190,6 +248,7 @@ def page(report: Report, pictures: Mapping[str, str], terms: str, snr: str | Non
         short=short,
         star=_STAR,
         glance=_glance(report),
+        together=_together_table(report),
         take="".join(f"<li>{html.escape(line)}</li>" for line in _take(report)),
         terms=_image(terms, "what each term costs"),
         snr=""
@@ -214,6 +273,9 @@ def markdown_page(report: Report) -> str:
     lines = ["# Error against run time", "", _machine(report), f"Seed {report.seed}.", ""]
     lines += [f"- {line}" for line in _short(report)]
     lines += ["", "## Which method to take", "", *(f"- {line}" for line in _take(report))]
+    lines += ["", "## Intervals over all scenes", "", f"| {' | '.join(_TOGETHER)} |"]
+    lines += ["|---" * len(_TOGETHER) + "|"]
+    lines += [f"| {' | '.join(cells)} |" for cells in _together(report)]
     lines += ["", LEGEND, "", _STAR, "", "## What each term costs", ""]
     lines += [
         "| scene | unknowns | arithmetic a frame | microseconds a frame |",

@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import zlib
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +19,14 @@ from simulator.sensor import Sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
 
-__all__ = ["Readings", "readings_of", "told_of_object"]
+__all__ = ["Readings", "readings_of", "sets_of", "told_of_object"]
 
 Array = NDArray[np.float64]
 
 _FRAME_S = 0.01
 _LIGHT = 1e-8  # relative error of the light that the optical simulator adds up
 _CALIBRATED_M = (0.1, 2.4)
+_KEPT = 128  # sets of readings that are not made again
 _OPTICAL = 2000  # frames, beyond which nothing is learnt that is worth the time
 
 
@@ -47,6 +49,44 @@ class Readings:
     def present(self) -> NDArray[np.bool_]:
         """Where an object is, shape (n,)."""
         return np.isfinite(self.range_m)
+
+
+def sets_of(
+    scene: ReportScene, frames: int, seed: int, count: int, empty: int | None = None
+) -> list[Readings]:
+    """Make data sets of a scene, independent of one another and of those of other scenes.
+
+    Parameters
+    ----------
+    scene : ReportScene
+        The scene.
+    frames : int
+        Of each set, with the object.
+    seed : int
+        Of the report.
+    count : int
+        How many.
+    empty : int, optional
+        Frames without the object; left out: those of the scene.
+
+    Returns
+    -------
+    list of Readings
+    """
+    without = scene.empty if empty is None else empty
+    return [_made(scene, frames, _seed_of(scene, frames, seed, k), without) for k in range(count)]
+
+
+@functools.lru_cache(maxsize=_KEPT)
+def _made(scene: ReportScene, frames: int, seed: int, empty: int) -> Readings:
+    """Return what the methods of one scene ask one after the other."""
+    return readings_of(scene, frames, seed, empty)
+
+
+def _seed_of(scene: ReportScene, frames: int, seed: int, number: int) -> int:
+    """Return a seed of its own for a set: figures of several scenes are put together."""
+    entropy = [seed, zlib.crc32(scene.name.encode()), frames, number]
+    return int(np.random.SeedSequence(entropy).generate_state(1)[0])
 
 
 def readings_of(scene: ReportScene, frames: int, seed: int, empty: int = 0) -> Readings:

@@ -4,20 +4,23 @@ import dataclasses
 import json
 import os
 import platform
-import time
 from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from service.report.cells import Effort, cells_of
+from service.report.cells import Cell, Effort, cells_of
+from service.report.clock import timed
 from service.report.floors import division_s, least_error
 from service.report.measure import measure
+from service.report.pace import Pace, Spent
 from service.report.row import Row, row_from
+from service.report.sampled import POSTERIORS, not_tried
 from service.report.scenes import ReportScene
 from service.report.terms import TermCost, term_costs
+from simulator.processor_time import compiling_s
 
-__all__ = ["Report", "machine", "report_of", "rows_of"]
+__all__ = ["Measured", "Report", "machine", "measured", "report_of"]
 
 Told = Callable[[str], None]
 
@@ -40,6 +43,8 @@ class Report:
         Time of one division a frame [s].
     terms : tuple of TermCost
         What each term costs.
+    spent : Spent
+        What the measurements took, be they of several runs.
     """
 
     machine: dict[str, str]
@@ -48,6 +53,7 @@ class Report:
     least_errors: dict[str, float | None]
     division_s: float
     terms: tuple[TermCost, ...]
+    spent: Spent
 
     @property
     def scenes(self) -> tuple[str, ...]:
@@ -63,6 +69,7 @@ class Report:
         return {
             "machine": self.machine,
             "seed": self.seed,
+            "spent": dataclasses.asdict(self.spent),
             "division_s": self.division_s,
             "least_errors": self.least_errors,
             "terms": [dataclasses.asdict(term) for term in self.terms],
@@ -90,13 +97,21 @@ def machine() -> dict[str, str]:
     }
 
 
-def rows_of(
+class Measured(NamedTuple):
+    """One measurement, and the processor time that it took [s], compiling apart and alone."""
+
+    row: Row
+    seconds: float
+    compiling_s: float
+
+
+def measured(
     scenes: Sequence[ReportScene],
     effort: Effort,
     seed: int,
     kept: Path,
     tell: Told = lambda _: None,
-) -> Iterator[Row]:
+) -> Iterator[Measured]:
     """Measure what is not measured yet.
 
     Parameters
@@ -114,7 +129,7 @@ def rows_of(
 
     Yields
     ------
-    Row
+    Measured
         In the order of the scenes, as each is measured or read.
     """
     heading = {
@@ -128,32 +143,49 @@ def rows_of(
         kept.write_text(json.dumps(heading) + "\n")
     else:
         tell(f"goes on after {len(done)} of {len(cells)} measurements that are in {kept}")
-    spent = foreseen = 0.0
-    ahead = sum(cell.seconds for cell in cells if cell.key not in done)
-    scene = ""
+    pace = Pace()
+    for cell in cells:
+        if cell.key in done:
+            pace.learn(cell, done[cell.key].seconds)
+    scene, rows = "", list[Row]()
     for number, cell in enumerate(cells):
         if cell.scene.name != scene:
-            scene = cell.scene.name
-            pace = spent / foreseen if foreseen > 5 else 1.0
-            left = _minutes(ahead * pace)
-            tell(f"{scene}: measurement {number + 1} of {len(cells)}, about {left} left")
-        if cell.key in done:
-            yield done[cell.key]
-            continue
-        began = time.process_time()
-        row = measure(cell, seed)
-        used = time.process_time() - began
-        spent, foreseen, ahead = spent + used, foreseen + cell.seconds, ahead - cell.seconds
-        with kept.open("a") as file:
-            file.write(json.dumps({"key": cell.key, "row": row.to_json()}) + "\n")
-        yield row
+            scene, rows = cell.scene.name, []
+            ahead = pace.left_s(c for c in cells[number:] if c.key not in done)
+            left = f"about {_minutes(ahead)} of processor time left"
+            tell(f"{scene}: measurement {number + 1} of {len(cells)}, {left}")
+        one = done.get(cell.key)
+        if one is None:
+            one = _measured(cell, seed, rows)
+            pace.learn(cell, one.seconds)
+            _keep(kept, cell, one)
+        rows.append(one.row)
+        yield one
+
+
+def _measured(cell: Cell, seed: int, rows: Sequence[Row]) -> Measured:
+    """Measure a cell, if what was measured of its scene leaves hope."""
+    if cell.family in POSTERIORS:
+        for row in rows:
+            skipped = not_tried(cell, row)
+            if skipped is not None:
+                return Measured(skipped, 0.0, 0.0)
+    before = compiling_s()
+    row, seconds = timed(lambda: measure(cell, seed))
+    return Measured(row, seconds, compiling_s() - before)
+
+
+def _keep(kept: Path, cell: Cell, one: Measured) -> None:
+    entry = one._asdict() | {"key": cell.key, "row": one.row.to_json()}
+    with kept.open("a") as file:
+        file.write(json.dumps(entry) + "\n")
 
 
 def _minutes(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
 
 
-def _read(kept: Path, heading: dict[str, Any]) -> dict[str, Row]:
+def _read(kept: Path, heading: dict[str, Any]) -> dict[str, Measured]:
     """Return finished cells; a last line that was cut short is no finished cell."""
     try:
         first, *lines = kept.read_text().splitlines()
@@ -161,17 +193,20 @@ def _read(kept: Path, heading: dict[str, Any]) -> dict[str, Row]:
             return {}
     except (OSError, ValueError):
         return {}
-    done: dict[str, Row] = {}
+    done: dict[str, Measured] = {}
     for line in lines:
         try:
             entry = json.loads(line)
         except ValueError:
             continue
-        done[entry["key"]] = row_from(entry["row"])
+        row = row_from(entry["row"])
+        done[entry["key"]] = Measured(row, entry["seconds"], entry["compiling_s"])
     return done
 
 
-def report_of(rows: Sequence[Row], scenes: Sequence[ReportScene], seed: int) -> Report:
+def report_of(
+    rows: Sequence[Row], scenes: Sequence[ReportScene], seed: int, spent: Spent
+) -> Report:
     """Put rows together with what no method can do better, and what each term costs."""
     return Report(
         machine(),
@@ -180,4 +215,5 @@ def report_of(rows: Sequence[Row], scenes: Sequence[ReportScene], seed: int) -> 
         {scene.name: least_error(scene) for scene in scenes},
         division_s(),
         tuple(term_costs()),
+        spent,
     )

@@ -1,89 +1,157 @@
 """Posteriors."""
 
 import dataclasses
+import functools
 import math
+from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
 from service.report.cells import Cell
-from service.report.clock import peak_bytes, timed
-from service.report.readings import Readings, readings_of
+from service.report.clock import timed, traced
+from service.report.readings import Readings, sets_of
 from service.report.row import Costs, Row
 from service.report.scores import Scores, crps_of_draws, scores_of
-from simulator.errors import HybridTofError, RefusedError
+from simulator.errors import HybridTofError
 
-__all__ = ["measure_posterior"]
+__all__ = ["POSTERIORS", "measure_posterior", "not_tried"]
 
-# processor time after which a posterior is given up: never reached where figures are to be the same
-_MOST_S = 400.0
+Array = NDArray[np.float64]
+
+POSTERIORS = ("importance", "emcee")
+"""Families of cells that are posteriors."""
+
+# processor time after which a posterior is given up; what it has then would be the machine's, and
+# is not shown
+_MOST_S = 60.0
+_GIVEN_UP = f"no verdict within {_MOST_S:g} s of processor time"
 
 
 def measure_posterior(cell: Cell, seed: int) -> Row:
-    """Measure a posterior after a short one, which compiles and tells the memory."""
+    """Measure posteriors of several data sets, of the last the memory and not the time.
+
+    Tracing memory slows what it measures. Of one set alone the time is measured.
+    """
     scene = cell.scene
-    made = readings_of(scene, cell.frames, seed, scene.empty)
-    weighted = cell.family == "importance"
-    row = Row(
-        scene.name,
-        "posterior, weighted draws" if weighted else "posterior",
+    sets = sets_of(scene, cell.frames, seed, cell.sets)
+    settings = SamplerSettings.model_validate(
+        {"method": cell.family, "target_ess": cell.value, "seed": seed, "max_seconds": _MOST_S}
+    )
+    row = _row(cell)
+    answers: list[Posterior | None] = []
+    seconds: list[float] = []
+    refused: list[str] = []
+    peak = None
+    for number, made in enumerate(sets):
+        run = functools.partial(infer, scene.sensor, scene.free, made.frames, settings)
+        try:
+            if number and number == len(sets) - 1:
+                answer, peak = traced(run)
+            else:
+                answer, used = timed(run)
+                seconds.append(used)
+        except HybridTofError as error:
+            refused.append(str(error))
+            answers.append(None)
+            continue
+        if any(reason.startswith("stopped at the time limit") for reason in answer.verdict.reasons):
+            return dataclasses.replace(row, remark=_GIVEN_UP)
+        answers.append(answer)
+    served = [answer for answer in answers if answer is not None]
+    if not served:
+        return dataclasses.replace(row, remark=f"refused: {refused[0]}")
+    # where the one that was traced is the only one, its time is not known
+    run_s = float(np.median(seconds)) if seconds else None
+    effective = float(np.median([_effective(answer) for answer in served]))
+    passed = all(answer.verdict.converged for answer in served)
+    known = passed and run_s is not None and math.isfinite(effective)
+    return dataclasses.replace(
+        row,
+        scores=_scores_of_posteriors(sets, answers),
+        costs=Costs(
+            frame_s=None if run_s is None else run_s / cell.frames,
+            run_s=run_s,
+            peak_bytes=peak,
+            draws_per_s=effective / run_s if known and run_s is not None else None,
+        ),
+        likelihood_calls=int(np.median([answer.runtime.likelihood_calls for answer in served])),
+        effective_draws=effective if math.isfinite(effective) else None,
+        remark=_remark(answers, refused),
+    )
+
+
+def not_tried(cell: Cell, earlier: Row) -> Row | None:
+    """Return the row of a posterior where one of its scene was given up; None where it was not."""
+    row = _row(cell)
+    if earlier.remark != _GIVEN_UP or (earlier.scene, earlier.method) != (row.scene, row.method):
+        return None
+    return dataclasses.replace(row, remark=f"not tried: {earlier.knob}: {_GIVEN_UP}")
+
+
+def _row(cell: Cell) -> Row:
+    return Row(
+        cell.scene.name,
+        "posterior, weighted draws" if cell.family == "importance" else "posterior",
         "posterior",
         knob=f"{cell.frames} frames, {cell.value} draws",
         order=float(cell.frames * 10_000 + cell.value),
-        frames=cell.frames,
+        frames=cell.frames * cell.sets,
     )
 
-    def run(draws: int) -> Posterior:
-        settings = SamplerSettings.model_validate(
-            {
-                "method": cell.family,
-                "target_ess": draws,
-                "seed": seed,
-                "max_seconds": _MOST_S,
-            }
+
+def _effective(answer: Posterior) -> float:
+    return min((min(p.ess_bulk, p.ess_tail) for p in answer.parameters.values()), default=math.nan)
+
+
+def _remark(answers: Sequence[Posterior | None], refused: Sequence[str]) -> str:
+    served = [answer for answer in answers if answer is not None]
+    passed = sum(answer.verdict.converged for answer in served)
+    several = len(answers) > 1
+    words = []
+    if passed:
+        words.append(f"verdict passed{f' in {passed} of {len(answers)} sets' * several}")
+    failed = Counter(
+        "; ".join(answer.verdict.reasons) for answer in served if not answer.verdict.converged
+    )
+    words += [f"{reason}{f' ({count} sets)' * several}" for reason, count in failed.items()]
+    words += [
+        f"refused: {reason}{f' ({count} sets)' * several}"
+        for reason, count in Counter(refused).items()
+    ]
+    misfits = sum(answer.fit.misfit is True for answer in served)
+    if misfits:
+        words.append(
+            f"says that the model does not fit{f' in {misfits} of {len(answers)} sets' * several}"
         )
-        return infer(scene.sensor, scene.free, made.frames, settings)
+    return ", ".join(words)
 
-    try:
-        # for the compiler, and for the memory: tracing it slows what it measures
-        peak = peak_bytes(lambda: run(10))
-        answer, seconds = timed(lambda: run(cell.value))
-    except RefusedError as error:
-        return dataclasses.replace(row, remark=f"refused: {error}")
-    except HybridTofError as error:
-        return dataclasses.replace(row, remark=str(error))
-    effective = min(
-        (min(p.ess_bulk, p.ess_tail) for p in answer.parameters.values()), default=math.nan
+
+def _scores_of_posteriors(sets: Sequence[Readings], answers: Sequence[Posterior | None]) -> Scores:
+    """Sum up frames of several sets; those of a refused set have no range."""
+    parts = [_columns(made, answer) for made, answer in zip(sets, answers, strict=True)]
+    truth, middle, several, held, crps = (
+        np.concatenate([part[k] for part in parts]) for k in range(5)
     )
-    passed = answer.verdict.converged
-    words = ["verdict passed" if passed else "; ".join(answer.verdict.reasons)]
-    if answer.fit.misfit:
-        words.append("says that the model does not fit")
-    return dataclasses.replace(
-        row,
-        scores=_scores_of_posterior(made, answer),
-        costs=Costs(
-            frame_s=seconds / cell.frames,
-            run_s=seconds,
-            peak_bytes=peak,
-            draws_per_s=effective / seconds if passed and math.isfinite(effective) else None,
-        ),
-        likelihood_calls=answer.runtime.likelihood_calls,
-        effective_draws=effective if math.isfinite(effective) else None,
-        remark=", ".join(words),
-    )
+    of = np.repeat(np.arange(len(parts)), [part[0].size for part in parts])
+    return scores_of(truth, middle, several.astype(bool), held, crps, of)
 
 
-def _scores_of_posterior(made: Readings, answer: Posterior) -> Scores:
-    here, found = made.present, answer.range_m
+def _columns(made: Readings, answer: Posterior | None) -> tuple[Array, ...]:
+    here = made.present
     truth = made.range_m[here]
-    counts = np.array([len(modes) for modes in found.modes])[here]
-    several = counts > 1
+    nothing = np.full(truth.size, np.nan)
+    if answer is None:
+        return truth, nothing, np.zeros(truth.size), nothing, nothing
+    found = answer.range_m
+    several = np.array([len(modes) > 1 for modes in found.modes])[here]
     low, middle, high = found.q05[here], found.q50[here], found.q95[here]
     held = np.where(np.isfinite(low), (low <= truth) & (truth <= high), np.nan)
     draws = answer.draws.range_m.reshape(-1, here.size)[:, here]
     drawn = len(draws) > 0 and answer.drawn
-    crps = crps_of_draws(truth, draws) if drawn else np.full(truth.size, np.nan)
-    return scores_of(truth, np.where(several, np.nan, middle), several, held, crps)
+    crps = crps_of_draws(truth, draws) if drawn else nothing
+    return truth, np.where(several, np.nan, middle), several.astype(float), held, crps

@@ -6,6 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from service.report.uncertain import (
+    blocks_of,
+    error_of_mean,
+    error_of_quantile,
+    share_band,
+)
+
 __all__ = ["Scores", "crps_of_draws", "crps_of_normals", "scores_of", "scores_of_roots"]
 
 Array = NDArray[np.float64]
@@ -27,6 +34,12 @@ class Scores(NamedTuple):
         a number without interval it would be its relative error.
     single, ambiguous, refused : float
         Shares of frames with one range, with several, and with none.
+    sets : int
+        Data sets, or of one sweep blocks of neighbouring frames.
+    median_se, p95_se, crps_se, ambiguous_se, refused_se : float or None
+        Monte Carlo errors (one standard error) of the figures of these names.
+    coverage_low, coverage_high : float or None
+        Ends of the 95 % band of the coverage.
     """
 
     median_error: float | None
@@ -36,6 +49,14 @@ class Scores(NamedTuple):
     single: float
     ambiguous: float
     refused: float
+    sets: int = 1
+    median_se: float | None = None
+    p95_se: float | None = None
+    crps_se: float | None = None
+    ambiguous_se: float | None = None
+    refused_se: float | None = None
+    coverage_low: float | None = None
+    coverage_high: float | None = None
 
 
 def crps_of_normals(truth: Array, mean: Array, sd: Array, weight: Array) -> Array:
@@ -92,7 +113,12 @@ def crps_of_draws(truth: Array, draws: Array) -> Array:
 
 
 def scores_of(
-    truth: Array, range_m: Array, ambiguous: NDArray[np.bool_], held: Array, crps: Array
+    truth: Array,
+    range_m: Array,
+    ambiguous: NDArray[np.bool_],
+    held: Array,
+    crps: Array,
+    sets: NDArray[np.int_] | None = None,
 ) -> Scores:
     """Sum up frames.
 
@@ -106,6 +132,8 @@ def scores_of(
         1 where an interval holds the truth, 0 where none does, nan where there is no interval.
     crps : ndarray, shape (n,)
         The score [m], nan where there is none.
+    sets : ndarray of int, shape (n,), optional
+        The data set of each frame; left out: blocks of neighbours.
 
     Returns
     -------
@@ -117,20 +145,43 @@ def scores_of(
         np.quantile(error[single], [0.5, 0.95]).tolist() if single.any() else (None, None)
     )
     relative = crps / truth
+    along = sets is None
+    of = blocks_of(truth.size) if sets is None else sets
+    band = share_band(held, of, along)
 
     def mean(values: Array) -> float | None:
         there = values[np.isfinite(values)]
         return float(there.mean()) if there.size else None
 
-    several = float(np.mean(ambiguous & ~single))
-    alone = float(np.mean(single))
+    doubled = ambiguous & ~single
+    several, alone = float(np.mean(doubled)), float(np.mean(single))
     return Scores(
-        median, tail, mean(held), mean(relative), alone, several, max(1.0 - alone - several, 0.0)
+        median,
+        tail,
+        mean(held),
+        mean(relative),
+        alone,
+        several,
+        max(1.0 - alone - several, 0.0),
+        sets=np.unique(of).size,
+        median_se=error_of_quantile(error, 0.5, of, along),
+        p95_se=error_of_quantile(error, 0.95, of, along),
+        crps_se=error_of_mean(relative, of, along),
+        ambiguous_se=error_of_mean(doubled.astype(float), of, along),
+        refused_se=error_of_mean((~single & ~ambiguous).astype(float), of, along),
+        coverage_low=None if band is None else band[0],
+        coverage_high=None if band is None else band[1],
     )
 
 
 def scores_of_roots(
-    truth: Array, range_m: Array, several: NDArray[np.bool_], roots: Array, sd: Array, weight: Array
+    truth: Array,
+    range_m: Array,
+    several: NDArray[np.bool_],
+    roots: Array,
+    sd: Array,
+    weight: Array,
+    sets: NDArray[np.int_] | None = None,
 ) -> Scores:
     """Sum up frames whose ranges stand side by side, each with its standard deviation.
 
@@ -142,6 +193,8 @@ def scores_of_roots(
         Where there are several.
     roots, sd, weight : ndarray, shape (n, k)
         The ranges and their standard deviations [m], and weights; nan where there is none.
+    sets : ndarray of int, shape (n,), optional
+        As for `scores_of`.
 
     Returns
     -------
@@ -151,5 +204,5 @@ def scores_of_roots(
     near = there & (np.abs(roots - truth[:, None]) <= Z90 * np.where(there, sd, 0.0))
     held = np.where(there.any(axis=1), near.any(axis=1), np.nan)
     return scores_of(
-        truth, range_m, np.asarray(several), held, crps_of_normals(truth, roots, sd, weight)
+        truth, range_m, np.asarray(several), held, crps_of_normals(truth, roots, sd, weight), sets
     )

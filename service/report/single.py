@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from inference.estimates import Status, TechniqueResult
 from inference.realtime.registry import TECHNIQUES
 from service.report.cells import Cell
 from service.report.clock import alone, best, peak_bytes
-from service.report.readings import Readings, readings_of, told_of_object
+from service.report.readings import Readings, sets_of, told_of_object
 from service.report.row import Costs, Row
 from service.report.said import in_words, said
 from service.report.scores import Scores, scores_of_roots
@@ -26,14 +26,23 @@ Array = NDArray[np.float64]
 _NEIGHBOURS = 3
 
 
-def _scores_of_result(truth: Array, result: TechniqueResult) -> Scores:
+def _scores_of_results(sweeps: Sequence[Readings], results: Sequence[TechniqueResult]) -> Scores:
+    width = max(result.roots_m.shape[1] for result in results)
+
+    def padded(values: Array) -> Array:
+        wanted = ((0, 0), (0, width - values.shape[1]))
+        return np.pad(values, wanted, constant_values=np.nan)
+
+    roots = np.concatenate([padded(result.roots_m) for result in results])
+    of = np.repeat(np.arange(len(sweeps)), [sweep.range_m.size for sweep in sweeps])
     return scores_of_roots(
-        truth,
-        result.range_m,
-        result.status == Status.AMBIGUOUS,
-        result.roots_m,
-        result.roots_sd_m,
-        np.where(np.isfinite(result.roots_m), 1.0, np.nan),
+        np.concatenate([sweep.range_m for sweep in sweeps]),
+        np.concatenate([result.range_m for result in results]),
+        np.concatenate([result.status for result in results]) == Status.AMBIGUOUS,
+        roots,
+        np.concatenate([padded(result.roots_sd_m) for result in results]),
+        np.where(np.isfinite(roots), 1.0, np.nan),
+        of if len(sweeps) > 1 else None,
     )
 
 
@@ -44,8 +53,9 @@ def _blind(scene: Scene) -> Scene:
 def measure_single(cell: Cell, seed: int) -> Row:
     """Measure a technique; one that cannot serve the scene is told that nothing disturbs it."""
     scene, name = cell.scene, cell.name
-    made = readings_of(scene, cell.frames, seed)
-    row = Row(scene.name, said(name), "single frames", frames=len(made.frames))
+    sweeps = sets_of(scene, cell.frames, seed, cell.sets, empty=0)
+    made = sweeps[0]
+    row = Row(scene.name, said(name), "single frames", frames=sum(s.range_m.size for s in sweeps))
     known = told_of_object(scene)
     reason = ""
     for told, scene_told in (("", known), ("that there is neither", _blind(known))):
@@ -58,14 +68,14 @@ def measure_single(cell: Cell, seed: int) -> Row:
         if not found.results:
             continue
         found, seconds = best(run)
-        (result,) = found.results
+        others = [estimate(scene.sensor, scene_told, s.frames, [name]) for s in sweeps[1:]]
         middle, tail = alone(_one_by_one(cell, scene_told, made))
         return dataclasses.replace(
             row,
             told=told,
-            knob=f"{len(made.frames)} frames a sweep",
+            knob=f"{len(made.frames):,} frames a sweep",
             order=float(cell.frames),
-            scores=_scores_of_result(made.range_m, result),
+            scores=_scores_of_results(sweeps, [f.results[0] for f in (found, *others)]),
             costs=Costs(
                 frame_s=seconds / len(made.frames),
                 p50_s=middle,

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from service.report.honesty import band_in_words
 from service.report.row import Row
 
 __all__ = [
@@ -14,14 +15,15 @@ __all__ = [
     "left_out",
     "line",
     "markdown",
-    "method_to_take",
     "percent",
     "time_of",
+    "with_error",
 ]
 
 COLUMNS = (
     "method",
-    "knob",
+    "setting",
+    "sets",
     "median error",
     "95 % error",
     "90 % interval holds",
@@ -39,15 +41,20 @@ LEGEND = (
     "Errors are relative to the range, of the frames with a single range. The 90 % interval of a "
     "frame with several ranges holds the truth where one of theirs does. CRPS: the continuous "
     "ranked probability score over the range, which for a number without interval would be its "
-    "error. A frame: processor time of a call over its frames; alone: of a frame that comes by "
+    "error. After ±: one standard error, by which a figure of other sets would differ; in "
+    "brackets the 95 % band of a share. Both count sets of frames, for those of one set err "
+    "together; of one long sweep blocks of neighbouring frames stand for sets, and of fewer than "
+    "five sets no standard error can be told. "
+    "A frame: processor time of a call over its frames; alone: of a frame that comes by "
     "itself. Memory: most that a call held. Effective draws a second: after a passed verdict. "
-    "Frames of one fit or posterior err together, and few of these are measured here: how often "
-    "their intervals hold the truth is told by many: docs/coverage.md and docs/calibration.md."
+    "How often intervals of fits and posteriors hold the truth is told by many more sets: "
+    "docs/coverage.md and docs/calibration.md."
 )
-_WIDTHS = (32, 24, 9, 9, 7, 9, 10, 8, 9, 9, 9, 9, 8, 9)
+_WIDTHS = (32, 24, 4, 9, 9, 7, 9, 10, 8, 9, 9, 9, 9, 8, 9)
 _HEADS = (
     "method",
     "",
+    "sets",
     "median",
     "95 %",
     "holds",
@@ -103,13 +110,44 @@ def method_of(row: Row) -> str:
 
 
 def cells_of_row(row: Row) -> tuple[str, ...]:
-    """Return what a row says, one text a column of `COLUMNS`."""
+    """Return what a row says with its Monte Carlo errors, one text a column of `COLUMNS`."""
+    plain, s = _plain(row), row.scores
+    if s is None:
+        return plain
+    found = dict(zip(COLUMNS, plain, strict=True))
+    for name, value, off in (
+        ("median error", s.median_error, s.median_se),
+        ("95 % error", s.p95_error, s.p95_se),
+        ("CRPS", s.crps, s.crps_se),
+    ):
+        found[name] = with_error(value, off)
+    if s.coverage is not None:
+        found["90 % interval holds"] += f" ({band_in_words(s)})"
+    for name, share, off in (
+        ("ambiguous", s.ambiguous, s.ambiguous_se),
+        ("refused", s.refused, s.refused_se),
+    ):
+        if off is not None and off >= 0.0005:
+            found[name] = f"{100 * share:.1f} ± {100 * off:.1f} %"
+    return tuple(found.values())
+
+
+def with_error(value: float | None, off: float | None) -> str:
+    """Return a share in percent with its standard error, to as many digits as that tells."""
+    if value is None or off is None or off <= 0.0:
+        return percent(value)
+    places = int(np.clip(1 - np.floor(np.log10(100 * off)), 0, 12))
+    return f"{100 * value:.{places}f} ± {100 * off:.{places}f} %"
+
+
+def _plain(row: Row) -> tuple[str, ...]:
     s, c = row.scores, row.costs
     if s is None:
         return (method_of(row), row.knob, *["-"] * (len(COLUMNS) - 2))
     return (
         method_of(row),
         row.knob,
+        str(s.sets),
         percent(s.median_error),
         percent(s.p95_error),
         _share(s.coverage),
@@ -141,31 +179,7 @@ def heading(scene: str) -> str:
 def line(row: Row) -> str:
     """Return a row as a line for a terminal."""
     said = " (*told that there is neither crosstalk nor wall)" if row.told else ""
-    return _aligned(cells_of_row(row)) + said
-
-
-def method_to_take(rows: Iterable[Row]) -> str:
-    """Say which method costs least of those that come near the least error, and hold the truth.
-
-    Near: within a factor of two. Holding: the truth is in 80 % or more of the 90 % intervals.
-    """
-    groups: dict[str, list[tuple[float, float, str]]] = {"known": [], "unknown": []}
-    for row in rows:
-        s, time_s = row.scores, row.costs.frame_s
-        if s is None or time_s is None or row.told or s.median_error is None or s.single < 0.5:
-            continue
-        if s.coverage is None or s.coverage < 0.8:
-            continue
-        told = row.family in ("single frames", "tracker") or "told the object" in row.remark
-        found = groups["known" if told else "unknown"]
-        found.append((time_s, s.median_error, f"{row.method}, {row.knob}"))
-    said = []
-    for object_is, found in groups.items():
-        if found:
-            least = min(error for _, error, _ in found)
-            time_s, error, name = min(x for x in found if x[1] <= 2 * least)
-            said.append(f"object {object_is}: {name} ({percent(error)}, {time_of(time_s)} a frame)")
-    return "; ".join(said)
+    return _aligned(_plain(row)) + said
 
 
 def left_out(rows: Iterable[Row]) -> dict[str, str]:

@@ -14,7 +14,7 @@ from inference.tracking.track import Track, step, track
 from inference.tracking.tracker import tracker
 from service.report.cells import Cell
 from service.report.clock import alone, best, peak_bytes
-from service.report.readings import readings_of, told_of_object
+from service.report.readings import sets_of, told_of_object
 from service.report.row import Costs, Row
 from service.report.scores import Scores, scores_of_roots
 from simulator.errors import RefusedError
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 def measure_tracker(cell: Cell, seed: int) -> Row:
     """Measure the tracker on a whole way, and frame by frame."""
     scene = cell.scene
-    made = readings_of(scene, cell.frames, seed, scene.empty)
+    (made,) = sets_of(scene, cell.frames, seed, 1)
     settings = TrackingSettings(hypotheses=cell.value)
     told = told_of_object(scene)
     row = Row(

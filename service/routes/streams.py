@@ -29,6 +29,7 @@ from service.routes.resources import Cursor, LastEventId, answered, event_of, pl
 from service.shared import client_of, shared_of
 from service.store.stream_record import StreamRecord
 from service.streams.answered import encoded, error_of
+from service.streams.lines import ended, lines_in
 from service.streams.producer import lines_of
 from simulator.errors import HybridTofError
 
@@ -149,12 +150,12 @@ class _Answers(Response):
             headers = [(b"content-type", kind.encode()), (b"vary", b"accept")]
             await send({"type": "http.response.start", "status": 200, "headers": headers})
 
-        async def answer(lines: list[bytes]) -> None:
+        async def answer(body: bytes) -> None:
             if not begun:
                 await begin()
             if self._message is not None:
-                lines = await asyncio.to_thread(as_messages, self._message, limits, lines)
-            body = b"\n".join(lines) + b"\n"
+                lines = lines_in(body)
+                body = ended(await asyncio.to_thread(as_messages, self._message, limits, lines))
             await send({"type": "http.response.body", "body": body, "more_body": True})
 
         shared = shared_of(request)
@@ -172,7 +173,7 @@ class _Answers(Response):
         except HybridTofError as error:
             if not begun:
                 raise
-            await answer([encoded({"sequence": None, "error": error_of(error)})])
+            await answer(encoded({"sequence": None, "error": error_of(error)}) + b"\n")
         if not begun:
             await begin()
         await send({"type": "http.response.body", "body": b""})
@@ -231,8 +232,8 @@ async def live(socket: WebSocket, stream_id: str) -> None:
     shared = shared_of(socket)
     client_s = shared.settings.client_s
 
-    async def answer(lines: list[bytes]) -> None:
-        for line in lines:
+    async def answer(text: bytes) -> None:
+        for line in lines_in(text):
             try:
                 async with asyncio.timeout(client_s):
                     await socket.send_text(line.decode())
@@ -253,7 +254,7 @@ async def live(socket: WebSocket, stream_id: str) -> None:
             await socket.send_denial_response(response_of(error))
             return
         try:
-            await answer([encoded({"sequence": None, "error": error_of(error)})])
+            await answer(encoded({"sequence": None, "error": error_of(error)}) + b"\n")
             await socket.close(1013, error_of(error)["title"])
         except (WebSocketDisconnect, SlowClientError):
             pass

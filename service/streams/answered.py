@@ -1,8 +1,9 @@
 """What a stream's lines are answered: one JSON object a line."""
 
+import functools
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,80 +12,85 @@ from numpy.typing import NDArray
 
 from inference.estimates import Status
 from service.problems import describe
+from service.streams.lines import lines_in
 from service.streams.said import MARK, OWN, Said, said_from_bytes
 from simulator.errors import HybridTofError
 
-__all__ = ["answers_in", "answers_of", "encoded", "error_of", "more_of"]
+__all__ = ["answers_in", "encoded", "error_of", "more_of", "text_of"]
 
-Array = NDArray[np.float64]
-Texts = list[list[str]]
-
-_STATUS = {int(status): status.name.lower() for status in Status}
+_STATUS = {int(status): status.name.lower().encode() for status in Status}
+_FLAGS = {False: b"false", True: b"true"}
 
 
-def answers_of(said: Said) -> list[bytes]:
-    """Return the answers to frames as JSON, without line ends; what is nan is null.
+def text_of(said: Said) -> bytes:
+    """Return the answers to frames as JSON, each with a line end; what is nan is null.
 
     The texts of all numbers are made in one go and laid between those that answers have in common:
     an object a frame costs several times as much.
     """
-    n, table = len(said.sequence), said.table
-    flags = np.where(said.misfit, "true", "false").tolist()
-    kinds = list(map(_STATUS.__getitem__, said.status.tolist()))
-    heads = [_texts(said.sequence), _texts(said.time_s), kinds]
-    tails = [flags, list(said.more) or [""] * n]
+    n, (own, latency) = len(said.sequence), (said.table[:8], said.table[8])
+    texts = _texts(own.ravel())
+    columns = [texts[k * n : (k + 1) * n] for k in range(len(own))]
+    form, hypotheses = _hypotheses(said)
+    kinds = map(_STATUS.__getitem__, said.status.tolist())
+    misfit = map(_FLAGS.__getitem__, said.misfit.tolist())
+    rows = [_texts(said.sequence), _texts(said.time_s), kinds, *columns[:5], *hypotheses]
+    rows += [*columns[5:], misfit, _texts(latency)]
+    if said.more:
+        rows.append([text.encode() for text in said.more])
+    return _laid(_template(form, bool(said.more)), n, rows)
+
+
+def _laid(template: bytes, n: int, rows: Sequence[Iterable[bytes]]) -> bytes:
+    """Return n times a template, with the texts of each row in one of its places."""
+    pieces = [b""] * (n * len(rows))
+    for k, row in enumerate(rows):
+        pieces[k :: len(rows)] = row
+    return template * n % tuple(pieces)
+
+
+def _hypotheses(said: Said) -> tuple[bytes, list[list[bytes]]]:
+    """Return how the hypotheses of a frame are written, and the texts for its places."""
     counts = np.unique(said.hypotheses).tolist()
     if len(counts) == 1:
-        return _of_one_count(counts[0], heads, table, tails)
-    answers = np.empty(n, dtype=object)
+        return _list_of(counts[0]), _columns_of(said, counts[0], slice(None))
+    lists = np.empty(len(said.sequence), dtype=object)
     for count in counts:
         which = np.flatnonzero(said.hypotheses == count)
-        at = which.tolist()
-        some = [[[column[i] for i in at] for column in texts] for texts in (heads, tails)]
-        answers[which] = _of_one_count(count, some[0], table[:, which], some[1])
-    found: list[bytes] = answers.tolist()
-    return found
+        columns = _columns_of(said, count, which)
+        lists[which] = _laid(_list_of(count) + b"\n", len(which), columns).split(b"\n")[:-1]
+    return b"%b", [lists.tolist()]
 
 
-def _of_one_count(count: int, heads: Texts, table: Array, tails: Texts) -> list[bytes]:
-    """Return the answers to frames with equally many hypotheses."""
-    order = [*range(5), *range(OWN, OWN + 3 * count), 5, 6, 7, 8]
-    every, n = _texts(table[order].ravel()), table.shape[1]
-    *columns, latency = [every[k * n : (k + 1) * n] for k in range(len(order))]
-    misfit, more = tails
-    return _laid(count, [*heads, *columns, misfit, latency, more])
+def _columns_of(said: Said, count: int, which: Any) -> list[list[bytes]]:
+    """Return the texts of the numbers of so many hypotheses of some frames."""
+    table = said.table[OWN : OWN + 3 * count, which]
+    texts, n = _texts(table.ravel()), table.shape[1]
+    return [texts[k * n : (k + 1) * n] for k in range(len(table))]
 
 
-_HEAD = '{"sequence":', ',"time_s":', ',"status":"', '","range_m":', ',"sd_m":'
-_PARTS = ',"sd_parts_m":{"noise":', ',"scene":', ',"model":'
-_HYPOTHESIS = '{"range_m":', ',"sd_m":', ',"weight":'
-_TAIL = ',"outlier":', ',"rate_m_s":', ',"misfit":', ',"latency_s":', ""
+@functools.cache
+def _list_of(count: int) -> bytes:
+    return b"[%b]" % b",".join([b'{"range_m":%b,"sd_m":%b,"weight":%b}'] * count)
 
 
-def _laid(count: int, columns: Texts) -> list[bytes]:
-    """Lay the texts of answers with ``count`` hypotheses between those that they share."""
-    fixed = [*_HEAD, *_PARTS]
-    opening = '},"hypotheses":['
-    for k in range(count):
-        first, *others = _HYPOTHESIS
-        fixed += [("}," if k else opening) + first, *others]
-    fixed.append(("}]" if count else opening + "]") + ',"present":')
-    fixed += _TAIL
-    n, width = len(columns[0]), 2 * len(fixed) + 1
-    pieces = [""] * (n * width)
-    for k, (text, column) in enumerate(zip(fixed, columns, strict=True)):
-        pieces[2 * k :: width] = [text] * n
-        pieces[2 * k + 1 :: width] = column
-    pieces[width - 1 :: width] = ["}\n"] * n
-    return "".join(pieces).encode().split(b"\n")[:-1]  # no JSON text has a line end of its own
+@functools.cache
+def _template(hypotheses: bytes, more: bool) -> bytes:
+    """Return what answers have in common, %b for each text between."""
+    return (
+        b'{"sequence":%b,"time_s":%b,"status":"%b","range_m":%b,"sd_m":%b,'
+        b'"sd_parts_m":{"noise":%b,"scene":%b,"model":%b},'
+        b'"hypotheses":' + hypotheses + b","
+        b'"present":%b,"outlier":%b,"rate_m_s":%b,"misfit":%b,"latency_s":%b'
+        + (b"%b}\n" if more else b"}\n")
+    )
 
 
-def _texts(values: NDArray[Any]) -> list[str]:
+def _texts(values: NDArray[Any]) -> list[bytes]:
     """Return the JSON texts of numbers."""
     # what was kept begins at any byte, and orjson reads whole numbers
     values = np.require(values, requirements=["C", "A"])
-    text = orjson.dumps(values, option=orjson.OPT_SERIALIZE_NUMPY)
-    return text[1:-1].decode("ascii").split(",")
+    return orjson.dumps(values, option=orjson.OPT_SERIALIZE_NUMPY)[1:-1].split(b",")
 
 
 def more_of(also: Sequence[dict[str, Any] | None] | None) -> tuple[str, ...]:
@@ -98,7 +104,7 @@ def answers_in(kept: bytes) -> dict[int, bytes]:
     """Return answers by their numbers, from what a store keeps of them: numbers, or lines."""
     if kept.startswith(MARK):
         said = said_from_bytes(kept)
-        return dict(zip(said.sequence.tolist(), answers_of(said), strict=True))
+        return dict(zip(said.sequence.tolist(), lines_in(text_of(said)), strict=True))
     return {orjson.loads(line)["sequence"]: line for line in kept.splitlines()}
 
 

@@ -12,6 +12,7 @@ from service.column_names import NAMES, check_names
 from service.errors import MalformedError
 from service.frame_files import check_separator
 from service.frame_table import value_of_text
+from service.streams.number_lines import NumberLines, number_lines
 from service.strict_json import MAX_DEPTH, SHORT, decode
 from simulator.errors import InvalidInputError, escape
 
@@ -43,6 +44,10 @@ class Form(Protocol):
         """
         ...
 
+    def numbers_in(self, lines: Sequence[bytes]) -> NumberLines | None:
+        """Return the members of many lines that hold numbers alone; None for all others."""
+        ...
+
 
 class JsonLines:
     """Lines that are JSON objects.
@@ -69,6 +74,10 @@ class JsonLines:
     def frames_in(self, lines: Sequence[bytes]) -> list[dict[str, Any]]:
         """See `Form.frames_in`."""
         return _all_at_once(lines) or [self.frame_in(line) for line in lines]
+
+    def numbers_in(self, lines: Sequence[bytes]) -> NumberLines | None:
+        """See `Form.numbers_in`."""
+        return number_lines(lines)
 
 
 def _all_at_once(lines: Sequence[bytes]) -> list[dict[str, Any]] | None:
@@ -175,6 +184,9 @@ class CsvLines:
     def frames_in(self, lines: Sequence[bytes]) -> list[dict[str, Any]]:
         """See `Form.frames_in`."""
         return [self.frame_in(line) for line in lines]
+
+    def numbers_in(self, lines: Sequence[bytes]) -> None:
+        """See `Form.numbers_in`."""
 
 
 def _fields(line: bytes) -> list[str]:

@@ -33,7 +33,7 @@ _KEPT = (*COUNTS, "unnumbered", "surprise", "misfit", "calibration", "supposed")
 _BLOCK = 2**17  # of a batch of a thousand lines, which is to be one turn
 _TRIES = 3
 
-Send = Callable[[list[bytes]], Awaitable[None]]
+Send = Callable[[bytes], Awaitable[None]]
 
 
 def place_of(record: StreamRecord, model: Follower) -> Place:
@@ -127,7 +127,7 @@ class Producer:
         source : async iterator of lists of lines
             As `lines_of` yields them.
         send : callable
-            Takes the answers of a turn, each without a line end; what came in the meantime waits.
+            Takes the answers of a turn, each with a line end; what came in the meantime waits.
 
         Raises
         ------
@@ -144,7 +144,7 @@ class Producer:
         try:
             while lines := await room.take():
                 taken = await self._turn(lines)
-                await send(taken.answers)
+                await send(taken.text)
             await reading
         finally:
             reading.cancel()

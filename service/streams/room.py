@@ -7,15 +7,17 @@ does not read its answers, or lines that come faster than they are answered.
 import asyncio
 import time
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from operator import attrgetter
 
-from service.streams.lines import Line
+from service.streams.lines import Line, arriving
 
 __all__ = ["STALE_S", "Room"]
 
 STALE_S = 0.2
 _LINES = 1000
 _BYTES = 2**18
+_RAW: Callable[[Line], bytes | None] = attrgetter("raw")
 
 
 class Room:
@@ -45,8 +47,7 @@ class Room:
 
     async def put(self, raws: Iterable[bytes | None]) -> None:
         """Let lines in, in their order; return when all are."""
-        now = time.perf_counter()
-        lines = [Line(raw, now) for raw in raws]
+        lines = arriving(raws, time.perf_counter())
         while lines:
             while self._full():
                 if self._latest:
@@ -58,7 +59,7 @@ class Room:
             some = lines[: _LINES - len(self._lines)]
             del lines[: len(some)]
             self._lines += some
-            self._bytes += sum(len(line.raw or b"") for line in some)
+            self._bytes += sum(map(len, filter(None, map(_RAW, some))))
             self._news.set()
 
     def end(self) -> None:

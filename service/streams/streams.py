@@ -63,7 +63,7 @@ class Streams:
             weakref.WeakValueDictionary()
         )
         # where streams stood when their last client was done, by their last change
-        self._places: OrderedDict[str, tuple[int, Place]] = OrderedDict()
+        self._places: OrderedDict[str, tuple[int, Place, Follower]] = OrderedDict()
         self._limiter: anyio.CapacityLimiter | None = None
 
     async def create(self, raw: bytes, client: str) -> StreamRecord:
@@ -201,7 +201,7 @@ class Streams:
         if self._limiter is None:
             self._limiter = anyio.CapacityLimiter(self._threads)
         try:
-            model = await asyncio.to_thread(model_of, record.request)
+            place, model = await self._standing(record)
             producer = Producer(
                 store=self._store,
                 writer=self._writer,
@@ -209,7 +209,7 @@ class Streams:
                 traces=self._traces,
                 record=record,
                 model=model,
-                place=self._place(record, model),
+                place=place,
                 latest=request_of(record.request).policy == "latest",
                 holder=self._holder if lasting else None,
                 changed=lambda: self._announce(stream_id),
@@ -227,14 +227,22 @@ class Streams:
             self._producing.discard(stream_id)
             self._traces.producers.dec()
 
-    def _place(self, record: StreamRecord, model: Follower) -> Place:
-        """Return where a stream stands: reading a state takes as long as a hundred frames."""
-        number, place = self._places.pop(record.id, (None, None))
-        return place_of(record, model) if place is None or number != record.number else place
+    async def _standing(self, record: StreamRecord) -> tuple[Place, Follower]:
+        """Return where a stream stands, and what follows it.
+
+        Reading a state takes as long as a hundred frames, and so does going to another thread.
+        """
+        number, place, model = self._places.pop(record.id, (None, None, None))
+        if model is None:
+            model = await asyncio.to_thread(model_of, record.request)
+        if place is None or number != record.number:
+            place = place_of(record, model)
+        return place, model
 
     def _remember(self, producer: Producer) -> None:
         if isinstance(producer.place.state, TrackState):  # others have histories, and are large
-            self._places[producer.record.id] = producer.record.number, producer.place
+            stands = producer.record.number, producer.place, producer.model
+            self._places[producer.record.id] = stands
             while len(self._places) > _REMEMBERED:
                 self._places.popitem(last=False)
 

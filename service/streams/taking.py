@@ -6,7 +6,8 @@ However the lines are cut into batches, the answers are the same to the last bit
 
 import dataclasses
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,11 @@ import numpy as np
 from inference.assumptions import unused_temperature
 from inference.self_calibration.following import Piece
 from service.errors import BodyTooLargeError, ConflictError, GoneError
-from service.streams.answered import answers_of, encoded, error_of, more_of
+from service.streams.answered import encoded, error_of, more_of, text_of
 from service.streams.cutting import LONGEST
 from service.streams.followers import Follower
 from service.streams.forms import Form
-from service.streams.lines import COUNTS, WINDOW, Earlier, Line, Place, Taken
+from service.streams.lines import COUNTS, WINDOW, Earlier, Line, Place, Taken, ended, lines_in
 from service.streams.numbering import missing_before, number_in
 from service.streams.said import Said, said_of, said_to_bytes
 from service.streams.shapes import (
@@ -39,6 +40,7 @@ __all__ = ["take"]
 # number, time and arrival, its values, and what else is to be said
 _Waiting = tuple[int, int, float, float, tuple[Any, ...], dict[str, Any] | None]
 
+_ARRIVED: Callable[[Line], float] = attrgetter("arrived")
 _More = Sequence[dict[str, Any] | None] | None
 
 
@@ -91,7 +93,6 @@ class _Batch:
         self._surprise, self._misfit = place.surprise, place.misfit
         self._supposed = place.supposed
         self._answers: list[bytes] = []
-        self._kept: bytes | None = None
         self._at: dict[int, int] = {}
         self._repeats: list[tuple[int, int, int]] = []
         self._waiting: list[_Waiting] = []
@@ -99,14 +100,21 @@ class _Batch:
         self._shape: Shape | None = None
 
     def take(self, lines: Sequence[Line]) -> Taken:
-        if not self._alike(lines):
-            for line in lines:
-                self._take(line)
-            self._track()
+        found = self._alike(lines)
+        if found is not None:
+            text, kept = found
+            return self._taken(text, text[text.rfind(b"\n", 0, -1) + 1 : -1], kept)
+        for line in lines:
+            self._take(line)
+        self._track()
         new = [self._answers[at] for at in self._at.values()]
-        repeated = len(self._repeats)
         for at, sequence, last in self._repeats:
             self._answers[at] = self._said_before(sequence, last)
+        last_new = new[-1] if new else self._place.last
+        return self._taken(ended(self._answers), last_new, ended(new))
+
+    def _taken(self, text: bytes, last: bytes, kept: bytes) -> Taken:
+        """Return what has become of the lines."""
         place = dataclasses.replace(
             self._place,
             state=self._state,
@@ -114,28 +122,25 @@ class _Batch:
             unnumbered=self._unnumbered,
             surprise=self._surprise,
             misfit=self._misfit,
-            last=new[-1] if new else self._place.last,
+            last=last,
             calibration=self._follower.told(self._state),
             supposed=self._supposed,
             **{name: getattr(self._place, name) + n for name, n in self._counts.items()},
         )
-        kept = self._kept
-        if kept is None:
-            kept = b"".join(line + b"\n" for line in new)
-        return Taken(place, self._answers, kept, repeated, any(self._counts.values()))
+        return Taken(place, text, kept, len(self._repeats), any(self._counts.values()))
 
-    def _alike(self, lines: Sequence[Line]) -> bool:
-        """Answer lines that are good and alike in one go; tell whether they are."""
+    def _alike(self, lines: Sequence[Line]) -> tuple[bytes, bytes] | None:
+        """Return the answers to lines that are good and alike, and what is kept of them."""
         if self._alone or not lines:
-            return False
+            return None
         after = max(self._sequence, 0) + 1 + self._unnumbered + lines[0].dropped
         found = together(self._model, self._form, lines, (self._sequence, after, self._time))
         if found is None:
-            return False
+            return None
         try:
             state, pieces = self._follower.follow(self._state, found.frames, found.sequences)
         except InvalidInputError:
-            return False
+            return None
         also = found.passed
         told = missing_before(found.sequences[0] - after if self._sequence >= 0 else 0, lines[0])
         if told:
@@ -145,16 +150,12 @@ class _Batch:
         self._counts["dropped"] += told.get("dropped", 0)
         self._sequence, self._unnumbered = found.sequences[-1], 0
         self._time = float(found.times[-1])
-        self._at = {sequence: at for at, sequence in enumerate(found.sequences)}
-        self._answers = [b""] * len(lines)
-        arrivals = [line.arrived for line in lines]
         self._state = state
-        every = range(len(lines))
+        arrivals = list(map(_ARRIVED, lines))
         more = self._supposing(found.frames, also)
-        said = self._say(pieces, every, found.sequences, found.times, arrivals, more)
-        if len(pieces) == 1:
-            self._kept = said_to_bytes(said)
-        return True
+        said = self._say(pieces, found.sequences, found.times, arrivals, more)
+        text = b"".join(map(text_of, said))
+        return text, said_to_bytes(said[0]) if len(said) == 1 else text
 
     def _take(self, line: Line) -> None:
         """Answer a line, or let it wait for the tracker."""
@@ -243,7 +244,9 @@ class _Batch:
             self._time = self._follower.time_of(self._state)
             raise of_one_frame(error) from None
         some = self._supposing(frames, also if any(also) else None)
-        self._say(pieces, at, sequences, times, arrivals, some)
+        said = self._say(pieces, sequences, times, arrivals, some)
+        for place, answer in zip(at, lines_in(b"".join(map(text_of, said))), strict=True):
+            self._answers[place] = answer
 
     def _supposing(self, frames: Frames, also: _More) -> _More:
         """Tell what answers suppose, once a stream: with the first frame where it plays a part."""
@@ -259,23 +262,22 @@ class _Batch:
     def _say(
         self,
         pieces: Sequence[Piece],
-        at: Sequence[int],
         sequences: Sequence[int],
         times: Sequence[float],
         arrivals: Sequence[float],
         also: _More,
-    ) -> Said:
-        """Answer frames by what follows the stream said of them; return the last piece."""
-        latencies, start = time.perf_counter() - np.array(arrivals), 0
+    ) -> list[Said]:
+        """Return what follows the stream says of frames, piece by piece."""
+        latencies, start, said = time.perf_counter() - np.array(arrivals), 0, []
         for track, event in pieces:
             part = slice(start, start + len(track))
             more = None if also is None else also[part]
             if event is not None:
                 first, *others = more or [None] * len(track)
                 more = [{**(first or {}), "calibration": event}, *others]
-            said = said_of(track, sequences[part], times[part], latencies[part], more_of(more))
-            for place, answer in zip(at[part], answers_of(said), strict=True):
-                self._answers[place] = answer
+            said.append(
+                said_of(track, sequences[part], times[part], latencies[part], more_of(more))
+            )
             start += len(track)
         self._counts["answered"] += len(sequences)
         surprise = float(track.surprise[-1])

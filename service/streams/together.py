@@ -4,7 +4,7 @@ What is out of the ordinary in any of them is left to `service.streams.taking`, 
 line and says what is wrong with it. The answers are the same either way.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -19,6 +19,7 @@ from simulator.frames import Frames
 
 __all__ = ["Together", "together"]
 
+_Read = tuple[tuple[str, ...], Callable[[str], Sequence[Any]]]
 _DROPPED = attrgetter("dropped")
 _FEW = 4  # fewer are answered as quickly one by one
 
@@ -69,19 +70,17 @@ def together(
     raws = [line.raw for line in lines if line.raw is not None]
     if len(lines) < _FEW or len(raws) < len(lines) or any(map(_DROPPED, lines[1:])):
         return None
-    try:
-        frames = form.frames_in(raws)
-    except HybridTofError:
+    read = _alike(form, raws)
+    if read is None:
         return None
-    names = tuple(frames[0])
-    if set(map(tuple, frames)) != {names}:
-        return None
+    names, values_of = read
     shape = shape_of(model, names)
     if shape.problem is not None:
         return None
     last, after, time_s = where
-    sequences = _numbers(frames, names, last, after)
-    columns = {name: [frame[name] for frame in frames] for name in shape.columns}
+    stated = values_of("sequence") if "sequence" in names else None
+    sequences = _numbers(stated, len(lines), last, after)
+    columns = {name: values_of(name) for name in shape.columns}
     kinds = dict(zip(shape.columns, shape.kinds, strict=True))
     sound = all(set(map(type, columns[name])) <= kinds[name] for name in columns)
     if sequences is None or not sound:
@@ -96,19 +95,34 @@ def together(
         return None
     passed: list[dict[str, Any] | None] | None = None
     if shape.passed:
-        passed = [{name: frame[name] for name in shape.passed} for frame in frames]
+        rows = zip(*map(values_of, shape.passed), strict=True)
+        passed = [dict(zip(shape.passed, row, strict=True)) for row in rows]
     return Together(found, sequences, times, passed)
 
 
-def _numbers(
-    frames: Sequence[dict[str, Any]], names: tuple[str, ...], last: int, after: int
-) -> Sequence[int] | None:
-    """Return the numbers of frames, where they are one after another."""
-    if "sequence" not in names:
-        return range(after, after + len(frames))
-    stated = [frame["sequence"] for frame in frames]
-    first = stated[0]
-    if set(map(type, stated)) != {int} or first < 0 or not last < first <= LARGEST - len(frames):
+def _alike(form: Form, raws: Sequence[bytes]) -> _Read | None:
+    """Return the names of members that all lines have, and what gives the values of each."""
+    numbers = form.numbers_in(raws)
+    if numbers is not None:
+        return numbers.names, numbers.column
+    try:
+        frames = form.frames_in(raws)
+    except HybridTofError:
         return None
-    counted = list(range(first, first + len(frames)))
+    names = tuple(frames[0])
+    if set(map(tuple, frames)) != {names}:
+        return None
+    return names, lambda name: [frame[name] for frame in frames]
+
+
+def _numbers(
+    stated: Sequence[Any] | None, count: int, last: int, after: int
+) -> Sequence[int] | None:
+    """Return the numbers of lines, where they are one after another."""
+    if stated is None:
+        return range(after, after + count)
+    first = stated[0]
+    if set(map(type, stated)) != {int} or first < 0 or not last < first <= LARGEST - count:
+        return None
+    counted = list(range(first, first + count))
     return counted if stated == counted else None

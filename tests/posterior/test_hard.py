@@ -42,7 +42,9 @@ def job(simulation: Simulation) -> Job:
     sensor = parse_sensor(
         {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [7.7e-6, 7.7e-6]}}
     )
-    return prepare(sensor, scene, simulation.frames, SamplerSettings(seed=3, target_ess=100))
+    return prepare(
+        sensor, scene, simulation.frames, SamplerSettings(seed=3, ensembles=2, target_ess=100)
+    )
 
 
 @pytest.fixture(scope="module")

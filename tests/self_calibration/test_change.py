@@ -173,3 +173,36 @@ def test_a_scene_that_shares_the_object_of_another() -> None:
         with_modes(scene_of(), [{"weight": 3.0, "mean": [0.0, 0.0], "covariance": np.eye(2)}])
         == scene_of()
     )
+
+
+def test_laws_that_nearly_agree_are_shared_or_left_as_they_are() -> None:
+    """Two unknowns of the object known by their ratio to 1e-6, beside a law 1e4 times as wide."""
+    stated = {
+        "object": {
+            "c0": 0.0769,
+            "c1": {"prior": "normal", "mean": -0.1, "sd": 0.1},
+            "c2": {"prior": "lognormal", "median": 0.1, "sigma": 1.0},
+        },
+        "crosstalk": [0.001, {"prior": "normal", "mean": 0.0, "sd": 0.01}],
+    }
+    own = ["object.c1", "object.c2"]
+
+    def scene(names: list[str], mean: list[float], factor: Array) -> Scene:
+        mode = {"mean": mean, "covariance": (factor @ factor.T).tolist()}
+        return parse_scene(stated | {"joint": {"unknowns": names, "modes": [mode]}})
+
+    narrow, w2 = 1e-4, [0.02, 5e-8, 3e-4]
+    factor = np.array([w2, [narrow, 0.0, 0.0], [narrow, narrow * 1e-6, 0.0]])
+    found = scene(["crosstalk.w2", *own], [0.5, 0.0, 0.0], factor)
+    wide = np.array([[1.0, 0.0], [0.9, 0.5]])
+    # it follows 200 of one and 500 of the difference, less the same of the other
+    law = mixed(found, scene(own, [0.1, 0.1], wide * 1e-3)).joint
+    assert law is not None
+    follow = np.array(w2[:2]) @ np.linalg.inv(factor[1:, :2])
+    lower = np.vstack([follow @ wide * 1e-3, wide * 1e-3])
+    wanted = lower @ lower.T + np.diag([w2[2] ** 2, 0.0, 0.0])
+    np.testing.assert_allclose(law.modes[1].mean[1:], [0.1, 0.1], rtol=1e-12)
+    # the factors are known to the rounding of a covariance of condition 4e12
+    np.testing.assert_allclose(law.modes[1].covariance, wanted, rtol=1e-3)
+    # farther than 100 standard deviations of the crosstalk's prior: no half that says so
+    assert mixed(found, scene(own, [0.1, 0.1], wide)) == found

@@ -244,7 +244,7 @@ async def test_who_breaks_off_leaves_the_stream_to_others(store: StreamStore) ->
     async def chunks() -> AsyncIterator[bytes]:
         yield LINES[0] + b"\n"
 
-    async def away(_: list[bytes]) -> None:
+    async def away(_: bytes) -> None:
         with pytest.raises(ConflictError):
             async with other.producing(made_one.id, ""):
                 pass

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 MAX_K_HAT = 0.5
 _LEAST_EXCESS = 5  # weights above the cut that a shape is fitted to
+_NOTHING = 1e-300  # of the largest weight: what is less counts for none
 _EQUAL = 1e-9  # of the largest weight, by which equal ones differ through rounding
 
 
@@ -123,7 +124,7 @@ def pareto_k_hat(log_weights: Array) -> float:
     ordered = np.sort(finite)
     weights = np.exp(ordered[-tail - 1 :] - ordered[-1])
     excess = weights[1:] - weights[0]
-    positive = excess[excess > 0]
+    positive = excess[excess > _NOTHING]
     if positive.size >= _LEAST_EXCESS:
         return generalised_pareto(positive)[0]
     # equal weights, or a few that dwarf all others
@@ -150,19 +151,25 @@ def smoothed(log_weights: Array) -> tuple[Array, float]:
         return log_weights, k_hat
     tail = _tail(log_weights.size)
     order = np.argsort(log_weights)
-    top, cut = (
-        log_weights[order[-1]],
-        math.exp(log_weights[order[-tail - 1]] - log_weights[order[-1]]),
-    )
+    top = log_weights[order[-1]]
+    log_cut = float(log_weights[order[-tail - 1]] - top)
     largest = np.exp(log_weights[order[-tail:]] - top)
-    shape, scale = generalised_pareto(np.maximum(largest - cut, 1e-300))
-    p = (np.arange(tail) + 0.5) / tail
-    excess = (
-        scale * -np.log1p(-p) if shape == 0.0 else scale * np.expm1(-shape * np.log1p(-p)) / shape
-    )
+    shape, scale = generalised_pareto(np.maximum(largest - math.exp(log_cut), _NOTHING))
+    log_excess = _log_pareto_quantiles(shape, scale, (np.arange(tail) + 0.5) / tail)
     result = log_weights.copy()
-    result[order[-tail:]] = top + np.minimum(np.log(cut + excess), 0.0)
+    result[order[-tail:]] = top + np.minimum(np.logaddexp(log_cut, log_excess), 0.0)
     return result, k_hat
+
+
+def _log_pareto_quantiles(shape: float, scale: float, p: Array) -> Array:
+    """Return logs of quantiles: a shape of 100 has some beyond the largest number."""
+    x = -np.log1p(-p)
+    if shape == 0.0:
+        return np.asarray(math.log(scale) + np.log(x))
+    if shape < 0.0:
+        return np.asarray(np.log(-np.expm1(shape * x)) + math.log(scale) - math.log(-shape))
+    x = shape * x
+    return np.asarray(x + np.log(-np.expm1(-x)) + math.log(scale) - math.log(shape))
 
 
 def draw_weighted(

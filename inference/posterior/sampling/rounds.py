@@ -235,6 +235,9 @@ def _fitted(proposal: Proposal, sample: Array, density: CollapsedDensity) -> Pro
 
 
 def _effective(log_weights: Array) -> float:
+    """Return an effective sample size; 1 where the target is zero at every draw."""
+    if not np.isfinite(log_weights).any():
+        return 1.0
     weights: Array = special.softmax(log_weights)
     return 1.0 / float(np.sum(weights**2))
 

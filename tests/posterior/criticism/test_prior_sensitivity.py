@@ -21,7 +21,7 @@ def answer(truth: dict[str, Any], scene: dict[str, Any], seed: int) -> Posterior
     path = SampledTrajectory(range_m=RANGES.tolist())
     frames = simulate(sensor, parse_scene({"object": OBJECT, **truth}), path, seed).frames
     exact = parse_scene({**scene, "discrepancy": 0})
-    return infer(sensor, exact, frames, SamplerSettings(seed=1, max_seconds=60))
+    return infer(sensor, exact, frames, SamplerSettings(seed=1, method="auto"))
 
 
 @pytest.mark.parametrize("seed", [4])

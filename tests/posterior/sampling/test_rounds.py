@@ -106,3 +106,18 @@ def test_a_blend_is_a_density_and_draws_by_its_counts() -> None:
     assert z.shape == (8000, 1)
     # 6000 of the near one, of which one in 1e3 lies beyond; 2000 of the far one, 4 % before
     assert abs(np.count_nonzero(z < 3.0) - 6000) < 100
+
+
+def test_a_target_that_is_zero_at_every_draw_is_not_trusted() -> None:
+    """All that is finite lies on a ring, which no draw meets."""
+
+    def target(z: np.ndarray) -> np.ndarray:
+        radius = np.hypot(*np.asarray(z).T)
+        return np.where(np.abs(radius - 1.0) < 1e-12, 0.0, -np.inf)
+
+    angle = np.linspace(0.0, 2 * np.pi, 300)
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    rng = np.random.default_rng(4)
+    found = in_rounds(cast(Any, target), Proposal(LAPLACE, None, 0.5), (ring,), rng, 400, 5000)
+    assert not found.trusted
+    assert found.dissent == 1.0

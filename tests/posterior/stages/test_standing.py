@@ -74,3 +74,14 @@ def test_smoothed_weights_keep_their_order_and_their_mean() -> None:
     assert np.std(errors, axis=0)[1] <= np.std(errors, axis=0)[0]
     same = np.zeros(100)
     assert np.array_equal(smoothed(same)[0], same)
+
+
+def test_weights_that_differ_by_more_than_numbers_reach_are_smoothed() -> None:
+    """Pareto quantiles of a shape of 100 exceed the largest number; a warning is an error."""
+    rng = np.random.default_rng(3)
+    for spread in (1e2, 3e2, 1e3, 1e4):
+        for raw in (spread * rng.standard_normal(3000), spread * rng.exponential(size=3000)):
+            log_weights, k_hat = smoothed(raw)
+            assert k_hat > 10.0
+            assert np.isfinite(log_weights).all()
+            assert log_weights.max() <= raw.max()
