@@ -14,12 +14,13 @@ from simulator.optics.assembly import OpticalScene, read
 from simulator.optics.electronics import Electronics
 from simulator.optics.motion import series
 from simulator.optics.parametrisation import fit_object
+from simulator.parameters import parameters_of
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
 
-__all__ = ["Readings", "readings_of", "sets_of", "told_of_object"]
+__all__ = ["Readings", "err_together", "readings_of", "sets_of", "told_of_object"]
 
 Array = NDArray[np.float64]
 
@@ -163,3 +164,22 @@ def told_of_object(scene: ReportScene) -> Scene:
     c0, c1, c2 = _calibrated(scene.plate, scene.sensor)
     told = scene.known.model_dump(mode="json", exclude_unset=True)
     return parse_scene(told | {"object": {"c0": c0, "c1": c1, "c2": c2}})
+
+
+def err_together(sensor: Sensor, told: Scene) -> bool:
+    """Tell whether single frames have an error in common, which only other scenes would change.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The sensor.
+    told : Scene
+        What a method that learns nothing from other frames is told: unknowns of their priors, or a
+        model that may be wrong, are the same in all frames of all sets.
+
+    Returns
+    -------
+    bool
+    """
+    error = told.model_error
+    return len(parameters_of(sensor, told)) > 0 or max(error.flux, error.range_m) > 0.0

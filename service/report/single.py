@@ -12,7 +12,7 @@ from inference.estimates import Status, TechniqueResult
 from inference.realtime.registry import TECHNIQUES
 from service.report.cells import Cell
 from service.report.clock import alone, best, peak_bytes
-from service.report.readings import Readings, sets_of, told_of_object
+from service.report.readings import Readings, err_together, sets_of, told_of_object
 from service.report.row import Costs, Row
 from service.report.said import in_words, said
 from service.report.scores import Scores, scores_of_roots
@@ -26,7 +26,9 @@ Array = NDArray[np.float64]
 _NEIGHBOURS = 3
 
 
-def _scores_of_results(sweeps: Sequence[Readings], results: Sequence[TechniqueResult]) -> Scores:
+def _scores_of_results(
+    sweeps: Sequence[Readings], results: Sequence[TechniqueResult], together: bool
+) -> Scores:
     width = max(result.roots_m.shape[1] for result in results)
 
     def padded(values: Array) -> Array:
@@ -34,7 +36,8 @@ def _scores_of_results(sweeps: Sequence[Readings], results: Sequence[TechniqueRe
         return np.pad(values, wanted, constant_values=np.nan)
 
     roots = np.concatenate([padded(result.roots_m) for result in results])
-    of = np.repeat(np.arange(len(sweeps)), [sweep.range_m.size for sweep in sweeps])
+    sets = np.zeros(len(sweeps), int) if together else np.arange(len(sweeps))
+    of = np.repeat(sets, [sweep.range_m.size for sweep in sweeps])
     return scores_of_roots(
         np.concatenate([sweep.range_m for sweep in sweeps]),
         np.concatenate([result.range_m for result in results]),
@@ -42,7 +45,7 @@ def _scores_of_results(sweeps: Sequence[Readings], results: Sequence[TechniqueRe
         roots,
         np.concatenate([padded(result.roots_sd_m) for result in results]),
         np.where(np.isfinite(roots), 1.0, np.nan),
-        of if len(sweeps) > 1 else None,
+        of if together or len(sweeps) > 1 else None,
     )
 
 
@@ -75,7 +78,11 @@ def measure_single(cell: Cell, seed: int) -> Row:
             told=told,
             knob=f"{len(made.frames):,} frames a sweep",
             order=float(cell.frames),
-            scores=_scores_of_results(sweeps, [f.results[0] for f in (found, *others)]),
+            scores=_scores_of_results(
+                sweeps,
+                [f.results[0] for f in (found, *others)],
+                err_together(scene.sensor, scene_told),
+            ),
             costs=Costs(
                 frame_s=seconds / len(made.frames),
                 p50_s=middle,

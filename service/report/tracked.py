@@ -14,7 +14,7 @@ from inference.tracking.track import Track, step, track
 from inference.tracking.tracker import tracker
 from service.report.cells import Cell
 from service.report.clock import alone, best, peak_bytes
-from service.report.readings import sets_of, told_of_object
+from service.report.readings import err_together, sets_of, told_of_object
 from service.report.row import Costs, Row
 from service.report.scores import Scores, scores_of_roots
 from simulator.errors import RefusedError
@@ -49,7 +49,7 @@ def measure_tracker(cell: Cell, seed: int) -> Row:
     middle, tail = alone(_stepped(cell, told, settings, made.frames))
     return dataclasses.replace(
         row,
-        scores=_scores_of_track(made.range_m[here], found, here),
+        scores=_scores_of_track(made.range_m[here], found, here, err_together(scene.sensor, told)),
         costs=Costs(
             frame_s=seconds / len(made.frames),
             p50_s=middle,
@@ -60,7 +60,7 @@ def measure_tracker(cell: Cell, seed: int) -> Row:
     )
 
 
-def _scores_of_track(truth: Array, found: Track, here: NDArray[np.bool_]) -> Scores:
+def _scores_of_track(truth: Array, found: Track, here: NDArray[np.bool_], together: bool) -> Scores:
     several = found.status[here] == Status.AMBIGUOUS
     return scores_of_roots(
         truth,
@@ -69,6 +69,7 @@ def _scores_of_track(truth: Array, found: Track, here: NDArray[np.bool_]) -> Sco
         found.hypotheses_m[here],
         found.hypotheses_sd_m[here],
         found.hypotheses_weight[here],
+        np.zeros(truth.size, int) if together else None,
     )
 
 
