@@ -76,8 +76,10 @@ def follow(
     Raises
     ------
     InvalidInputError
-        As `inference.tracking.track.step`; the state is what it was.
+        As `inference.tracking.track.step`, and where a temperature that plays a part is not known;
+        the state is what it was.
     """
+    frames = plan.at_reference(frames)
     numbers = np.asarray(sequence, dtype=np.int64)
     pieces, start = [], 0
     while start < len(frames):

@@ -3,6 +3,8 @@
 import dataclasses
 import functools
 
+import numpy as np
+
 from inference.self_calibration.gathering import nothing_kept
 from inference.self_calibration.scenes import (
     check_unknown,
@@ -13,9 +15,12 @@ from inference.self_calibration.scenes import (
 from inference.self_calibration.state import CalibrationState
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.tracker import Tracker, tracker
-from simulator.errors import RefusedError
+from simulator.at_temperature import at_reference
+from simulator.errors import InvalidInputError, RefusedError
+from simulator.frames import Frames, check_frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
+from simulator.sensor_unknowns import DRIFTS
 
 __all__ = ["Plan", "begin", "plan_of"]
 
@@ -27,19 +32,45 @@ class Plan:
     Attributes
     ----------
     sensor : Sensor
-        The sensor.
+        The sensor, without temperature coefficients.
     stated : Scene
         The scene as it was stated.
     settings : TrackingSettings
         How objects move, come and go.
     seed : int
         From which the seeds of its calibrations come.
+    reads : Sensor
+        The sensor as it was stated, whose frames come.
     """
 
     sensor: Sensor
     stated: Scene
     settings: TrackingSettings
     seed: int
+    reads: Sensor
+
+    def at_reference(self, frames: Frames) -> Frames:
+        """Return frames as the sensor reads them at its reference temperature.
+
+        Raises
+        ------
+        InvalidInputError
+            At "/frames/temperature_k" where a temperature that plays a part is not known.
+        """
+        if self.reads.temperature is None:
+            return frames
+        check_frames(self.reads, frames)
+        if frames.temperature_k is not None and np.isnan(frames.temperature_k).any():
+            at = int(np.isnan(frames.temperature_k).argmax())
+            raise InvalidInputError.at(
+                "/frames/temperature_k",
+                f"entry {at} is not known: a stream that calibrates itself needs it in every frame",
+            )
+        return at_reference(self.reads, frames, _numbers(self.stated) or (0.0, 0.0))[1]
+
+    def reader(self) -> Tracker:
+        """Return a tracker that takes frames as they come."""
+        return _tracker(self.reads, begin(self).scene, self.settings)
 
     def tracker(self, scene: Scene) -> Tracker:
         """Return the tracker of a scene.
@@ -74,18 +105,37 @@ def plan_of(sensor: Sensor, scene: Scene, settings: TrackingSettings, seed: int)
     InvalidInputError
         At "/calibrate" where nothing is unknown; as `inference.tracking.tracker.tracker`.
     RefusedError
-        Where there is no tracker for it; of a sensor with temperature coefficients.
+        Where there is no tracker for it; where a temperature coefficient is unknown, or that of the
+        delay is stated beside unknown crosstalk.
     """
-    if sensor.temperature is not None:
+    if any(path in DRIFTS for path in sensor.unknown):
         raise RefusedError(
-            "a stream that calibrates itself takes no temperature coefficients: its calibrations "
-            "would have to tell their drift from that of the crosstalk; calibrate from recorded "
-            "frames, and track with what that has found"
+            "temperature coefficients unknown: calibrations of a stream could not tell their drift "
+            "from that of the crosstalk; calibrate from recorded frames, and state what has been "
+            "found"
         )
-    check_unknown(sensor, scene)
-    plan = Plan(sensor, scene, settings, seed)
+    cold = sensor
+    if sensor.temperature is not None:
+        if sensor.temperature.known[1] != 0.0 and _numbers(scene) is None:
+            raise RefusedError(
+                "the sensor's delay follows its temperature, which turns the light and not the "
+                "crosstalk: a stream that calibrates itself takes delay_drift_s_per_k beside "
+                "crosstalk as numbers alone; calibrate from recorded frames, and track with what "
+                "that has found"
+            )
+        cold = sensor.model_copy(update={"temperature": None})
+    check_unknown(cold, scene)
+    plan = Plan(cold, scene, settings, seed, sensor)
     begin(plan)
     return plan
+
+
+def _numbers(scene: Scene) -> tuple[float, float] | None:
+    """Return crosstalk that is known, 0 where there is none; None where it is not."""
+    first, second = scene.crosstalk_values or (0.0, 0.0)
+    if isinstance(first, float | int) and isinstance(second, float | int):
+        return float(first), float(second)
+    return None
 
 
 def begin(plan: Plan) -> CalibrationState:

@@ -127,8 +127,7 @@ class Calibrating:
     @classmethod
     def of(cls, plan: Plan, concluding: Conclude | None = None) -> "Calibrating":
         """Make one of a plan."""
-        first = begin(plan)
-        return cls(plan, plan.tracker(first.scene), concluding)
+        return cls(plan, plan.reader(), concluding)
 
     @property
     def first(self) -> CalibrationState:

@@ -24,7 +24,7 @@ from inference.self_calibration.state import (
     calibration_to_bytes,
 )
 from inference.tracking.settings import TrackingSettings
-from simulator.errors import InvalidInputError
+from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import parse_sensor
@@ -327,3 +327,56 @@ def test_readings_that_move_within_the_law_are_a_doubt() -> None:
     assert answered.any()
     # the shift is less than a standard deviation of what the intervals hold
     assert (np.abs(rows[late, 0] - truth[late]) <= 3 * rows[late, 1])[answered].all()
+
+
+def test_a_gain_that_follows_the_temperature_is_a_gain_of_each_frame() -> None:
+    """To the last bit, calibrations included."""
+    drift, kelvin = -0.003, 298.15 + np.linspace(-5.0, 15.0, N)
+    warm = parse_sensor(
+        SENSOR.model_dump(mode="json", exclude_none=True)
+        | {"temperature": {"gain_drift_per_k": drift, "reference_k": 298.15}}
+    )
+    plan = plan_of(warm, STATED, STILL, 7)
+    frames = course()
+    gain = 1.0 + drift * (kelvin - 298.15)
+    light = frames.readings - TRUTH
+    readings = light * gain[:, None] + TRUTH
+    told_gain = dataclasses.replace(frames, readings=readings, gain=gain)
+    told_kelvin = dataclasses.replace(frames, readings=readings, temperature_k=kelvin)
+    outcome = Outcome(known(TRUTH), "", False, GOOD)
+    expected = run(told_gain, told(outcome))
+    found = run(told_kelvin, told(outcome), cuts=(100, 431), stored=True, plan=plan)
+    np.testing.assert_array_equal(found[1], expected[1])
+    assert found[2] == expected[2]
+    assert found[0].gathered.frames is not None
+    assert found[0].gathered.frames.gain is not None
+    kelvin[3] = np.nan
+    with pytest.raises(InvalidInputError, match="/frames/temperature_k: entry 3 is not known"):
+        run(dataclasses.replace(told_kelvin, temperature_k=kelvin), None, plan=plan)
+    with pytest.raises(InvalidInputError, match="/frames/temperature_k: is missing"):
+        run(told_gain, None, plan=plan)
+
+
+@pytest.mark.parametrize(
+    ("temperature", "crosstalk", "refused"),
+    [
+        ({"delay_drift_s_per_k": 1e-12}, None, "takes delay_drift_s_per_k beside"),
+        ({"gain_drift_per_k": {"prior": "normal", "mean": 0, "sd": 0.1}}, None, "unknown"),
+        ({"delay_drift_s_per_k": 1e-12}, [0.001, 0.006], None),
+        ({"gain_drift_per_k": -0.003}, None, None),
+    ],
+)
+def test_which_temperature_coefficients_a_stream_takes(
+    temperature: dict[str, Any], crosstalk: list[float] | None, refused: str | None
+) -> None:
+    document = SENSOR.model_dump(mode="json", exclude_none=True) | {"temperature": temperature}
+    stated: dict[str, Any] = {"range_m": {"prior": "loguniform", "low": 0.1, "high": 5.0}}
+    scene = STATED
+    if crosstalk is not None:
+        scene = parse_scene(stated | {"crosstalk": crosstalk, "discrepancy": 0})
+    if refused is None:
+        plan = plan_of(parse_sensor(document), scene, STILL, 7)
+        assert plan.sensor == SENSOR
+        return
+    with pytest.raises(RefusedError, match=refused):
+        plan_of(parse_sensor(document), scene, STILL, 7)

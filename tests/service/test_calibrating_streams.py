@@ -21,6 +21,7 @@ from service.streams.followers import Calibrating
 from service.streams.forms import JsonLines
 from service.streams.kept import Kept
 from service.streams.lines import Line, Place
+from service.streams.model import model_of
 from service.streams.taking import take
 from tests.self_calibration.test_following import DRIFTING, SENSOR, STATED, course
 
@@ -189,3 +190,23 @@ async def test_what_cannot_be_calibrated_is_refused(
         response = await http.post("/v1/streams", json=SYSTEM | change)
         assert response.status_code == 422
         assert [error["pointer"] for error in response.json()["errors"]] == [pointer]
+
+
+async def test_a_line_without_the_temperature_that_a_gain_follows_is_an_error() -> None:
+    """Of that line alone."""
+    warm = SYSTEM["sensor"] | {"temperature": {"gain_drift_per_k": -0.003}}
+    follower = model_of(json.dumps(SYSTEM | {"sensor": warm, "seed": 7}).encode())
+    kelvin = [300.0, None, 301.0, 302.0, 303.0]
+    told = [
+        json.dumps(json.loads(line) | {"temperature_k": value}).encode()
+        for line, value in zip(lines(), kelvin, strict=False)
+    ]
+    given = [Line(raw, 0.0) for raw in told]
+    taken = take(follower, Place(follower.first), given, JsonLines(), Kept())
+    answers = [json.loads(line) for line in taken.answers]
+    pointers = [answer.get("error", {}).get("pointer") for answer in answers]
+    assert pointers == [None, "/temperature_k", None, None, None]
+    assert not any("assumptions" in answer for answer in answers)
+    again = take(follower, Place(follower.first), [given[0], *given[2:]], JsonLines(), Kept())
+    ranges = [json.loads(line)["range_m"] for line in again.answers]
+    assert ranges == [answer["range_m"] for answer in answers if "error" not in answer]
