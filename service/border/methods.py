@@ -75,8 +75,10 @@ class Methods:
             return
         scope["hybridtof.route"], methods = known
         method = scope["method"]
-        direct = self._direct.get((scope["path"], method))
+        direct = self._direct.get((scope["hybridtof.route"], method))
         if direct is not None:
+            match = direct.path_regex.match(scope["path"])
+            scope["path_params"] = {} if match is None else match.groupdict()
             response = await direct.answer(Request(scope, receive, send))
             await response(scope, receive, send)
             return

@@ -15,7 +15,7 @@ __all__ = ["DirectRoute"]
 
 
 class DirectRoute(APIRoute):
-    """A route without parameters in its path, whose answer `service.border.methods` asks for."""
+    """A route whose answer `service.border.methods` asks for; parameters of its path are texts."""
 
     async def answer(self, request: Request) -> Response:
         """Return the answer to a request.

@@ -25,6 +25,7 @@ from service.messages.streaming import (
 )
 from service.problems import problem_responses, response_of
 from service.requests import StreamRequest
+from service.routes.direct import DirectRoute
 from service.routes.resources import Cursor, LastEventId, answered, event_of, place_of
 from service.shared import client_of, shared_of
 from service.store.stream_record import StreamRecord
@@ -197,8 +198,28 @@ class _Answers(Response):
         yield await read_limited(request.stream(), declared, most, held, client_s)
 
 
-@router.post(
+class _Frames(DirectRoute):
+    """A batch of lines takes less time than FastAPI's way to it."""
+
+    async def answer(self, request: Request) -> Response:
+        """See `DirectRoute`."""
+        return await frames(request, request.path_params["stream_id"])
+
+
+async def frames(request: Request, stream_id: str) -> Response:
+    """Answer frames line by line; a number that was answered is answered as before.
+
+    By ``Accept`` a line has a message of ROS 2 or MAVLink in place of its numbers.
+    """
+    check_media_type(request.headers, _KINDS, LINES)
+    return _Answers(request, stream_id, message_for(",".join(request.headers.getlist("accept"))))
+
+
+router.add_api_route(
     "/{stream_id}/frames",
+    frames,
+    methods=["POST"],
+    route_class_override=_Frames,
     status_code=200,
     response_model=None,
     response_class=_Answers,
@@ -216,13 +237,6 @@ class _Answers(Response):
         }
     },
 )
-async def frames(request: Request, stream_id: str) -> Response:
-    """Answer frames line by line; a number that was answered is answered as before.
-
-    By ``Accept`` a line has a message of ROS 2 or MAVLink in place of its numbers.
-    """
-    check_media_type(request.headers, _KINDS, LINES)
-    return _Answers(request, stream_id, message_for(",".join(request.headers.getlist("accept"))))
 
 
 @router.websocket("/{stream_id}/live")
