@@ -194,7 +194,8 @@ async def test_what_cannot_be_calibrated_is_refused(
 
 async def test_a_line_without_the_temperature_that_a_gain_follows_is_an_error() -> None:
     """Of that line alone."""
-    warm = SYSTEM["sensor"] | {"temperature": {"gain_drift_per_k": -0.003}}
+    plain = SENSOR.model_dump(mode="json", exclude_none=True)
+    warm = plain | {"temperature": {"gain_drift_per_k": -0.003}}
     follower = model_of(json.dumps(SYSTEM | {"sensor": warm, "seed": 7}).encode())
     kelvin = [300.0, None, 301.0, 302.0, 303.0]
     told = [
