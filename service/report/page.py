@@ -76,8 +76,8 @@ $scenes
 <h2>How to read the tables</h2><p>$legend</p>
 <p>Dashed lines are what no method can do better: the Cramer-Rao bound of the noise with everything
 but the range known, and one division a frame ($division). Curves go over what a method lets one
-choose: frames of a sweep, hypotheses, frames and draws of a posterior. A point of few frames or
-sets may lie below the bound by chance.</p>
+choose: frames of a sweep, hypotheses, frames and draws of a posterior; bars are one standard
+error. A point of few frames or sets may lie below the bound by chance.</p>
 </body></html>
 """)
 _STAR = (

@@ -38,12 +38,24 @@ _SUMMARY = ("Bare object", "Unknown crosstalk", "Known wall behind", "Through th
 
 
 def _curves(rows: Sequence[Row]) -> dict[tuple[str, str, str], list[Row]]:
-    """Return the curves of a scene: rows of one method by its knob."""
+    """Return the curves of a scene: rows of one method by its knob.
+
+    Of a posterior, which has two knobs, those with the fewest draws: more are a curve of their own.
+    """
     curves: dict[tuple[str, str, str], list[Row]] = {}
     for row in rows:
         if row.scores is not None and row.scores.median_error and row.costs.frame_s:
             curves.setdefault((row.family, row.method, row.told), []).append(row)
-    return {key: sorted(curve, key=lambda row: row.order) for key, curve in curves.items()}
+    found: dict[tuple[str, str, str], list[Row]] = {}
+    for (family, method, told), curve in curves.items():
+        ordered = sorted(curve, key=lambda row: row.order)
+        few = [row for row in ordered if row.draws <= min(x.draws for x in ordered)]
+        found[family, method, told] = few
+        more = [row for row in ordered if row not in few]
+        if more:
+            alike = [row for row in few if row.frames_a_set == more[0].frames_a_set]
+            found[family, f"{method}, more draws", told] = [*alike, *more]
+    return found
 
 
 def _along(x: Sequence[float], y: Sequence[float]) -> list[tuple[float, float]]:
@@ -64,6 +76,10 @@ def _panel(axes: Axes, rows: Sequence[Row], least: float | None, division: float
         axes.loglog(
             x, y, "-o", color=colour, ms=5, lw=1.2, mfc="white" if told else colour, clip_on=False
         )
+        off = [(row.scores and row.scores.median_se) or 0.0 for row in curve]
+        # a bar that reached below zero would leave the picture
+        down = [min(o, 0.9 * e) for o, e in zip(off, y, strict=True)]
+        axes.errorbar(x, y, yerr=[down, off], fmt="none", ecolor=colour, lw=0.8, alpha=0.7)
         points += _along(x, y)
         name = f"{method} (misinformed)" if told else method
         at = int(np.argmin(y))

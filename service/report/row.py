@@ -5,7 +5,16 @@ from typing import Any
 
 from service.report.scores import Scores
 
-__all__ = ["Costs", "Row", "row_from"]
+__all__ = ["Costs", "Row", "order_of", "row_from"]
+
+
+# a posterior is lined up by its frames, and with as many by its draws
+_DRAWS_BELOW = 10_000
+
+
+def order_of(frames: int, draws: int) -> float:
+    """Return by what a posterior of so many frames and effective draws is lined up."""
+    return float(frames * _DRAWS_BELOW + draws)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,6 +85,16 @@ class Row:
     likelihood_calls: int | None = None
     effective_draws: float | None = None
     remark: str = ""
+
+    @property
+    def frames_a_set(self) -> int:
+        """Frames of one set, of a posterior; else 0."""
+        return int(self.order) // _DRAWS_BELOW if self.family == "posterior" else 0
+
+    @property
+    def draws(self) -> int:
+        """Effective draws wanted of a posterior; else 0."""
+        return int(self.order) % _DRAWS_BELOW if self.family == "posterior" else 0
 
     def to_json(self) -> dict[str, Any]:
         """Return plain JSON data."""

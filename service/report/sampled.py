@@ -15,7 +15,7 @@ from inference.posterior.settings import SamplerSettings
 from service.report.cells import Cell
 from service.report.clock import timed, traced
 from service.report.readings import Readings, sets_of
-from service.report.row import Costs, Row
+from service.report.row import Costs, Row, order_of
 from service.report.scores import Scores, crps_of_draws, scores_of
 from simulator.errors import HybridTofError
 
@@ -99,7 +99,7 @@ def _row(cell: Cell) -> Row:
         "posterior, weighted draws" if cell.family == "importance" else "posterior",
         "posterior",
         knob=f"{cell.frames} frames, {cell.value} draws",
-        order=float(cell.frames * 10_000 + cell.value),
+        order=order_of(cell.frames, cell.value),
         frames=cell.frames * cell.sets,
     )
 

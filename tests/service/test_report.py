@@ -26,7 +26,7 @@ from service.report.pace import Pace, Spent
 from service.report.page import markdown_page, page
 from service.report.picture import draw_scene, draw_summary, draw_terms, svg
 from service.report.readings import readings_of
-from service.report.row import Costs, Row, row_from
+from service.report.row import Costs, Row, order_of, row_from
 from service.report.run import Report, machine
 from service.report.scenes import SCENES, ReportScene
 from service.report.scores import Scores, crps_of_draws, crps_of_normals, scores_of_roots
@@ -273,6 +273,20 @@ def test_a_posterior_is_scored_and_counted() -> None:
     assert row.scores.coverage > 0.5
     assert row.costs.draws_per_s is not None
     assert row.costs.draws_per_s > 0
+
+
+def test_more_draws_of_a_posterior_are_a_curve_of_their_own() -> None:
+    scores, costs = Scores(1e-4, 1e-3, 0.9, 1e-4, 1.0, 0.0, 0.0, median_se=2e-4), Costs(1.0)
+    few = [(8, 400), (40, 400), (100, 400)]
+    rows = [
+        Row("x", "posterior", "posterior", order=order_of(*knobs), scores=scores, costs=costs)
+        for knobs in [*few, (40, 6400)]
+    ]
+    report = Report(machine(), 1, tuple(rows), {"x": 1e-5}, 3e-10, (), Spent())
+    (axes,) = draw_scene(report, "x").axes
+    curves = [line for line in axes.lines if line.get_marker() == "o"]
+    assert [np.size(curve.get_xdata()) for curve in curves] == [3, 2]
+    assert {"posterior", "posterior, more draws"} <= {text.get_text() for text in axes.texts}
 
 
 def scored(
