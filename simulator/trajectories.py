@@ -15,6 +15,7 @@ MAX_FRAMES = 1_000_000
 # of columns, which are long: their sizes are judged by what comes of them
 _Entry = Annotated[float, pydantic.Field(gt=0)]
 _BOUNDS = pydantic.Field(min_length=1, max_length=MAX_FRAMES, fail_fast=True)
+_ENDS = pydantic.Field(min_length=1, max_length=2)
 T = TypeVar("T", list[float] | None, list[bool] | None, list[float | None] | None)
 
 
@@ -70,6 +71,10 @@ class SampledTrajectory(Validated):
         sds = self.known_range_sd_m
         return None if sds is None else np.array(sds, dtype=np.float64)
 
+    def temperatures(self) -> NDArray[np.float64] | None:
+        """Return the temperatures [K], shape (n,), or None."""
+        return None if self.temperature_k is None else np.asarray(self.temperature_k)
+
 
 class RadialTrajectory(Validated):
     """Straight towards the sensor or away from it.
@@ -86,6 +91,10 @@ class RadialTrajectory(Validated):
         Time from the first to the last frame [s]; left out: 0.01 s a frame.
     known_range_sd_m : float, optional
         Standard deviation to which every range is known beside the readings [m].
+    temperature_k : list of float, optional
+        Temperature of a sensor that has temperature coefficients [K]: one of all frames, or those
+        of the first and the last, between which it changes evenly. Left out: that at which it was
+        calibrated.
     """
 
     kind: Literal["radial"] = "radial"
@@ -95,6 +104,7 @@ class RadialTrajectory(Validated):
     spacing: Literal["linear", "log"] = "linear"
     duration_s: Positive | None = None
     known_range_sd_m: Positive | None = None
+    temperature_k: Annotated[list[Positive], _ENDS] | None = None
 
     def ranges(self) -> NDArray[np.float64]:
         """Return the ranges [m], shape (n,)."""
@@ -112,6 +122,11 @@ class RadialTrajectory(Validated):
         """Return to what the ranges are known [m], shape (n,), or None."""
         sd = self.known_range_sd_m
         return None if sd is None else np.full(self.frames, sd)
+
+    def temperatures(self) -> NDArray[np.float64] | None:
+        """Return the temperatures [K], shape (n,), or None."""
+        given = self.temperature_k
+        return None if given is None else np.linspace(given[0], given[-1], self.frames)
 
 
 def _kind(value: object) -> str:

@@ -29,7 +29,7 @@ def temperatures(sensor: Sensor, trajectory: RadialTrajectory | SampledTrajector
     InvalidInputError
         At "/trajectory/temperature_k" where they are none of such a sensor.
     """
-    given = trajectory.temperature_k if isinstance(trajectory, SampledTrajectory) else None
+    given = trajectory.temperatures()
     if sensor.temperature is None:
         if given is not None:
             raise InvalidInputError.at(
@@ -38,10 +38,9 @@ def temperatures(sensor: Sensor, trajectory: RadialTrajectory | SampledTrajector
         return None
     if given is None:
         return np.full(trajectory.ranges().size, sensor.temperature.reference_k)
-    temperature = np.asarray(given)
-    if problems := temperature_problems(sensor.temperature, temperature):
+    if problems := temperature_problems(sensor.temperature, given):
         raise InvalidInputError(*problems).below("/trajectory")
-    return temperature
+    return given
 
 
 def warmed(

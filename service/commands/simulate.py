@@ -35,6 +35,14 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     parser.add_argument(
         "--known-range-sd-m", type=float, help="have frames tell their range to this sd [m]"
     )
+    parser.add_argument(
+        "--temperature-k",
+        type=float,
+        nargs="+",
+        metavar="K",
+        help="of a sensor with coefficients [K]: one of all frames, or those of the first and the "
+        "last, between which it changes evenly",
+    )
     parser.add_argument("--seed", type=int, help="left out: drawn and printed")
     parser.add_argument(
         "--output", type=Path, help="write the frames here too, as .csv, .ndjson or .json"
@@ -43,7 +51,15 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
 
 def _radial(args: argparse.Namespace) -> dict[str, Any]:
     """Trajectory from the options that were given."""
-    names = ("from_m", "to_m", "frames", "spacing", "duration_s", "known_range_sd_m")
+    names = (
+        "from_m",
+        "to_m",
+        "frames",
+        "spacing",
+        "duration_s",
+        "known_range_sd_m",
+        "temperature_k",
+    )
     given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
     return {"kind": "radial"} | given
 

@@ -147,6 +147,11 @@ def test_errors_name_file_and_field(
         ),
         (
             ("simulate", "--scene", scene, "--from-m", "1", "--to-m", "2", "--frames", "2",
+             "--temperature-k", "290", "310"),
+            "trajectory#/temperature_k: is given, and the sensor has no coefficients",
+        ),
+        (
+            ("simulate", "--scene", scene, "--from-m", "1", "--to-m", "2", "--frames", "2",
              "--seed", "-1"),
             "--seed: ",
         ),

@@ -13,7 +13,7 @@ from simulator.optics.electronics import Electronics
 from simulator.scene import parse_scene
 from simulator.sensor import Sensor, parse_sensor
 from simulator.simulate import simulate
-from simulator.trajectories import SampledTrajectory
+from simulator.trajectories import RadialTrajectory, SampledTrajectory
 from tests.optics.test_assembly import DISK, PULSE, SINE
 
 TINY = {"read": [1e-30, 1e-30]}
@@ -131,3 +131,21 @@ def test_trajectories_name_what_cannot_be_their_temperatures() -> None:
         with pytest.raises(InvalidInputError, match=words) as error:
             simulate(parse_sensor(sensor), scene, path, 1)
         assert error.value.problems[0].pointer == "/trajectory/temperature_k"
+
+
+@pytest.mark.parametrize(
+    ("told", "kelvin"), [([280.0, 330.0], [280.0, 305.0, 330.0]), ([310.0], [310.0] * 3)]
+)
+def test_a_sensor_warms_evenly_along_a_radial_way(told: list[float], kelvin: list[float]) -> None:
+    scene = parse_scene({"object": {"c0": 0.0769, "c1": -0.123, "c2": 0.0957}})
+    radial = RadialTrajectory(from_m=0.2, to_m=0.6, frames=3, temperature_k=told)
+    listed = SampledTrajectory(
+        range_m=radial.ranges().tolist(), time_s=radial.times().tolist(), temperature_k=kelvin
+    )
+    found, expected = (simulate(parse_sensor(WARM), scene, w, 1).frames for w in (radial, listed))
+    assert found.temperature_k is not None
+    assert found.temperature_k.tolist() == kelvin
+    np.testing.assert_array_equal(found.readings, expected.readings)
+    with pytest.raises(InvalidInputError, match="no coefficients") as error:
+        simulate(parse_sensor(SENSORS["pulsed"]), scene, radial, 1)
+    assert error.value.problems[0].pointer == "/trajectory/temperature_k"
