@@ -14,9 +14,10 @@ applied 20 s later.
 For each: calibrations asked for and taken, scenes given up, the share of frames with one range, and
 of them the median relative error, the share of 90 % intervals that hold the truth, their median
 width over the range; the share of all frames that have one range and hold it; both shares in the
-90 s after the wall has come; the longest stretch without an interval that holds, and that is sure
-and wrong (one range, five standard deviations off, no `misfit`); of frames without an object before
-the wall, the share with a range.
+90 s after the wall has come; the longest stretch without an interval that holds, when it begins and
+by how many standard deviations it is off at most; the longest that is sure and wrong (one range,
+five standard deviations off, no `misfit`); of frames without an object before the wall, the share
+with a range.
 """
 
 import argparse
@@ -187,6 +188,16 @@ def longest_s(wrong: NDArray[np.bool_]) -> float:
     return longest / HZ
 
 
+def where_longest(wrong: NDArray[np.bool_], off: Array) -> tuple[float, float]:
+    """Return when the longest stretch begins [s], and how far off its frames are at most [sd]."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], wrong, [False]]).astype(np.int8)))
+    if not edges.size:
+        return 0.0, 0.0
+    starts, ends = edges[::2], edges[1::2]
+    at = int(np.argmax(ends - starts))
+    return float(starts[at]) / HZ, float(off[starts[at] : ends[at]].max())
+
+
 def wrong_of(of: Course, said: Followed) -> NDArray[np.bool_]:
     """Tell where an answer is sure and wrong."""
     with np.errstate(invalid="ignore"):
@@ -205,6 +216,8 @@ def figures(of: Course, said: Followed) -> dict[str, float]:
         held = error <= _Z * said.sd_m
     taken = sum(event["kind"] == "taken" for event in said.events)
     ghosts = ~there & said.unique
+    missed = asked & ~held & ~said.misfit
+    since, off = where_longest(missed, error / said.sd_m)
     bare = ~there & (t < of.wall_s)
     behind = there & (t >= of.wall_s) & (t < of.wall_s + _BEHIND_S)
     return {
@@ -220,7 +233,9 @@ def figures(of: Course, said: Followed) -> dict[str, float]:
         "wall held": float(held[asked & behind].mean()) if (asked & behind).any() else 0.0,
         "wall right": float((held & asked)[behind & there].mean()) if behind.any() else 0.0,
         "misfit": float(said.misfit[there].mean()),
-        "missed s": longest_s(asked & ~held & ~said.misfit),
+        "missed s": longest_s(missed),
+        "missed at s": since,
+        "missed sd": off,
         "wrong s": longest_s(wrong_of(of, said)),
         "wrong": float(wrong_of(of, said)[there].mean()),
         "ghosts": float(ghosts[bare].mean()) if bare.any() else 0.0,

@@ -4,7 +4,16 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.self_calibration import HZ, course, draw, figures, followed, longest_s, wrong_of
+from benchmarks.self_calibration import (
+    HZ,
+    course,
+    draw,
+    figures,
+    followed,
+    longest_s,
+    where_longest,
+    wrong_of,
+)
 from inference.self_calibration.calibration import Asked, Outcome
 from simulator.sensor import Sensor
 
@@ -14,6 +23,10 @@ def test_the_longest_stretch() -> None:
     assert longest_s(wrong) == 0.0
     wrong[[3, 10, 11, 12, 99]] = True
     assert longest_s(wrong) == 3 / HZ
+    off = np.arange(100.0)
+    assert where_longest(wrong, off) == (10 / HZ, 12.0)
+    assert where_longest(~wrong, off) == (13 / HZ, 98.0)
+    assert where_longest(np.zeros(3, dtype=bool), off) == (0.0, 0.0)
 
 
 def test_a_short_course_is_followed_counted_and_drawn(tmp_path: Path) -> None:
