@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import sqlalchemy as sa
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.pool import ConnectionPoolEntry
 
 from service.errors import StoreError
 from service.store.database import brief, engine_of, is_sqlite, ready
@@ -71,5 +72,10 @@ class Transactions:
             raise StoreError(message) from error
 
     def close(self) -> None:
-        """Give connections back."""
+        """End connections: those that a thread still uses when it gives them back."""
+        sa.event.listen(self.engine, "checkin", _end)
         self.engine.dispose()
+
+
+def _end(_: object, entry: ConnectionPoolEntry) -> None:
+    entry.close()
