@@ -12,7 +12,7 @@ help: ## Show the targets
 
 # --no-compile: Python makes what is imported as it is imported, a tenth of all that is installed
 $(READY): pyproject.toml requirements/dev.txt
-	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if (3, 11) <= v <= (3, 13) else "hybridtof needs Python 3.11 to 3.13; name one with make PYTHON=...")'
+	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if (3, 11) <= v <= (3, 14) else "hybridtof needs Python 3.11 to 3.14; name one with make PYTHON=...")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --require-hashes -r requirements/dev.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
@@ -107,8 +107,8 @@ lowest: ## Run the tests that take seconds with the lowest versions that pyproje
 	uv pip install --quiet --python out/lowest/bin/python --no-deps --no-build-isolation --editable .
 	NUMBA_CACHE_DIR=$(CURDIR)/out/lowest/kernels out/lowest/bin/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow" $(LOWEST)
 
-versions: ## Run the tests that take seconds on Python 3.11 to 3.13 (needs uv, and finds or fetches these)
-	for version in 3.11 3.12 3.13; do \
+versions: ## Run the tests that take seconds on Python 3.11 to 3.14 (needs uv, and finds or fetches these)
+	for version in 3.11 3.12 3.13 3.14; do \
 		made=out/python-$$version; python=$$made/bin/python; \
 		uv venv --quiet --clear --python $$version $$made && \
 		uv pip install --quiet --python $$python --require-hashes --requirements requirements/dev.txt && \
