@@ -51,6 +51,7 @@ LEGEND = (
     "How often intervals of fits and posteriors hold the truth is told by many more sets: "
     "docs/coverage.md and docs/calibration.md."
 )
+_TINY = 1e-9  # a share whose zeros nobody counts
 _WIDTHS = (32, 24, 4, 9, 9, 7, 9, 10, 8, 9, 9, 9, 9, 8, 9)
 _HEADS = (
     "method",
@@ -76,9 +77,11 @@ def _share(value: float | None) -> str:
 
 
 def percent(value: float | None) -> str:
-    """Return a share in percent to two digits, without an exponent."""
+    """Return a share in percent to two digits, without an exponent; of a tiny one only that."""
     if value is None:
         return "-"
+    if 0.0 < value < _TINY:
+        return "below 0.0000001 %"
     text = np.format_float_positional(
         100 * value, precision=2, unique=False, fractional=False, trim="-"
     )

@@ -30,6 +30,7 @@ from service.report.row import Costs, Row, order_of, row_from
 from service.report.run import Report, machine
 from service.report.scenes import SCENES, ReportScene
 from service.report.scores import Scores, crps_of_draws, crps_of_normals, scores_of_roots
+from service.report.table import percent, with_error
 from service.report.taking import method_to_take
 from service.report.terms import TermCost, operations_of
 from service.report.together import together
@@ -319,6 +320,15 @@ def test_the_method_to_take_is_cheap_near_the_best_and_shown_to_be_honest() -> N
         "Object unknown: too few sets to tell of free, k (0.00005 %, 100 ms a frame)"
     )
     assert method_to_take(rows[1:3]) == ""
+
+
+def test_shares_can_be_read() -> None:
+    assert percent(0.0123) == "1.2 %"
+    assert percent(4.2e-5) == "0.0042 %"
+    assert percent(2e-16) == "below 0.0000001 %"
+    assert percent(0.0) == "0 %"
+    assert with_error(0.012345, 0.00067) == "1.234 ± 0.067 %"
+    assert with_error(0.012345, None) == "1.2 %"
 
 
 def test_intervals_are_put_together_by_sets_and_data_count_once() -> None:
