@@ -134,7 +134,8 @@ def test_exceptions_come_back() -> None:
     with ProcessPool(1) as pool:
         with pytest.raises(Exception, match="/a: is wrong"):
             pool.submit(_refuse).result()
-        with pytest.raises(Exception, match="pickle"):
+        # the words before that differ between versions of Python
+        with pytest.raises(Exception, match="local object"):
             pool.submit(lambda: None).result()
         with pytest.raises(TypeError):
             pool.submit(_pid, _=1)

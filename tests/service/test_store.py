@@ -3,6 +3,7 @@
 import sqlite3
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +31,22 @@ def clock() -> Clock:
     return Clock()
 
 
+_opened: list[SqlJobStore] = []
+
+
 def store_at(path: Path, clock: Clock | None = None, **limits: Any) -> SqlJobStore:
     retention = Retention(**{"jobs": 100} | limits)
-    return SqlJobStore(f"sqlite:///{path}/jobs.sqlite", retention, 0.05, clock or Clock())
+    store = SqlJobStore(f"sqlite:///{path}/jobs.sqlite", retention, 0.05, clock or Clock())
+    _opened.append(store)
+    return store
+
+
+@pytest.fixture(autouse=True)
+def every_store_is_closed() -> Iterator[None]:
+    """Else whatever test runs when the garbage is collected is told of an open database."""
+    yield
+    while _opened:
+        _opened.pop().close()
 
 
 def new(name: str, **fields: Any) -> NewJob:
