@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import collapsed_density
-from inference.posterior.answer.posterior import ParameterSummary
+from inference.posterior.answer.posterior import ParameterSummary, Posterior
 from inference.posterior.infer import infer
 from inference.posterior.sampling.diagnostics import effective_sample_size
 from inference.posterior.settings import SamplerSettings
@@ -52,7 +52,8 @@ class Verdict:
     Attributes
     ----------
     outcome : str
-        held, wrong, flagged, refused, or without reference.
+        held, widened (by what it owes to the law of the ranges: its log densities are held),
+        wrong, flagged, refused, or without reference.
     precision : float
         Largest variance of the prior over that of the posterior, in prior's coordinates.
     worst : float
@@ -128,6 +129,8 @@ def held(case: PosteriorCase, target_ess: int = 200, max_seconds: float = 60.0) 
         return Verdict("refused", precision, math.nan, str(error))
     if not posterior.verdict.converged:
         return Verdict("flagged", precision, math.nan, "; ".join(posterior.verdict.reasons))
+    if any("its interval is widened" in (row.reason or "") for row in posterior.identifiability):
+        return _widened(case, exact, posterior)
     off = {
         f"{name}, {what}": error
         for k, (name, summary) in enumerate(posterior.parameters.items())
@@ -135,6 +138,23 @@ def held(case: PosteriorCase, target_ess: int = 200, max_seconds: float = 60.0) 
     }
     what, worst = max(off.items(), key=lambda pair: pair[1])
     return Verdict("held" if worst <= 6 else "wrong", precision, worst, what)
+
+
+def _widened(case: PosteriorCase, exact: Reference, posterior: Posterior) -> Verdict:
+    """Hold an answer that owes to the law of the ranges, by which it is widened and says so.
+
+    Its log densities are those of the posterior that was drawn.
+    """
+    density = collapsed_density(case.sensor, case.scene, case.frames)
+    drawn, heights = posterior.draws.log_density, density(exact.z)
+    heights = np.where(np.isfinite(heights), heights, 0.0)  # of no weight
+    mean = exact.weights @ heights
+    spread = math.sqrt(exact.weights @ (heights - mean) ** 2)
+    off = abs(float(drawn.mean()) - float(mean)) / spread
+    single = drawn.shape[0] == 1
+    size = next(iter(posterior.parameters.values())).ess_bulk
+    off *= math.sqrt(size if single else effective_sample_size(drawn))
+    return Verdict("widened" if off <= 6 else "wrong", exact.precision, off, "log density")
 
 
 def errors_of(
