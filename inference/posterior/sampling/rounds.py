@@ -2,10 +2,12 @@
 
 Adaptive multiple importance sampling (Cornuet et al. 2012): a draw of any round is weighted by the
 mixture of all proposals (Owen and Zhou 2000), so that what one of them leaves out another holds.
-Besides a map, every round has a law around the place where the target exceeds the mixture most
-(incremental mixtures, Raftery and Bao 2010): no polynomial follows a narrow second mode. Members of
-populations that came from the prior begin it, and are what it is held to. The draws that count are
-made at the end, from proposals that are fitted no more.
+One of two maps is fitted to draws that are weighted to a small power of the target: along a thin
+ridge, where populations come slowly, it reaches beyond them. Besides, every round has a law around
+the place where the target exceeds the mixture most (incremental mixtures, Raftery and Bao 2010): no
+polynomial follows a narrow second mode. Members of populations that came from the prior begin it,
+and are what it is held to. The draws that count are made at the end, from proposals that are fitted
+no more.
 """
 
 import dataclasses
@@ -34,6 +36,9 @@ Array = NDArray[np.float64]
 
 _DRAWS = 1000  # of a round
 _LOCAL_SHARE = 0.25  # of them, from around the place that the others hold least of
+_WIDE_SHARE = 0.35  # of them, from a map fitted to draws of
+_WIDE = 0.15  # this power of the target
+_FEWEST, _LAWS = 6, 3  # rounds, and laws of each
 _NEIGHBOURS = 10  # for every unknown, that such a law is fitted to; or
 _NEAR = 0.05  # of all draws
 _LONGEST = 4  # times as many may count before the draws are spent
@@ -192,6 +197,7 @@ def in_rounds(
         count = int(min(max(_SPARE * target_ess / share, _LEAST), most))
         over = calls + _DRAWS + count > most
         settled = pareto_k_hat(log_weights) < _SURE and _worst(beyond, ends) < _MOST_DISSENT
+        settled = settled and len(pool.laws) > _FEWEST * _LAWS
         if over or (settled and count <= _LONGEST * _LEAST):
             count = max(min(count, most - calls), _LEAST)
             draws = draw_weighted(density, pool.blend, rng, count)
@@ -200,10 +206,14 @@ def in_rounds(
             found = Rounds(proposal, draws, _worst(excess > most_drawn, ends), calls)
             if over or (found.trusted and draws.ess >= target_ess):
                 return found
-        sample = _sample(pool.z[ends[-1] :], log_weights, members[beyond], len(members), rng)
-        proposal, local = _fitted(proposal, sample, density), int(_LOCAL_SHARE * _DRAWS)
-        laws = (proposal, _around(proposal, pool.z, pool.log_ratios))
-        pool = _with(pool, laws, (_DRAWS - local, local), density, rng)
+        drawn = pool.z[ends[-1] :]
+        sample = _sample(drawn, log_weights, members[beyond], len(members), rng)
+        flatter = _flatter(log_weights, pool.target[ends[-1] :])
+        wide = _fitted(proposal, _sample(drawn, flatter, members[:0], 1, rng), density)
+        proposal = _fitted(proposal, sample, density)
+        local, far = int(_LOCAL_SHARE * _DRAWS), int(_WIDE_SHARE * _DRAWS)
+        laws = (proposal, wide, _around(proposal, pool.z, pool.log_ratios))
+        pool = _with(pool, laws, (_DRAWS - local - far, far, local), density, rng)
         calls += _DRAWS
 
 
@@ -232,6 +242,12 @@ def _mixed(each: Array, counts: tuple[int, ...]) -> Array:
 
 def _fitted(proposal: Proposal, sample: Array, density: CollapsedDensity) -> Proposal:
     return dataclasses.replace(proposal, transport=fit_map(sample, reparametrisation_of(density)))
+
+
+def _flatter(log_weights: Array, target: Array) -> Array:
+    """Return log weights to a small power of the target, of draws with weights to itself."""
+    at = np.where(np.isfinite(log_weights), target, 0.0)
+    return np.asarray(log_weights + (_WIDE - 1.0) * at)
 
 
 def _effective(log_weights: Array) -> float:

@@ -27,7 +27,7 @@ from inference.posterior.streams import Stream
 __all__ = ["SetOutTask", "TemperTask", "merge", "tasks"]
 
 _SHARE = 0.5  # of what the populations took, that importance sampling behind them may take
-_MOST_DRAWS = (8000, 40_000)  # but so many at least, and at most
+_MOST_DRAWS = (12_000, 40_000)  # but so many at least, and at most
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
