@@ -69,6 +69,13 @@ class WeightedDraws:
         """Importance sample size."""
         return float(1.0 / np.sum(self.weights**2))
 
+    @property
+    def that_count(self) -> "WeightedDraws":
+        """Those of any weight: the rest lie far out, where squares of parameters overflow."""
+        some = self.weights > 0
+        z, log_density = self.z[some], self.log_density[some]
+        return dataclasses.replace(self, z=z, log_density=log_density, weights=self.weights[some])
+
 
 def generalised_pareto(excess: Array) -> tuple[float, float]:
     """Estimate shape and scale of excesses over a threshold (Zhang and Stephens 2009).

@@ -200,7 +200,7 @@ def in_rounds(
         settled = settled and len(pool.laws) > _FEWEST * _LAWS
         if over or (settled and count <= _LONGEST * _LEAST):
             count = max(min(count, most - calls), _LEAST)
-            draws = draw_weighted(density, pool.blend, rng, count)
+            draws = draw_weighted(density, pool.blend, rng, count).that_count
             calls += count
             most_drawn = np.max(draws.log_density - pool.blend.log_density(draws.z))
             found = Rounds(proposal, draws, _worst(excess > most_drawn, ends), calls)
