@@ -133,11 +133,11 @@ def test_a_thin_ridge_is_followed_beyond_the_populations(seed: int) -> None:
     thin = 0.01
 
     def log_first(x: np.ndarray) -> np.ndarray:
-        return np.where(x < 0, -0.5 * x**2, -x)
+        return np.asarray(np.where(x < 0, -0.5 * x**2, -x))
 
     def target(z: np.ndarray) -> np.ndarray:
         x, y = np.asarray(z).T
-        return log_first(x) - 0.5 * ((y - 0.3 * x**2) / thin) ** 2
+        return np.asarray(log_first(x) - 0.5 * ((y - 0.3 * x**2) / thin) ** 2)
 
     grid = np.linspace(-5.0, 30.0, 200_001)
     mass = np.exp(log_first(grid))
