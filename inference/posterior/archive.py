@@ -106,10 +106,17 @@ def unpack(*pieces: bytes) -> tuple[dict[str, Any], Arrays]:
             for name, array in arrays.items()
         }
         meta = meta["meta"] if "continued" in meta else meta
-    return meta, {
-        name: found[0] if len(found) == 1 else np.concatenate(found)
-        for name, found in parts.items()
-    }
+    return meta, {name: _joined(found) for name, found in parts.items()}
+
+
+def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    """Join what was appended; the order in memory stays, which decides last bits of sums."""
+    first, *others = parts
+    added = [part for part in others if part.size]
+    if not added:
+        return first
+    joined = np.concatenate([first, *added])
+    return np.asfortranarray(joined) if first.flags.fnc else joined
 
 
 # frozen dataclasses of arrays, numbers and one another; anything else is a mistake
