@@ -84,13 +84,15 @@ def reference_of(density: Density, natural: Density, d: int) -> Reference | None
     Returns
     -------
     Reference or None
-        None where two quadratures differ on the finest grid too.
+        None where two quadratures differ on the finest grid too, or no grid meets any density.
     """
     for points in _POINTS:
         if d == 1:
             fine, coarse = (_along_one(density, count * points[1]) for count in (2, 4))
         else:
             fine, coarse = (_along_two(density, outer, points) for outer in (0, 1))
+        if not (len(fine[0]) and len(coarse[0])):
+            continue
         one, other = (_reference(natural, *nodes) for nodes in (fine, coarse))
         off = max(
             float(np.max(np.abs(one.mean - other.mean) / one.sd)) / _OFF_MEAN,
@@ -139,6 +141,8 @@ def _along_two(density: Density, outer: int, points: tuple[int, int]) -> tuple[A
 
     lines = integrated(exactly, tops_of(roughly, 1, points[0]), 1)
     held = [k for k, x in enumerate(lines.place) if float(x) in seen]
+    if not held:
+        return np.empty((0, 2)), np.empty(0)
     inner = [seen[float(lines.place[k])] for k in held]
     x = np.repeat(lines.place[held], [len(y) for y, _ in inner])
     y = np.concatenate([y for y, _ in inner])

@@ -193,6 +193,8 @@ def _panels(heights: Heights, tops: Tops, n: int) -> tuple[Numbers, Array, Array
 
 def integrated(heights: Heights, tops: Tops, n: int) -> Nodes:
     """Integrate n lines over all panels about their tops, halved where two rules differ."""
+    if not tops.line.size:
+        return Nodes(np.empty(0, np.intp), np.empty(0), np.empty(0), np.empty(0))
     line, low, high = _panels(heights, tops, n)
     settled: list[tuple[Numbers, Array, Array, Array]] = []
     most, total, error = np.full(n, -np.inf), np.zeros(n), np.zeros(n)

@@ -56,6 +56,23 @@ def test_a_narrow_mode_beside_a_wide_one_has_its_mass() -> None:
     assert exact.weights[exact.z[:, 0] > 0].sum() == pytest.approx(0.01, rel=0.02)
 
 
+def test_lines_without_any_density_and_no_density_at_all() -> None:
+    """Beyond a hard edge there is nothing: the normal law on a disk, and on none."""
+
+    def disk(radius: float) -> Reference | None:
+        def heights(z: Array) -> Array:
+            squares = (z**2).sum(axis=1)
+            return np.where(squares < radius**2, -0.5 * squares, -np.inf)
+
+        return reference_of(heights, lambda z: z, 2)
+
+    exact = disk(1.5)
+    assert exact is not None
+    mass = 2 * math.pi * (1 - math.exp(-(1.5**2) / 2))
+    assert exact.log_evidence == pytest.approx(math.log(mass), abs=0.01)
+    assert disk(0.0) is None
+
+
 def test_what_one_way_alone_has_is_no_reference() -> None:
     """A mode in a plain, a sixtieth of the grid wide: it is found along one unknown only."""
     assert _two_modes(1e-3) is None
