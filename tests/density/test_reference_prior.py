@@ -15,8 +15,6 @@ from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
 from simulator.errors import InvalidInputError
 from simulator.frames import Frames
-from simulator.object_model import object_flux
-from simulator.readings import covariance
 from simulator.scene import parse_scene
 from simulator.sensor import PulsedSensor, Sensor, parse_sensor
 from simulator.simulate import simulate
@@ -41,45 +39,51 @@ def density_of(sensor: Sensor, scene: dict[str, Any], frames: Frames) -> Collaps
     return collapsed_density(sensor, parse_scene(scene), frames)
 
 
-def readings_at(sensor: Sensor, u: float, scene: dict[str, Any]) -> tuple[Array, Array]:
-    """Mean readings and the object's part, from the formulas."""
-    r = math.exp(u)
-    flux = object_flux(r, C[0] * C[2], C[0], C[1])
-    hidden = 0.0
+def readings_at(sensor: Sensor, u: Array, scene: dict[str, Any]) -> tuple[Array, Array]:
+    """Mean readings and the object's part at ranges exp(u), shape (2, n), from the formulas."""
+    r = np.exp(u)
+    flux = C[0] * C[2] / (r**2 * (r**2 + C[1] * r + C[0]))
+    hidden, one = np.zeros_like(r), np.ones_like(r)
     if "background" in scene:
         c0, c1 = WALL["shadow"]["c0"], WALL["shadow"]["c1"]
         hidden = WALL["strength"] * (r**2 + c1 * r) / (r**2 + c1 * r + c0)
     if isinstance(sensor, PulsedSensor):
-        own = flux * np.array([r / sensor.r0, 1.0])
-        behind = hidden * np.array([WALL["distance_m"] / sensor.r0, 1.0])
+        own = flux * np.stack([r / sensor.r0, one])
+        behind = hidden * np.stack([WALL["distance_m"] / sensor.r0 * one, one])
     else:
         turn = sensor.wave_number
-        own = flux * np.array([math.cos(turn * r), math.sin(turn * r)])
-        phase = turn * WALL["distance_m"]
-        behind = hidden * np.array([math.cos(phase), math.sin(phase)])
-    return own + behind + np.array(CROSSTALK), own
+        own = flux * np.stack([np.cos(turn * r), np.sin(turn * r)])
+        phase = turn * WALL["distance_m"] * one
+        behind = hidden * np.stack([np.cos(phase), np.sin(phase)])
+    return own + behind + np.array(CROSSTALK)[:, None], own
+
+
+def covariances(sensor: Sensor, mean: Array, own: Array) -> Array:
+    """Covariance matrices of the readings, shape (n, 2, 2), from the contract's words."""
+    noise = sensor.noise
+    shot = noise.shot * np.abs(mean)
+    matrix = np.zeros((mean.shape[1], 2, 2))
+    for j in range(2):
+        matrix[:, j, j] = noise.read[j] ** 2 + shot[j]
+    if isinstance(sensor, PulsedSensor):
+        # the late photons are part of the whole
+        matrix[:, 0, 1] = matrix[:, 1, 0] = shot.min(axis=0)
+    light = noise.relative * own.T
+    return np.asarray(matrix + light[:, :, None] * light[:, None, :])
 
 
 def log_densities(sensor: Sensor, scene: dict[str, Any], reading: Array, u: Array) -> Array:
     """One frame's log density, plus that of the root of one plus a 25th of its information."""
-    noise, pulsed, out = sensor.noise, isinstance(sensor, PulsedSensor), np.empty(u.size)
-    for k, at in enumerate(u):
-        mean, own = readings_at(sensor, at, scene)
-        ahead, behind = (readings_at(sensor, at + h, scene)[0] for h in (1e-5, -1e-5))
-        slope = (ahead - behind) / 2e-5
-        v1, v2, c = covariance(
-            noise.read,
-            noise.shot or None,
-            noise.relative or None,
-            pulsed,
-            (mean[0], mean[1]),
-            (own[0], own[1]),
-        )
-        matrix = np.array([[v1, c], [c, v2]])
-        e, information = reading - mean, slope @ np.linalg.solve(matrix, slope)
-        out[k] = -0.5 * (e @ np.linalg.solve(matrix, e) + math.log(np.linalg.det(matrix)))
-        out[k] += 0.5 * math.log1p(information / LEAST_INFORMATION) - math.log(2 * math.pi)
-    return out
+    mean, own = readings_at(sensor, u, scene)
+    ahead, behind = (readings_at(sensor, u + h, scene)[0] for h in (1e-5, -1e-5))
+    slope, e = ((ahead - behind) / 2e-5).T, reading - mean.T
+    matrix = covariances(sensor, mean, own)
+    square, information = (
+        np.einsum("nj,nj->n", side, np.linalg.solve(matrix, side[:, :, None])[:, :, 0])
+        for side in (e, slope)
+    )
+    log_density = -0.5 * (square + np.log(np.linalg.det(matrix))) - math.log(2 * math.pi)
+    return np.asarray(log_density + 0.5 * np.log1p(information / LEAST_INFORMATION))
 
 
 def by_quadrature(sensor: Sensor, scene: dict[str, Any], reading: Array) -> float:
