@@ -1,17 +1,28 @@
 """All that a tracker remembers between frames, in memory and as bytes."""
 
 import dataclasses
+import math
 import struct
 import zipfile
 import zlib
 
-from inference.posterior.archive import pack, unpack
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.posterior.archive import unpack
 from inference.tracking.hypotheses import COUNT, Hypotheses
 from simulator.errors import InvalidInputError
 
 __all__ = ["BROKEN", "TrackState", "check_state", "state_from_bytes", "state_to_bytes"]
 
-_KIND = "track state 3"
+_MARK = b"track state 4\n"
+# that, a checksum of all that follows, and lengths: of the signature, of the rows, of a mean, of
+# both sides of a root, of the numbers
+_HEAD = struct.Struct("<14sI6I")
+_CHECKED_FROM = len(_MARK) + 4
+_NUMBER = np.dtype("<f8")
+# how it was written before: a numpy archive, which takes as long as a hundred frames
+_ARCHIVED = "track state 3"
 # what reading an archive raises where bytes are missing or changed
 BROKEN = (
     ValueError,
@@ -44,12 +55,17 @@ class TrackState:
 
 
 def state_to_bytes(state: TrackState) -> bytes:
-    """Write a state as a numpy archive without pickle; every bit survives."""
-    return pack({"kind": _KIND, "signature": state.signature}, state.hypotheses._asdict())
+    """Write a state; every bit survives."""
+    of, name = state.hypotheses, state.signature.encode()
+    body = b"".join([name, *(np.asarray(array, dtype=_NUMBER).tobytes() for array in of)])
+    lengths = len(name), *of.x.shape, *of.X.shape[1:], *of.numbers.shape
+    head = _HEAD.pack(_MARK, 0, *lengths)
+    checked = zlib.crc32(body, zlib.crc32(head[_CHECKED_FROM:]))
+    return _HEAD.pack(_MARK, checked, *lengths) + body
 
 
 def state_from_bytes(data: bytes) -> TrackState:
-    """Read what `state_to_bytes` wrote.
+    """Read what `state_to_bytes` wrote, today or as an archive.
 
     Raises
     ------
@@ -57,13 +73,28 @@ def state_from_bytes(data: bytes) -> TrackState:
         At "/state" where the bytes are something else.
     """
     try:
-        meta, arrays = unpack(data)
-        if meta["kind"] != _KIND:
-            raise ValueError(meta["kind"])
-        hypotheses = Hypotheses(*(arrays[name] for name in Hypotheses._fields))
-        return TrackState(hypotheses, meta["signature"])
+        return _read(data) if data.startswith(_MARK) else _read_archive(data)
     except BROKEN as error:
         raise InvalidInputError.at("/state", "is not the state of a tracker") from error
+
+
+def _read(data: bytes) -> TrackState:
+    _, checked, name, rows, mean, n, columns, numbers = _HEAD.unpack_from(data)
+    if zlib.crc32(memoryview(data)[_CHECKED_FROM:]) != checked:
+        raise ValueError("bytes have changed")
+    at, arrays = _HEAD.size + name, []
+    for shape in ((rows, mean), (rows, n, columns), (rows,), (numbers,)):
+        array: NDArray[np.float64] = np.frombuffer(data, _NUMBER, math.prod(shape), at)
+        arrays.append(array.reshape(shape).astype(np.float64))
+        at += array.nbytes
+    return TrackState(Hypotheses(*arrays), data[_HEAD.size : _HEAD.size + name].decode())
+
+
+def _read_archive(data: bytes) -> TrackState:
+    meta, arrays = unpack(data)
+    if meta["kind"] != _ARCHIVED:
+        raise ValueError(meta["kind"])
+    return TrackState(Hypotheses(*(arrays[n] for n in Hypotheses._fields)), meta["signature"])
 
 
 def check_state(state: TrackState, like: TrackState) -> None:

@@ -40,7 +40,13 @@ _CHANGE = (
         holder=sa.bindparam("holder"),
         held_until=sa.bindparam("held_until"),
     )
-    .returning(STREAM.c.kept_bytes)
+)
+# locked where a database does not lock as a whole
+_STAND = (
+    sa.select(STREAM.c.id, STREAM.c.number, STREAM.c.kept_bytes)
+    .where(STREAM.c.id.in_(sa.bindparam("streams", expanding=True)))
+    .order_by(STREAM.c.id)
+    .with_for_update()
 )
 _SIZES = (
     sa.select(STREAM_ANSWER.c.sequence, STREAM_ANSWER.c.size)
@@ -193,41 +199,70 @@ class StreamStore:
         """
         now = self._clock()
         done = [False] * len(changes)
+        # in one order everywhere, so that two processes never wait for each other
+        left = sorted(range(len(changes)), key=lambda at: changes[at].id)
         with self._database.write() as connection:
-            # in one order everywhere, so that two processes never wait for each other
-            for at in sorted(range(len(changes)), key=lambda at: changes[at].id):
-                done[at] = self._apply(connection, changes[at], now)
+            while left:
+                first = {changes[at].id: at for at in reversed(left)}
+                for at in self._apply(connection, changes, list(first.values())[::-1], now):
+                    done[at] = True
+                left = [at for at in left if first[changes[at].id] != at]
         return done
 
-    def _apply(self, connection: sa.Connection, change: StreamChange, now: float) -> bool:
-        size = len(change.answers)
-        of_stream = {"stream": change.id, "old": change.sequence - self._window}
-        changed = connection.execute(
-            _CHANGE,
-            of_stream
-            | {
-                "before": change.number,
-                "after": change.number + 1,
-                "state": change.state,
+    def _apply(
+        self,
+        connection: sa.Connection,
+        changes: Sequence[StreamChange],
+        which: Sequence[int],
+        now: float,
+    ) -> list[int]:
+        """Apply some of the changes, of a stream each; which of them still could be."""
+        ids = [changes[at].id for at in which]
+        stand = {row.id: row for row in connection.execute(_STAND, {"streams": ids}).all()}
+        done = [
+            at
+            for at in which
+            if (row := stand.get(changes[at].id)) is not None and row.number == changes[at].number
+        ]
+        if not done:
+            return done
+        some = [changes[at] for at in done]
+        connection.execute(_CHANGE, [self._row(change, now) for change in some])
+        old = [{"stream": c.id, "old": c.sequence - self._window} for c in some]
+        connection.execute(_FORGET, old)
+        answered = [
+            {
+                "stream_id": change.id,
                 "sequence": change.sequence,
-                "counts": json.dumps(change.counts),
-                "last": change.last,
-                "added": size,
-                "now": now,
-                "holder": change.holder,
-                "held_until": now + _LEASE_S if change.holder else 0.0,
-            },
-        )
-        kept = changed.scalar_one_or_none()
-        if kept is None:
-            return False
-        connection.execute(_FORGET, of_stream)
-        if size:
-            row = {"stream_id": change.id, "sequence": change.sequence, "size": size}
-            connection.execute(_INSERT, row | {"bytes": change.answers})
-        if kept > _MOST_KEPT:
-            self._forget_most(connection, change)
-        return True
+                "size": len(change.answers),
+                "bytes": change.answers,
+            }
+            for change in some
+            if change.answers
+        ]
+        if answered:
+            connection.execute(_INSERT, answered)
+        for change in some:
+            if stand[change.id].kept_bytes + len(change.answers) > _MOST_KEPT:
+                self._forget_most(connection, change)
+        return done
+
+    def _row(self, change: StreamChange, now: float) -> dict[str, Any]:
+        """Return what a change sets, and where."""
+        return {
+            "stream": change.id,
+            "old": change.sequence - self._window,
+            "before": change.number,
+            "after": change.number + 1,
+            "state": change.state,
+            "sequence": change.sequence,
+            "counts": json.dumps(change.counts),
+            "last": change.last,
+            "added": len(change.answers),
+            "now": now,
+            "holder": change.holder,
+            "held_until": now + _LEASE_S if change.holder else 0.0,
+        }
 
     @staticmethod
     def _forget_most(connection: sa.Connection, change: StreamChange) -> None:

@@ -6,6 +6,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from inference.posterior.archive import pack
 from inference.tracking.hypotheses import COUNT
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import state_from_bytes, state_to_bytes
@@ -45,3 +46,24 @@ def test_bytes_with_something_missing_or_changed_are_refused() -> None:
         # either it is noticed, or it did not matter
         with contextlib.suppress(InvalidInputError):
             state_from_bytes(bytes(changed))
+
+
+def test_states_that_were_written_as_archives_are_read_to_the_last_bit() -> None:
+    sensor, scene = sensor_of(SNR_100), scene_of(PLATE)
+    model = tracker(sensor, scene)
+    frames = frames_of(np.full((2, 2), 3e-3))
+    state, _ = step(model, model.first, frames)
+    of, name = state.hypotheses, state.signature
+    archived = pack({"kind": "track state 3", "signature": name}, of._asdict())
+    for data in (archived, state_to_bytes(state)):
+        found = state_from_bytes(data)
+        assert found.signature == name
+        for one, other in zip(found.hypotheses, of, strict=True):
+            assert (one.shape, one.dtype, one.tobytes()) == (
+                other.shape,
+                other.dtype,
+                other.tobytes(),
+            )
+    other_kind = pack({"kind": "track state 2", "signature": name}, of._asdict())
+    with pytest.raises(InvalidInputError, match="/state"):
+        state_from_bytes(other_kind)
