@@ -98,12 +98,17 @@ class Producer:
         Whether stale lines are dropped.
     holder : str or None
         This process, where the client goes on sending.
+    held_elsewhere : callable
+        Tells of a record whether another process's client sends to the stream.
     changed : callable
         Is called after every change.
     quiet_s : float or None
         How long a client may send nothing [s].
     calibrations : Calibrations or None
         Where the stream asks for them.
+    seen : bool
+        Whether the record was read for this client. One that is remembered shows itself as the
+        present one where a change of it is taken.
     """
 
     store: StreamStore
@@ -115,9 +120,11 @@ class Producer:
     place: Place
     latest: bool
     holder: str | None
+    held_elsewhere: Callable[[StreamRecord], bool]
     changed: Callable[[], None]
     quiet_s: float | None = None
     calibrations: Calibrations | None = None
+    seen: bool = True
 
     async def run(self, source: AsyncIterator[list[bytes | None]], send: Send) -> None:
         """Answer all lines.
@@ -172,7 +179,10 @@ class Producer:
             taken, change = await anyio.to_thread.run_sync(
                 self._taken, place, lines, limiter=self.limiter
             )
-            if not taken.changed or await self.writer.write(change):
+            # what came before is answered from the store, by a stream that is there
+            done = await self.writer.write(change) if taken.changed else self.seen
+            if done:
+                self.seen = True
                 self._count(taken)
                 self._concluded()  # what is asked for from now on begins at once
                 return taken
@@ -222,9 +232,9 @@ class Producer:
         record = self.store.get(self.record.id)
         if record is None:
             raise NotFoundError("the stream was deleted")
-        if record.holder not in (None, self.holder) and self.store.held(record):
+        if self.held_elsewhere(record):
             raise ConflictError("another client sends to this stream")
-        self.record = record
+        self.record, self.seen = record, True
         self.model = model_of(record.request)
         self.place = place_of(record, self.model)
 

@@ -62,8 +62,8 @@ class Streams:
         self._watched: weakref.WeakValueDictionary[str, asyncio.Event] = (
             weakref.WeakValueDictionary()
         )
-        # where streams stood when their last client was done, by their last change
-        self._places: OrderedDict[str, tuple[int, Place, Follower]] = OrderedDict()
+        # where streams stood when their last client was done
+        self._places: OrderedDict[str, tuple[StreamRecord, Place, Follower]] = OrderedDict()
         self._limiter: anyio.CapacityLimiter | None = None
 
     async def create(self, raw: bytes, client: str) -> StreamRecord:
@@ -126,6 +126,7 @@ class Streams:
         await self.get(stream_id, client)
         if not await asyncio.to_thread(self._store.delete, stream_id):
             raise NotFoundError("there is no stream of this id")
+        self._places.pop(stream_id, None)
         if self._calibrations is not None:
             self._calibrations.forget(stream_id)
         self._announce(stream_id)
@@ -191,7 +192,8 @@ class Streams:
         GoneError
             Where it has expired, or its state is of another version.
         """
-        record = await self.get(stream_id, client)
+        known = None if lasting else self._remembered(stream_id, client)
+        record = known or await self.get(stream_id, client)
         if self._store.expired(record):
             raise GoneError("the stream has expired: make a new one")
         if stream_id in self._producing or self._held_elsewhere(record):
@@ -212,9 +214,11 @@ class Streams:
                 place=place,
                 latest=request_of(record.request).policy == "latest",
                 holder=self._holder if lasting else None,
+                held_elsewhere=self._held_elsewhere,
                 changed=lambda: self._announce(stream_id),
                 quiet_s=quiet_s,
                 calibrations=self._calibrations,
+                seen=known is None,
             )
             try:
                 yield producer
@@ -227,22 +231,33 @@ class Streams:
             self._producing.discard(stream_id)
             self._traces.producers.dec()
 
+    def _remembered(self, stream_id: str, client: str) -> StreamRecord | None:
+        """Return the record of a stream as it stood here, where it need not be read again.
+
+        Should it stand elsewhere by now its next change is not taken, and it is read then.
+        """
+        record = self._places[stream_id][0] if stream_id in self._places else None
+        if record is None or record.client != client or self._store.expired(record):
+            return None
+        return record
+
     async def _standing(self, record: StreamRecord) -> tuple[Place, Follower]:
         """Return where a stream stands, and what follows it.
 
-        Reading a state takes as long as a hundred frames, and so does going to another thread.
+        Reading a state takes as long as some frames, and so does going to another thread.
         """
-        number, place, model = self._places.pop(record.id, (None, None, None))
+        known, place, model = self._places.pop(record.id, (None, None, None))
         if model is None:
             model = await asyncio.to_thread(model_of, record.request)
-        if place is None or number != record.number:
+        if place is None or known is None or known.number != record.number:
             place = place_of(record, model)
         return place, model
 
     def _remember(self, producer: Producer) -> None:
-        if isinstance(producer.place.state, TrackState):  # others have histories, and are large
-            stands = producer.record.number, producer.place, producer.model
-            self._places[producer.record.id] = stands
+        # others have histories, and are large
+        if isinstance(producer.place.state, TrackState):
+            record = producer.record
+            self._places[record.id] = record, producer.place, producer.model
             while len(self._places) > _REMEMBERED:
                 self._places.popitem(last=False)
 

@@ -22,7 +22,7 @@ from service.app import create_app
 from service.border.keys import new_key, write_keys
 from service.border.traces import Traces
 from service.cli import main
-from service.errors import BusyError, ConflictError, GoneError
+from service.errors import BusyError, ConflictError, GoneError, NotFoundError
 from service.service_settings import ServiceSettings
 from service.store.stream_record import StreamChange, StreamRecord
 from service.store.stream_store import StreamStore
@@ -255,6 +255,44 @@ async def test_who_breaks_off_leaves_the_stream_to_others(store: StreamStore) ->
             await producer.run(cut_lines(chunks()), away)
     async with other.producing(made_one.id, "") as producer:
         assert producer.place.sequence == 1
+
+
+async def test_batches_by_two_processes_are_one_stream(
+    store: StreamStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A process need not read what it wrote, and sees what another one wrote or deleted."""
+    one, other = (Streams(store, Traces(dict), 1) for _ in range(2))
+    stream_id = (await one.create(json.dumps(system()).encode(), "")).id
+    reads, get = [], store.get
+    monkeypatch.setattr(store, "get", lambda name: (reads.append(name), get(name))[1])
+
+    async def batch(streams: Streams, lines: list[bytes]) -> list[dict[str, Any]]:
+        answers: list[bytes] = []
+
+        async def whole() -> AsyncIterator[bytes]:
+            yield b"\n".join(lines)
+
+        async def send(body: bytes) -> None:
+            answers.append(body)
+
+        async with streams.producing(stream_id, "", lasting=False) as producer:
+            await producer.run(cut_lines(whole()), send)
+        return plain([json.loads(line) for line in b"".join(answers).splitlines()])
+
+    found = await batch(one, LINES[:2]) + await batch(one, LINES[2:4])
+    assert len(reads) == 1
+    found += await batch(other, LINES[4:6]) + await batch(one, LINES[6:8])
+    found += await batch(one, LINES[8:])
+    assert len(reads) == 3
+    model = model_of(json.dumps(system()).encode())
+    lines = [Line(raw, 0.0) for raw in LINES]
+    quiet = take(model, Place(model.first), lines, JsonLines(), Kept())
+    assert found == plain([json.loads(answer) for answer in quiet.answers])
+    assert await batch(one, LINES[8:10]) == found[8:10]
+    await other.delete(stream_id, "")
+    for lines_again in (LINES[8:10], lines_of(14)[12:]):
+        with pytest.raises(NotFoundError):
+            await batch(one, lines_again)
 
 
 async def flood(address: str, path: str, http: httpx.AsyncClient) -> tuple[int, dict[str, Any]]:
