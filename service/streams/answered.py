@@ -4,6 +4,7 @@ import functools
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -13,32 +14,51 @@ from numpy.typing import NDArray
 from inference.estimates import Status
 from service.problems import describe
 from service.streams.lines import lines_in
-from service.streams.said import MARK, OWN, Said, said_from_bytes
+from service.streams.said import MARKS, OWN, Said, said_from_bytes
 from simulator.errors import HybridTofError
 
 __all__ = ["answers_in", "encoded", "error_of", "more_of", "text_of"]
 
 _STATUS = {int(status): status.name.lower().encode() for status in Status}
-_FLAGS = {False: b"false", True: b"true"}
+_FLAGS: dict[int, bytes] = {False: b"false", True: b"true"}
 
 
 def text_of(said: Said) -> bytes:
     """Return the answers to frames as JSON, each with a line end; what is nan is null.
 
     The texts of all numbers are made in one go and laid between those that answers have in common:
-    an object a frame costs several times as much.
+    an object a frame costs several times as much. What is the same in all answers is such a text.
     """
-    n, (own, latency) = len(said.sequence), (said.table[:8], said.table[8])
-    texts = _texts(own.ravel())
-    columns = [texts[k * n : (k + 1) * n] for k in range(len(own))]
+    n, columns = len(said.sequence), _own_columns(said.table[:OWN])
     form, hypotheses = _hypotheses(said)
-    kinds = map(_STATUS.__getitem__, said.status.tolist())
-    misfit = map(_FLAGS.__getitem__, said.misfit.tolist())
+    kinds = _texts_of(said.status, _STATUS)
+    misfit = _texts_of(said.misfit, _FLAGS)
     rows = [_texts(said.sequence), _texts(said.time_s), kinds, *columns[:5], *hypotheses]
-    rows += [*columns[5:], misfit, _texts(latency)]
+    rows += [*columns[5:8], misfit, columns[8]]
     if said.more:
         rows.append([text.encode() for text in said.more])
-    return _laid(_template(form, bool(said.more)), n, rows)
+    alike = tuple(row if isinstance(row, bytes) else b"%b" for row in rows)
+    template = _template(form, bool(said.more)) % alike
+    return _laid(template, n, [row for row in rows if not isinstance(row, bytes)])
+
+
+def _texts_of(values: NDArray[Any], names: Mapping[int, bytes]) -> Iterable[bytes] | bytes:
+    """Return the names of values, or the one that all have."""
+    found = values.tolist()
+    if found.count(found[0]) == len(found):
+        return names[found[0]]
+    return map(names.__getitem__, found)
+
+
+def _own_columns(table: NDArray[np.float64]) -> list[list[bytes] | bytes]:
+    """Return the texts of rows of numbers, or the one of all numbers of a row."""
+    first = table[:, :1]
+    same = ((table == first) | (np.isnan(table) & np.isnan(first))).all(axis=1)
+    # equal, and written in another way
+    same &= ~((first[:, 0] == 0.0) & np.signbit(table).any(axis=1))
+    one, n = _texts(first.ravel()), table.shape[1]
+    many = iter(_texts(table[~same].ravel()) if not same.all() else ())
+    return [one[k] if alike else list(islice(many, n)) for k, alike in enumerate(same.tolist())]
 
 
 def _laid(template: bytes, n: int, rows: Sequence[Iterable[bytes]]) -> bytes:
@@ -102,7 +122,7 @@ def more_of(also: Sequence[dict[str, Any] | None] | None) -> tuple[str, ...]:
 
 def answers_in(kept: bytes) -> dict[int, bytes]:
     """Return answers by their numbers, from what a store keeps of them: numbers, or lines."""
-    if kept.startswith(MARK):
+    if kept.startswith(MARKS):
         said = said_from_bytes(kept)
         return dict(zip(said.sequence.tolist(), lines_in(text_of(said)), strict=True))
     return {orjson.loads(line)["sequence"]: line for line in kept.splitlines()}

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from inference.tracking.track import Track
 
-__all__ = ["MARK", "OWN", "Said", "said_from_bytes", "said_of", "said_to_bytes"]
+__all__ = ["MARKS", "OWN", "Said", "said_from_bytes", "said_of", "said_to_bytes"]
 
-MARK = b"\0"
-"""The first byte of what `said_to_bytes` writes, with which no JSON text begins."""
+MARKS = (b"\1", b"\0")
+"""First bytes of what `said_to_bytes` writes, and wrote; no JSON text begins with them."""
 
 OWN = 9
 """Rows of `Said.table` that every frame has, before those of its hypotheses."""
@@ -98,23 +98,45 @@ def said_of(
 
 
 def said_to_bytes(said: Said) -> bytes:
-    """Return it as bytes for a store."""
+    """Return it as bytes for a store.
+
+    Of a row of the table that is the same in all frames one number is kept, and of hypotheses those
+    that there are.
+    """
     text = "\n".join(said.more).encode()
-    head = _HEAD.pack(MARK, len(said.sequence), len(said.table), len(text))
-    return b"".join([head, *(array.tobytes() for array in said[:-1]), text])
+    bits = said.table.view(np.int64)
+    same = (bits == bits[:, :1]).all(axis=1)
+    head = _HEAD.pack(MARKS[0], len(said.sequence), len(said.table), len(text))
+    parts = [head, *(array.tobytes() for array in said[:5]), same.tobytes()]
+    for row, (values, alike) in enumerate(zip(said.table, same.tolist(), strict=True)):
+        parts.append((values[:1] if alike else values[_present(said.hypotheses, row)]).tobytes())
+    return b"".join([*parts, text])
 
 
 def said_from_bytes(data: bytes) -> Said:
-    """Read what `said_to_bytes` wrote."""
-    _, n, rows, length = _HEAD.unpack_from(data)
+    """Read what `said_to_bytes` wrote, today or with all numbers of the table."""
+    mark, n, rows, length = _HEAD.unpack_from(data)
     at = _HEAD.size
     arrays: list[NDArray[Any]] = []
     for kind in (np.int64, np.float64, np.uint8, np.bool_, np.uint8):
         arrays.append(np.frombuffer(data, dtype=kind, count=n, offset=at))
         at += arrays[-1].nbytes
-    table = np.frombuffer(data, dtype=np.float64, count=rows * n, offset=at).reshape(rows, n)
-    at += table.nbytes
+    sequence, time_s, status, misfit, hypotheses = arrays
+    table = np.full((rows, n), np.nan)
+    same = np.zeros(rows, dtype=np.bool_)
+    if mark == MARKS[0]:
+        same = np.frombuffer(data, dtype=np.bool_, count=rows, offset=at)
+        at += same.nbytes
+    for row, alike in enumerate(same.tolist()):
+        which = _present(hypotheses, row) if mark == MARKS[0] and not alike else slice(None)
+        size = 1 if alike else table[row, which].size
+        table[row, which] = np.frombuffer(data, dtype=np.float64, count=size, offset=at)
+        at += 8 * size
     text = data[at : at + length].decode()
     more = tuple(text.split("\n")) if length else ()
-    sequence, time_s, status, misfit, hypotheses = arrays
     return Said(sequence, time_s, status, misfit, hypotheses, table, more)
+
+
+def _present(hypotheses: NDArray[np.uint8], row: int) -> Any:
+    """Return which frames have a number in a row of the table; nan stands in all others."""
+    return slice(None) if row < OWN else hypotheses > (row - OWN) // 3

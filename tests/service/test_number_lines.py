@@ -2,6 +2,7 @@
 
 import json
 import math
+import struct
 from typing import Any
 
 import numpy as np
@@ -114,13 +115,16 @@ def _said(draw: st.DrawFn) -> Said:
     values = draw(st.lists(number, min_size=n * (OWN + 3 * most), max_size=n * (OWN + 3 * most)))
     stamp = st.none() | st.fixed_dictionaries({"stamp": st.text(max_size=3) | st.just("100 %b")})
     more = draw(st.none() | st.lists(stamp, min_size=n, max_size=n))
+    table = np.array(values).reshape(OWN + 3 * most, n)
+    rows = draw(st.lists(st.booleans(), min_size=len(table), max_size=len(table)))
+    table[rows] = table[rows, :1]
     return Said(
         np.arange(n, dtype=np.int64) + draw(st.sampled_from([0, 7, 2**53 - 10])),
         np.array(values[:n]),
         np.array(draw(st.lists(st.integers(0, 3), min_size=n, max_size=n)), dtype=np.uint8),
         np.array(draw(st.lists(st.booleans(), min_size=n, max_size=n)), dtype=np.bool_),
         np.array(counts, dtype=np.uint8),
-        np.array(values).reshape(OWN + 3 * most, n),
+        table,
         more_of(more),
     )
 
@@ -133,3 +137,8 @@ def test_a_batch_of_answers_is_an_object_a_frame(said: Said) -> None:
     kept = said_to_bytes(said)
     assert text_of(said_from_bytes(kept)) == text_of(said)
     assert list(answers_in(kept).values()) == lines
+    # as it was written before: all numbers of the table
+    text = "\n".join(said.more).encode()
+    head = struct.pack("<cIIQ", b"\0", len(lines), len(said.table), len(text))
+    before = b"".join([head, *(array.tobytes() for array in said[:-1]), text])
+    assert list(answers_in(before).values()) == lines

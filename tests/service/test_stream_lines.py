@@ -20,7 +20,7 @@ from service.streams.forms import JsonLines
 from service.streams.kept import Kept
 from service.streams.lines import WINDOW, Line, Place
 from service.streams.room import STALE_S, Room
-from service.streams.said import MARK
+from service.streams.said import MARKS
 from service.streams.taking import take
 from service.strict_json import decode
 from simulator.errors import InvalidInputError
@@ -300,7 +300,7 @@ def test_kept_numbers_are_the_same_answers(model: Tracker) -> None:
     lines = [frame(n, stamp=None if n % 2 else {"at": "ä\n"}) for n in range(1, 40)]
     batch = [Line(raw, time.perf_counter()) for raw in lines]
     taken = take(Plain(model), Place(model.first), batch, JsonLines(), Kept())
-    assert taken.kept.startswith(MARK)
+    assert taken.kept.startswith(MARKS)
     assert list(answers_in(taken.kept).values()) == taken.answers
     assert list(answers_in(taken.kept)) == list(range(1, 40))
     plain = [Line(frame(n), 0.0) for n in range(1, 40)]

@@ -264,7 +264,12 @@ async def test_batches_by_two_processes_are_one_stream(
     one, other = (Streams(store, Traces(dict), 1) for _ in range(2))
     stream_id = (await one.create(json.dumps(system()).encode(), "")).id
     reads, get = [], store.get
-    monkeypatch.setattr(store, "get", lambda name: (reads.append(name), get(name))[1])
+
+    def counted(name: str) -> StreamRecord | None:
+        reads.append(name)
+        return get(name)
+
+    monkeypatch.setattr(store, "get", counted)
 
     async def batch(streams: Streams, lines: list[bytes]) -> list[dict[str, Any]]:
         answers: list[bytes] = []
