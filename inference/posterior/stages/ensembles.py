@@ -51,7 +51,8 @@ def new_ensembles(
     for given, seed in zip(starts, seeds.spawn(len(starts)), strict=True):
         _, first = np.unique(given, axis=0, return_index=True)
         coords = given[np.sort(first)][:walkers]
-        if np.linalg.matrix_rank(coords - coords[:1]) < coords.shape[1]:
+        # of no points at all, numpy before 2.4.5 cannot tell a rank
+        if coords.size and np.linalg.matrix_rank(coords - coords[:1]) < coords.shape[1]:
             coords = coords[:0]  # walkers on a plane never leave it
         rng = np.random.default_rng(seed.spawn(1)[0])
         log_prob = density(coords) if len(coords) else np.empty(0)
