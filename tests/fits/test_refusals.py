@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from inference.estimate import estimate
-from inference.estimates import Status
+from inference.estimates import Estimates, Status
 from inference.fits.answer.counts import frames_needed
 from inference.fits.likelihood.unknowns import unknowns_of
 from inference.identifiability.experiment import Experiment, information
@@ -23,7 +23,10 @@ TRUTH = {"object": OBJECT, "crosstalk": [0.002, 0.01]}
 
 
 def refusal(sensor: Sensor, scene: dict[str, Any], frames: Frames, name: str = "joint_fit") -> str:
-    found = estimate(sensor, exact_scene(scene), frames, [name])
+    return said_by(estimate(sensor, exact_scene(scene), frames, [name]), name)
+
+
+def said_by(found: Estimates, name: str = "joint_fit") -> str:
     assert not found.results
     return next(item.reason for item in found.left_out if item.name == name)
 
@@ -204,7 +207,7 @@ def test_noise_is_not_taken_for_the_shape_of_an_object_that_hardly_moves(
             assert np.mean(off < 2.0) > 0.8
             assert np.isfinite(off).mean() > 0.9
             continue
-        said = refusal(sensor, {}, shown)
+        said = said_by(found)
         assert ("does not move" if span[1] < 0.7 + 1e-9 else "follow the noise") in said
         # an empty scene shows nothing of an object
         assert "object_present" not in said
