@@ -30,9 +30,9 @@ from inference.tracking.readings_table import (
     nuisance_at,
     object_at,
 )
-from inference.tracking.roots import UNIT, add_root, solve
-from inference.tracking.second_order import add_products
-from inference.tracking.shared_error import NOT_SHARED, follow, straighten
+from inference.tracking.roots import UNIT, Root, add_root, solve
+from inference.tracking.second_order import add_products, slope_variance
+from inference.tracking.shared_error import NOT_SHARED, bring_anchor, follow, straighten
 from inference.tracking.square_root import Linear, update
 from simulator.compiled import compiled
 
@@ -87,10 +87,27 @@ def _of_derivatives(
 
 @borrowed
 @compiled
+def _noise_of(
+    of: Hypotheses, tangent: Tangent, gain: float, prior: Prior, table: ReadingsTable
+) -> Root:
+    """Return the root of the covariance of a frame's own errors at a mode."""
+    t, noise = tangent, UNIT
+    if not table.noise.plain:
+        m1, m2 = t.value1 + prior.added.offset1, t.value2 + prior.added.offset2
+        o1, o2 = object_at(t.u, table)
+        noise = noise_root(m1, m2, gain * o1, gain * o2, table.noise)
+    if learns_crosstalk(of) and not prior.position.born:
+        noise = add_products(noise, t.u, gain, math.sqrt(1.0 / prior.position.precision), table)
+    return noise
+
+
+@borrowed
+@compiled
 def _of_readings(
     of: Hypotheses,
     row: int,
     tangent: Tangent,
+    noise: Root,
     frame: TrackedFrame,
     prior: Prior,
     table: ReadingsTable,
@@ -99,12 +116,6 @@ def _of_readings(
     """Linearise readings at a mode; ``nuisance`` is filled with their nuisance Jacobian."""
     x, t, gain = of.x, tangent, frame.gain
     m1, m2 = t.value1 + prior.added.offset1, t.value2 + prior.added.offset2
-    noise = UNIT
-    if not table.noise.plain:
-        o1, o2 = object_at(t.u, table)
-        noise = noise_root(m1, m2, gain * o1, gain * o2, table.noise)
-    if learns_crosstalk(of) and not prior.position.born:
-        noise = add_products(noise, t.u, gain, math.sqrt(1.0 / prior.position.precision), table)
     i, part = cell_of(t.u, table)
     for j in range(nuisance.shape[1]):
         g1, g2 = nuisance_at(i, part, j, table)
@@ -180,9 +191,14 @@ def learn(
     at = u if position.born else position.centre + (1.0 - prior.share) * (u - position.centre)
     value1, value2, d1, d2 = mean_at(at, table)
     tangent = Tangent(u, at, gain * value1, gain * value2, gain * d1, gain * d2)
+    noise = UNIT if table.by_rate else _noise_of(of, tangent, gain, prior, table)
     shares = learns_crosstalk(of) and not position.born
     shared = NOT_SHARED
     if shares:
+        pull1, pull2 = solve(noise, tangent.slope1, tangent.slope2)
+        told = pull1 * tangent.slope1 + pull2 * tangent.slope2
+        unsure = slope_variance(at, gain, tangent.slope1, tangent.slope2, table)
+        bring_anchor(of, row, at, prior.share, told, unsure)
         shared = straighten(of, row, gain, tangent.slope1, tangent.slope2, table)
     if position.born:
         begin(of, row, u, prior.rate.sd)
@@ -192,7 +208,7 @@ def learn(
     if table.by_rate:
         readings = _of_derivatives(of, row, tangent, frame, prior)
     else:
-        readings = _of_readings(of, row, tangent, frame, prior, table, scratch.nuisance)
+        readings = _of_readings(of, row, tangent, noise, frame, prior, table, scratch.nuisance)
     surprise = update(of, row, readings, scratch)
     if shares:
         follow(of, row, shared, gain, table)

@@ -12,7 +12,7 @@ from inference.tracking.readings_table import ReadingsTable, cell_of, nuisance_a
 from inference.tracking.roots import Root, add_factor
 from simulator.compiled import compiled
 
-__all__ = ["add_products"]
+__all__ = ["add_products", "slope_variance"]
 
 # Standard deviations at which a nuisance parameter is taken. It is the same in all frames, so that
 # its square does not average out as that of noise does: nineteen of twenty scenes are within two.
@@ -46,3 +46,26 @@ def add_products(root: Root, u: float, gain: float, sd: float, table: ReadingsTa
         next1, next2 = nuisance_at(i, 1.0, j, table)
         root = add_factor(root, size * (next1 - here1), size * (next2 - here2))
     return root
+
+
+@compiled
+def slope_variance(
+    u: float, gain: float, slope1: float, slope2: float, table: ReadingsTable
+) -> float:
+    """Return the variance that nuisance parameters give the derivatives of the readings along u.
+
+    Parameters
+    ----------
+    u, gain, table
+        As for `add_products`.
+    slope1, slope2 : float
+        The derivatives, relative to whose squares it is.
+    """
+    i, _ = cell_of(u, table)
+    size, square = _TAKEN_AT * gain / table.step, 0.0
+    for j in range(nuisance_count(table)):
+        here1, here2 = nuisance_at(i, 0.0, j, table)
+        next1, next2 = nuisance_at(i, 1.0, j, table)
+        square += (size * (next1 - here1)) ** 2 + (size * (next2 - here2)) ** 2
+    whole = slope1 * slope1 + slope2 * slope2
+    return square / whole if whole > 0.0 else 0.0

@@ -9,7 +9,9 @@ what follows the crosstalk's error and the rest. Along the rest the curve is wha
 common part it is straight, its tangent taken at an anchor. What an update corrects, and what a rate
 moves that may be noise, turns the tangent with the errors of the readings kept: no knowledge comes
 from it. What is motion for certain turns it with the errors of the crosstalk kept, and that is how
-motion tells range and crosstalk apart.
+motion tells range and crosstalk apart. It is certain where the rate is known, and where a frame
+shows it well beyond what the frame itself may err: of an object far slower than it may be the rate
+is never known, and its motion taken for corrections would turn crosstalk that stays.
 """
 
 from typing import NamedTuple
@@ -27,9 +29,18 @@ from inference.tracking.hypotheses import (
 from inference.tracking.readings_table import ReadingsTable, mean_at
 from simulator.compiled import compiled
 
-__all__ = ["NOT_SHARED", "Shared", "certainty", "follow", "shared_part", "straighten"]
+__all__ = [
+    "NOT_SHARED",
+    "Shared",
+    "bring_anchor",
+    "certainty",
+    "follow",
+    "shared_part",
+    "straighten",
+]
 
 _MOST = 0.5  # of the common part that a change of tangent may take up
+_CERTAIN = 9.0  # variances of its error at which half of a motion counts as certain
 _SINGULAR = 1e-14  # of a determinant against the product of its diagonal
 
 
@@ -93,6 +104,34 @@ def certainty(of: Hypotheses, row: int) -> float:
     """Return how much of a rate is motion rather than noise, from 0 to 1."""
     square = of.x[row, V] * of.x[row, V]
     return square / (square + variance_of(of, row, V)) if square > 0.0 else 0.0
+
+
+@compiled
+def bring_anchor(
+    of: Hypotheses, row: int, at: float, share: float, told: float, unsure: float
+) -> None:
+    """Bring the anchor to where a frame shows that the object has moved, as far as that is certain.
+
+    Parameters
+    ----------
+    of, row : Hypotheses, int
+        The hypothesis as predicted; its anchor is changed in place.
+    at : float
+        log r at the frame's mode, less what that corrects of the common part.
+    share : float
+        Share of the variance of u that is common.
+    told : float
+        What the frame tells of log r: one over its variance.
+    unsure : float
+        Relative variance of the derivatives by which the readings tell it.
+    """
+    x = of.x
+    own = (1.0 - share) * variance_of(of, row, U)
+    error = own / (1.0 + own * told)
+    moved = at - x[row, ANCHOR]
+    square = moved * moved
+    if square > 0.0:
+        x[row, ANCHOR] += square / (square + _CERTAIN * (error + unsure * square)) * moved
 
 
 @borrowed

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 from inference.fits.techniques.registry import FITS
 from inference.realtime.registry import TECHNIQUES
+from service.report.readings import learns_crosstalk
 from service.report.scenes import ReportScene
 
 __all__ = ["FULL", "QUICK", "Cell", "Effort", "cells_of"]
@@ -32,6 +33,8 @@ class Effort:
         Effective draws wanted of a posterior of 40 frames, on the scenes of the quick report.
     hypotheses : tuple of int
         That a tracker keeps.
+    tracks : int
+        Tracks of a tracker that learns crosstalk: the frames of one err together.
     """
 
     batch: int
@@ -42,6 +45,7 @@ class Effort:
     posterior_sets: tuple[tuple[int, int], ...]
     draws: tuple[int, ...]
     hypotheses: tuple[int, ...]
+    tracks: int = 6
 
 
 QUICK = Effort(2000, 60, 6, (40, 400), (10, 40), ((40, 2), (10, 1)), (), (1, 12))
@@ -122,8 +126,10 @@ def cells_of(scene: ReportScene, effort: Effort) -> Iterator[Cell]:
             sweeps = min(max(_SWEPT // frames, 1), _SWEEPS)
             seconds = 0.1 + 5e-4 * effort.alone
             yield Cell(scene, "single", name, frames, effort.alone, sweeps, seconds)
+    tracks = effort.tracks if learns_crosstalk(scene) else 1
     for value in effort.hypotheses:
-        yield Cell(scene, "tracker", "", effort.batch, value, 1, 0.1 + 2e-5 * effort.batch)
+        seconds = 0.1 + 2e-5 * effort.batch * (1 + tracks / 4)
+        yield Cell(scene, "tracker", "", effort.batch, value, tracks, seconds)
     wall = scene.free.background
     # these leave a posterior no shape that draws can be weighted to
     hard = wall is not None and wall.shadow != "object" and wall.shadow.c0 is None

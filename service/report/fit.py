@@ -12,7 +12,7 @@ from service.report.cells import Cell
 from service.report.clock import peak_bytes, timed
 from service.report.readings import Readings, sets_of, told_of_object
 from service.report.row import Costs, Row
-from service.report.said import in_words, said
+from service.report.said import said
 from service.report.scores import scores_of_roots
 
 __all__ = ["measure_fit"]
@@ -40,9 +40,7 @@ def measure_fit(cell: Cell, seed: int) -> Row:
             for made in sets
         ]
         served = [found.results[0] if found.results else None for found, _ in pairs]
-        reasons = {
-            item.name: in_words(item.reason) for found, _ in pairs for item in found.left_out
-        }
+        reasons = {item.name: item.reason for found, _ in pairs for item in found.left_out}
         reason = reason or reasons.get(name, "")
         if not any(served):
             continue

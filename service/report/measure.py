@@ -1,10 +1,12 @@
 """Error and cost of one cell of the report."""
 
+import dataclasses
 from collections.abc import Callable
 
 from service.report.cells import Cell
 from service.report.fit import measure_fit
 from service.report.row import Row
+from service.report.said import in_words
 from service.report.sampled import measure_posterior
 from service.report.single import measure_single
 from service.report.tracked import measure_tracker
@@ -35,4 +37,5 @@ def measure(cell: Cell, seed: int) -> Row:
     Row
         Without scores, and with the reason, where the method cannot serve the scene.
     """
-    return _BY[cell.family](cell, seed)
+    row = _BY[cell.family](cell, seed)
+    return dataclasses.replace(row, remark=in_words(row.remark))

@@ -10,17 +10,24 @@ from numpy.typing import NDArray
 from service.report.scenes import ReportScene
 from simulator.catalogue import plate_scene
 from simulator.frames import Frames
-from simulator.optics.assembly import OpticalScene, read
+from simulator.optics.assembly import OpticalScene, modulation_of, read
 from simulator.optics.electronics import Electronics
 from simulator.optics.motion import series
 from simulator.optics.parametrisation import fit_object
 from simulator.parameters import parameters_of
 from simulator.scene import Scene, parse_scene
-from simulator.sensor import Sensor
+from simulator.sensor import PulsedSensor, Sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
 
-__all__ = ["Readings", "err_together", "readings_of", "sets_of", "told_of_object"]
+__all__ = [
+    "Readings",
+    "err_together",
+    "learns_crosstalk",
+    "readings_of",
+    "sets_of",
+    "told_of_object",
+]
 
 Array = NDArray[np.float64]
 
@@ -147,12 +154,16 @@ def _optical(scene: ReportScene, frames: int, seed: int, empty: int) -> Readings
 @functools.cache
 def _calibrated(plate: str, sensor: Sensor) -> tuple[float, float, float]:
     """Return c0, c1, c2 as a calibration at 40 distances without noise finds them."""
-    made, light, ranges = plate_scene(plate), [], []
+    made, light, ranges, modulation = plate_scene(plate), [], [], modulation_of(sensor)
     for distance in np.geomspace(*_CALIBRATED_M, 40).tolist():
         body = OpticalScene(surfaces=(made.plate(distance),))
         found = read(body, sensor, tolerance=_LIGHT).light.objects
-        light.append(found.flux)
-        ranges.append(found.distance_m)
+        if isinstance(sensor, PulsedSensor):
+            light.append(found.flux)
+            ranges.append(found.pulse_distance_m(modulation))
+        else:
+            light.append(abs(found.phasor))
+            ranges.append(found.phase_distance_m(modulation))
     fit = fit_object(np.array(ranges), np.array(light))
     return fit.c0, fit.c1, fit.c2
 
@@ -183,3 +194,11 @@ def err_together(sensor: Sensor, told: Scene) -> bool:
     """
     error = told.model_error
     return len(parameters_of(sensor, told)) > 0 or max(error.flux, error.range_m) > 0.0
+
+
+def learns_crosstalk(scene: ReportScene) -> bool:
+    """Tell whether a tracker learns crosstalk, and errs by nothing else that all tracks share."""
+    values = scene.known.crosstalk_values or ()
+    unknown = any(not isinstance(value, float | int) for value in values)
+    error = scene.known.model_error
+    return unknown and max(error.flux, error.range_m) == 0.0

@@ -17,6 +17,7 @@ from service.report.pace import Pace, Spent
 from service.report.row import Row, row_from
 from service.report.sampled import POSTERIORS, not_tried
 from service.report.scenes import ReportScene
+from service.report.sources import sources_digest
 from service.report.terms import TermCost, term_costs
 from simulator.processor_time import compiling_s
 
@@ -94,6 +95,7 @@ def machine() -> dict[str, str]:
         "system": platform.platform(),
         "python": platform.python_version(),
         **{name: version(name) for name in ("hybridtof", "numpy", "scipy", "numba", "emcee")},
+        "sources": sources_digest(),
     }
 
 
@@ -123,7 +125,8 @@ def measured(
     seed : int
         Of everything random.
     kept : Path
-        Where finished cells are kept. One of another version, effort or seed is begun anew.
+        Where finished cells are kept. What other sources, another effort or another seed measured
+        is said, and measured anew.
     tell : callable
         Is told how far it is.
 
@@ -133,12 +136,14 @@ def measured(
         In the order of the scenes, as each is measured or read.
     """
     heading = {
-        "version": version("hybridtof"),
+        "sources": sources_digest(),
         "seed": seed,
         "effort": json.loads(json.dumps(dataclasses.asdict(effort))),
     }
-    done = _read(kept, heading)
+    done, reason = _read(kept, heading)
     cells = [cell for scene in scenes for cell in cells_of(scene, effort)]
+    if reason:
+        tell(f"begins anew: {reason}")
     if not done:
         kept.write_text(json.dumps(heading) + "\n")
     else:
@@ -185,14 +190,24 @@ def _minutes(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
 
 
-def _read(kept: Path, heading: dict[str, Any]) -> dict[str, Measured]:
-    """Return finished cells; a last line that was cut short is no finished cell."""
+_APART = {"sources": "other sources", "seed": "another seed", "effort": "another effort"}
+
+
+def _read(kept: Path, heading: dict[str, Any]) -> tuple[dict[str, Measured], str]:
+    """Return finished cells, or none and why those that are there are of no use.
+
+    A last line that was cut short is no finished cell.
+    """
+    if not kept.exists():
+        return {}, ""
+    first, *lines = kept.read_text().splitlines() or [""]
     try:
-        first, *lines = kept.read_text().splitlines()
-        if json.loads(first) != heading:
-            return {}
-    except (OSError, ValueError):
-        return {}
+        found = json.loads(first)
+    except ValueError:
+        return {}, f"{kept} has no heading that can be read"
+    if found != heading:
+        apart = [said for name, said in _APART.items() if found.get(name) != heading[name]]
+        return {}, f"what {kept} holds was measured with {' and '.join(apart)}"
     done: dict[str, Measured] = {}
     for line in lines:
         try:
@@ -201,7 +216,7 @@ def _read(kept: Path, heading: dict[str, Any]) -> dict[str, Measured]:
             continue
         row = row_from(entry["row"])
         done[entry["key"]] = Measured(row, entry["seconds"], entry["compiling_s"])
-    return done
+    return done, ""
 
 
 def report_of(

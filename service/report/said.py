@@ -24,7 +24,34 @@ def said(name: str) -> str:
     return _SAID.get(name, name.replace("_", " "))
 
 
+# what stands in reasons that Python callers read too, and how a page says it
+_PATHS = {
+    "object.c0": "the object's size",
+    "object.c1": "the object's shape",
+    "object.c2": "the object's reflectance",
+    "crosstalk.w1": "the crosstalk of the late window",
+    "crosstalk.w2": "the crosstalk",
+    "crosstalk.i": "the crosstalk's real part",
+    "crosstalk.q": "the crosstalk's imaginary part",
+    "background.strength": "the background's strength",
+    "background.distance_m": "the background's distance",
+    "background.shadow.c0": "the shadow's size",
+    "background.shadow.c1": "the shadow's shape",
+    "background.shadow": "the shadow",
+    "range_m": "the ranges",
+}
+_PHRASES = {
+    ' ("shadow": "object")': "",
+    "use the method emcee": "take the posterior by walkers",
+}
+
+
 def in_words(reason: str) -> str:
-    """Return a reason with the names of techniques as `said` has them."""
-    names = (name for name in _SAID if "_" in name)
-    return re.sub(rf"\b({'|'.join(names)})\b", lambda found: f"the {said(found[0])}", reason)
+    """Return a reason without names of code: techniques as `said` has them, unknowns in words."""
+    words = {name: f"the {said(name)}" for name in _SAID if "_" in name} | _PATHS
+    longest = sorted(words, key=len, reverse=True)
+    names = "|".join(re.escape(name) for name in longest)
+    for phrase, instead in _PHRASES.items():
+        reason = reason.replace(phrase, instead)
+    found = re.sub(rf"(?<![\w.])({names})(?![\w.]\w)", lambda one: words[one[0]], reason)
+    return re.sub(r"(,[^,]+), ([^,]+) is not$", r"\1 and \2 are not", found)

@@ -156,8 +156,10 @@ SCENES: tuple[ReportScene, ...] = (
     _scene("Signal-to-noise ratio 10", snr=10.0),
     _scene("Signal-to-noise ratio 100", snr=100.0),
     _scene("Signal-to-noise ratio 10,000", snr=1e4),
+    _scene("Signal-to-noise ratio 100,000", snr=1e5),
     _scene("Signal-to-noise ratio 1,000,000", snr=1e6),
     _scene("Real plate", plate="W04H08R00T00", exact=False, quick=True),
+    _scene("Real plate, sine wave", "sine_wave", plate="W04H08R00T00", exact=False),
     _scene("Real plate, told that the model is exact", plate="W04H08R00T00"),
     _scene("Real glossy plate, tilted", plate="W04H08R05T06", exact=False),
     _scene(

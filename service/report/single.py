@@ -14,7 +14,7 @@ from service.report.cells import Cell
 from service.report.clock import alone, best, peak_bytes
 from service.report.readings import Readings, err_together, sets_of, told_of_object
 from service.report.row import Costs, Row
-from service.report.said import in_words, said
+from service.report.said import said
 from service.report.scores import Scores, scores_of_roots
 from simulator.scene import Scene
 
@@ -66,7 +66,7 @@ def measure_single(cell: Cell, seed: int) -> Row:
             continue
         run = functools.partial(estimate, scene.sensor, scene_told, made.frames, [name])
         found = run()
-        reasons = {item.name: in_words(item.reason) for item in found.left_out}
+        reasons = {item.name: item.reason for item in found.left_out}
         reason = reason or reasons.get(name, "could not serve this scene")
         if not found.results:
             continue

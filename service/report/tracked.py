@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,13 @@ from inference.tracking.track import Track, step, track
 from inference.tracking.tracker import tracker
 from service.report.cells import Cell
 from service.report.clock import alone, best, peak_bytes
-from service.report.readings import err_together, sets_of, told_of_object
+from service.report.readings import (
+    Readings,
+    err_together,
+    learns_crosstalk,
+    sets_of,
+    told_of_object,
+)
 from service.report.row import Costs, Row
 from service.report.scores import Scores, scores_of_roots
 from simulator.errors import RefusedError
@@ -27,9 +33,10 @@ Array = NDArray[np.float64]
 
 
 def measure_tracker(cell: Cell, seed: int) -> Row:
-    """Measure the tracker on a whole way, and frame by frame."""
+    """Measure the tracker on whole ways, the time and memory of the first, and frame by frame."""
     scene = cell.scene
-    (made,) = sets_of(scene, cell.frames, seed, 1)
+    ways = sets_of(scene, cell.frames, seed, cell.sets)
+    made = ways[0]
     settings = TrackingSettings(hypotheses=cell.value)
     told = told_of_object(scene)
     row = Row(
@@ -38,18 +45,19 @@ def measure_tracker(cell: Cell, seed: int) -> Row:
         "tracker",
         knob=f"{cell.value} hypothes{'i' if cell.value == 1 else 'e'}s",
         order=float(cell.value),
-        frames=int(made.present.sum()),
+        frames=sum(int(way.present.sum()) for way in ways),
     )
     run = functools.partial(track, scene.sensor, told, made.frames, settings)
     try:
         found, seconds = best(run)
     except RefusedError as error:
         return dataclasses.replace(row, remark=str(error))
-    here = made.present
+    others = [track(scene.sensor, told, way.frames, settings) for way in ways[1:]]
+    together = err_together(scene.sensor, told) and not learns_crosstalk(scene)
     middle, tail = alone(_stepped(cell, told, settings, made.frames))
     return dataclasses.replace(
         row,
-        scores=_scores_of_track(made.range_m[here], found, here, err_together(scene.sensor, told)),
+        scores=_scores_of_tracks(ways, [found, *others], together),
         costs=Costs(
             frame_s=seconds / len(made.frames),
             p50_s=middle,
@@ -60,16 +68,30 @@ def measure_tracker(cell: Cell, seed: int) -> Row:
     )
 
 
-def _scores_of_track(truth: Array, found: Track, here: NDArray[np.bool_], together: bool) -> Scores:
-    several = found.status[here] == Status.AMBIGUOUS
+def _scores_of_tracks(ways: Sequence[Readings], tracks: Sequence[Track], together: bool) -> Scores:
+    here = np.concatenate([way.present for way in ways])
+
+    width = max(found.hypotheses_m.shape[1] for found in tracks)
+
+    def side_by_side(name: str) -> Array:
+        parts = [getattr(found, name) for found in tracks]
+        wide = [
+            np.pad(part, ((0, 0), (0, width - part.shape[1])), constant_values=np.nan)
+            for part in parts
+        ]
+        return np.asarray(np.concatenate(wide)[here])
+
+    number = np.zeros(len(ways), int) if together else np.arange(len(ways))
     return scores_of_roots(
-        truth,
-        found.range_m[here],
-        np.asarray(several),
-        found.hypotheses_m[here],
-        found.hypotheses_sd_m[here],
-        found.hypotheses_weight[here],
-        np.zeros(truth.size, int) if together else None,
+        np.concatenate([way.range_m for way in ways])[here],
+        np.concatenate([found.range_m for found in tracks])[here],
+        np.concatenate([found.status == Status.AMBIGUOUS for found in tracks])[here],
+        side_by_side("hypotheses_m"),
+        side_by_side("hypotheses_sd_m"),
+        side_by_side("hypotheses_weight"),
+        np.repeat(number, [way.range_m.size for way in ways])[here]
+        if together or len(ways) > 1
+        else None,
     )
 
 

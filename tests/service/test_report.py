@@ -5,6 +5,7 @@ import functools
 import itertools
 import json
 import math
+import re
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -25,9 +26,10 @@ from service.report.measure import measure
 from service.report.pace import Pace, Spent
 from service.report.page import markdown_page, page
 from service.report.picture import draw_scene, draw_summary, draw_terms, svg
-from service.report.readings import readings_of
+from service.report.readings import readings_of, told_of_object
 from service.report.row import Costs, Row, order_of, row_from
 from service.report.run import Report, machine
+from service.report.said import in_words
 from service.report.scenes import SCENES, ReportScene
 from service.report.scores import Scores, crps_of_draws, crps_of_normals, scores_of_roots
 from service.report.table import percent, with_error
@@ -200,6 +202,44 @@ def test_time_left_is_told_by_kind_of_method() -> None:
     assert 0.5 * exact < pace.left_s(ahead) < 1.5 * exact
 
 
+def test_catalogue_has_what_was_asked_for() -> None:
+    kinds = itertools.product(("pulsed", "sine_wave"), (False, True))
+    assert {(s.sensor.kind, bool(s.plate)) for s in SCENES} == set(kinds)
+    assert {s.snr for s in SCENES} == {10.0**k for k in range(1, 7)}
+    assert {s.empty for s in SCENES} == {0, 5}
+
+
+@pytest.mark.parametrize("name", ["Real plate", "Real plate, sine wave"])
+def test_a_calibration_of_a_plate_fits_what_a_sensor_reads_of_it(name: str) -> None:
+    """Model errors of a plate are some percent of its light, 2.0 in the mean over 98 plates."""
+    scene = BY_NAME[name]
+    made = readings_of(scene, 12, 1)
+    body = told_of_object(scene).model_dump(mode="json")["object"]
+    r, (one, other) = made.range_m, made.frames.readings.T
+    light = np.hypot(one, other) if scene.sensor.kind == "sine_wave" else other
+    told = body["c0"] * body["c2"] / (r**2 * (r**2 + body["c1"] * r + body["c0"]))
+    np.testing.assert_allclose(light, told, rtol=0.1)
+
+
+def test_reasons_are_in_words() -> None:
+    for reason, said in (
+        (
+            "needs object.c0 and object.c1 as known",
+            "needs the object's size and the object's shape as known",
+        ),
+        (
+            "needs a background that is known, and background.strength, background.shadow.c0, "
+            "background.shadow.c1 is not",
+            "needs a background that is known, and the background's strength, the shadow's size "
+            "and the shadow's shape are not",
+        ),
+        ("made for more: take joint_fit", "made for more: take the fit of everything"),
+        ('its shadow ("shadow": "object"): take', "its shadow: take"),
+        ("crosstalk.w1 unknown: R-hat 1.2", "the crosstalk of the late window unknown: R-hat 1.2"),
+    ):
+        assert in_words(reason) == said
+
+
 MEASURED = ("Unknown crosstalk", "Through the fold")
 
 
@@ -236,6 +276,14 @@ def test_same_seed_same_errors_and_a_killed_run_goes_on(
     assert uncosted(again) == uncosted(whole)
     assert again[: len(first)] == first
     assert "goes on after 9 of" in said[0]
+    # what other sources measured is not mixed with what these measure
+    monkeypatch.setattr(run_module, "sources_digest", lambda: "others")
+    counted.clear()
+    said.clear()
+    next(rows_of(scenes, TINY, 1, tmp_path / "part", said.append))
+    assert len(counted) == 1
+    assert said[0].startswith("begins anew: ")
+    assert said[0].endswith("was measured with other sources")
     # another seed is another report
     counted.clear()
     next(rows_of(scenes, TINY, 2, tmp_path / "part"))
@@ -264,6 +312,8 @@ def test_what_is_not_told_misleads() -> None:
     out = [row for row in rows if row.scores is None]
     assert out
     assert all(row.remark for row in out)
+    for row in measured():
+        assert not re.search(r"[a-z]\.[a-z]|_|\bemcee\b", row.remark), row.remark
 
 
 @pytest.mark.slow
