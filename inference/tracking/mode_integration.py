@@ -7,10 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.tracking.candidates import TrackCandidate, TrackCandidates, add_candidate
-from inference.tracking.frame_density import Prior, TrackedFrame, log_density
+from inference.tracking.frame_density import Prior, TrackedFrame, log_density, spread_at
+from inference.tracking.hypotheses import WITHOUT_CROSSTALK
 from inference.tracking.mode_refinement import PeakedMode, bends, refined
 from inference.tracking.mode_search import edge
-from inference.tracking.readings_table import ReadingsTable
+from inference.tracking.readings_table import ReadingsTable, mean_at
+from inference.tracking.roots import Root
 from simulator.compiled import compiled
 
 __all__ = ["Nodes", "integrate", "nodes_for"]
@@ -21,6 +23,7 @@ _GAUSSIAN = 0.3  # nats by which a mode may leave its parabola at sqrt(3) standa
 _WINDOWS = 4  # on either side of the middle one
 _SPACING = 0.5  # of windows, in standard deviations, and their width
 _NEGLIGIBLE_WINDOW = 1e-3  # share of a mode below which a window's part is left out
+_FAINT = 0.3  # standard deviations of the noise: nuisance parameters that do less are not felt
 _INTERVALS = 32  # of Simpson's rule on either side of a mode
 _ROOT3 = math.sqrt(3.0)
 _LOG_ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
@@ -132,6 +135,20 @@ def _divide(
 
 
 @compiled
+def _by_noise(u: float, frame: TrackedFrame, prior: Prior, table: ReadingsTable) -> bool:
+    """Tell whether a frame's noise hides what nuisance parameters do to it, as of a faint object.
+
+    Its density is then as wide as the noise makes it, which comes anew with every frame.
+    """
+    X = prior.added.spread
+    if prior.position.born or X.shape[0] > WITHOUT_CROSSTALK:
+        return False
+    _, _, d1, d2 = mean_at(u, table)
+    felt = spread_at(Root(0.0, 0.0, 0.0), u, frame.gain, (d1, d2), X, table)
+    return felt.r11 < _FAINT and math.hypot(felt.r21, felt.r22) < _FAINT
+
+
+@compiled
 def integrate(
     to: TrackCandidates,
     count: int,
@@ -148,7 +165,7 @@ def integrate(
     of the distance.
 
     Where u is wide because nuisance parameters or crosstalk are uncertain, only the mode is taken,
-    but for an object that has just come.
+    but for an object that has just come, or one so faint that the noise hides what they do.
     What they do to the readings is linear here, and the curve is not: integrated over a wide
     density, the difference would pass for knowledge of the range, a little in every frame.
 
@@ -174,7 +191,8 @@ def integrate(
     """
     u, scale = mode.u, mode.scale
     once = prior.position.born and not prior.position.again
-    if prior.added.spread.shape[1] > 2 and not once:
+    shared = prior.added.spread.shape[1] > WITHOUT_CROSSTALK
+    if shared and not once and not _by_noise(u, frame, prior, table):
         if not prior.position.born and bends(prior.added.spread.shape[0], table):
             u, scale, top = refined(mode, frame, prior, table)
         else:

@@ -1,4 +1,9 @@
-"""What smooth errors of the model do to what a tracker reads (docs/model.md, model-error)."""
+"""What smooth errors of the model, and of its table, do to what a tracker reads.
+
+docs/model.md, model-error, has the model.
+"""
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +16,14 @@ from simulator.model_error import ModelError
 from simulator.parameters import Terms
 from simulator.sensor import PulsedSensor, Sensor, instrument
 
-__all__ = ["model_changes", "sd_by_derivatives"]
+__all__ = ["model_changes", "sd_by_derivatives", "sd_by_table"]
 
 Array = NDArray[np.float64]
 
 _NEGLECTED = 1e-3  # of the variance: every function is another state of the filter
 _WIDEST = 10.0  # of log r: nothing is known
+# standard deviations at which the turn of a sine wave is squared, as in `second_order`
+_TAKEN_AT = 2.0
 
 
 def _shapes(positions: Array, sd: float) -> Array:
@@ -44,10 +51,15 @@ def model_changes(sensor: Sensor, error: ModelError, knots: Knots, scale: Array)
     list of ndarray, shape (n, 2)
         In units of the noise.
     """
-    light = knots.means[:, OBJECT]
+    light, flux = knots.means[:, OBJECT], error.flux
+    _, wave = instrument(sensor)
+    if wave is not None:
+        # light that is turned points less far to where it was: by half the square of the angle,
+        # which is felt where neither noise nor an error of the flux is as large
+        flux = math.hypot(flux, 0.5 * (_TAKEN_AT * wave[0] * error.range_m) ** 2)
     changes = []
-    if error.flux > 0:
-        changes += [light * s[:, None] for s in _shapes(knots.positions, error.flux)]
+    if flux > 0:
+        changes += [light * s[:, None] for s in _shapes(knots.positions, flux)]
     if error.range_m > 0:
         with np.errstate(divide="ignore", invalid="ignore"):
             raw = np.where(scale > 0, light / scale, 0.0)
@@ -100,6 +112,34 @@ def sd_by_derivatives(
         square = sum((sd * _cross(along, part) / turn) ** 2 for sd, part in parts)
         sd = np.sqrt(square)
     return np.where(sd < _WIDEST, sd, _WIDEST)
+
+
+def sd_by_table(knots: Knots, by_rate: bool) -> Array | None:
+    """Return how far errors of the table move log r: as far in every frame at one range.
+
+    Parameters
+    ----------
+    knots : Knots
+        Where readings are tabulated.
+    by_rate : bool
+        Whether derivatives in time are read, of which the direction tells the range.
+
+    Returns
+    -------
+    ndarray, shape (n,), or None
+        At every knot; None where the noise hides them all.
+    """
+    if knots.error == 0.0:
+        return None
+    means, slopes = knots.means[:, MEAN], knots.means[:, SLOPE]
+    with np.errstate(all="ignore"):
+        if by_rate:
+            sd = knots.error * np.sqrt(2.0) * means.prod(axis=1) / _cross(means, slopes)
+        else:
+            square = (slopes**2).sum(axis=1)
+            sd = knots.error * np.sqrt(((slopes * means) ** 2).sum(axis=1)) / square
+    # at a fold the second order tells the range
+    return np.asarray(np.fmin(np.abs(sd), math.sqrt(knots.error)))
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -48,7 +48,8 @@ _NARROWEST = 1e-12  # log range that a table covers
 _FEWEST = 256
 _MOST = 1 << 16
 _ERROR = 0.01  # standard deviations of a reading by which the table may be wrong
-_RELATIVE_ERROR = 1e-11  # or this share of the reading, which no range feels
+_SHARE = 2e-14  # or this share of the reading: a hundred roundings
+_MOST_SHARE = 1e-11  # and no more than this with as many knots as there may be
 _DIFFERENCE = 3e-5  # of u, for second derivatives
 
 
@@ -136,6 +137,8 @@ class Knots:
     positions: Array  # (n,): u = log r, ascending
     means: Array  # (n, 8): as `means_over`, in units of the noise
     log_prior: Array  # (n,): log prior density of u
+    # share of a reading by which a table of them is wrong where that is more than its noise hides
+    error: float = 0.0
 
     @property
     def step(self) -> float:
@@ -192,12 +195,15 @@ def knots_of(
         middle = 0.5 * (left + right)[:, _VALUES]
         middle += 0.125 * step * (left - right)[:, _SLOPES]
         exact = values[1::2, _VALUES]
-        allowed = np.maximum(error, _RELATIVE_ERROR * np.abs(exact))
-        if bool((np.abs(middle - exact) <= allowed).all()):
+        off, size = np.abs(middle - exact), np.abs(exact)
+        share = _SHARE if count < _MOST else _MOST_SHARE
+        if bool((off <= np.maximum(error, share * size)).all()):
             prior = np.empty(count + 1)
             positions = np.ascontiguousarray(fine[::2])
             _fill_prior(prior, positions, law)
-            return Knots(positions, np.ascontiguousarray(values[::2]), prior)
+            seen = off > error
+            rest = float(np.divide(off, size, out=np.zeros_like(off), where=seen).max())
+            return Knots(positions, np.ascontiguousarray(values[::2]), prior, rest)
         count *= 2
     raise RefusedError(
         f"the readings turn too quickly along the range for a table of {_MOST} knots within "

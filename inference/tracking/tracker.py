@@ -13,7 +13,7 @@ from inference.frame.arguments import prior_of
 from inference.posterior.answer.posterior import Posterior
 from inference.tracking.first_state import first_state
 from inference.tracking.hypotheses import WITHOUT_CROSSTALK, Hypotheses
-from inference.tracking.model_error import sd_by_derivatives
+from inference.tracking.model_error import sd_by_derivatives, sd_by_table
 from inference.tracking.motion import Rules
 from inference.tracking.nuisance import nuisance_of
 from inference.tracking.nuisance_jacobian import crosstalk_root, nuisance_jacobian
@@ -30,12 +30,14 @@ from simulator.model_error import ModelError
 from simulator.parameters import Terms, parameters_of
 from simulator.range_prior import RangePrior
 from simulator.scene import Reference, Scene, Stroke
-from simulator.sensor import PulsedSensor, Sensor
+from simulator.sensor import PulsedSensor, Sensor, instrument
 from simulator.sensor_unknowns import DRIFTS, sensor_at
 
 __all__ = ["Tracker", "tracker"]
 
 Array = NDArray[np.float64]
+
+_TURN = 1.0  # radians by which a sine wave may be wrong
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -57,8 +59,8 @@ class Tracker:
     first : TrackState
         The state before any frame.
     added_sd : ndarray, shape (knots,), optional
-        Standard deviation of log r by errors of the model that the filter does not carry along, at
-        the knots of its table.
+        Standard deviation of log r by errors of the model, or of the table itself, that the filter
+        does not carry along, at the knots of the table.
     crosstalk : (float, float)
         Its best value before any frame [reading units]: what is not turned with the light where the
         sensor's delay follows its temperature.
@@ -123,7 +125,7 @@ def tracker(
     RefusedError
         Where there is no honest answer: unknowns without a posterior, tangential motion, optional
         terms, derivatives with an uncertain scene, crosstalk to learn of a sensor whose delay
-        drifts.
+        drifts, an error of the distance of more than a radian of a sine wave.
     """
     settings = TrackingSettings() if settings is None else settings
     try:
@@ -189,6 +191,9 @@ def tracker(
     first = dataclasses.replace(first, signature=_signature(table, places, rules, first.hypotheses))
     model = Model(table, places, rules)
     added = sd_by_derivatives(sensor, erring, known.centre, knots, observed)
+    by_table = sd_by_table(knots, observed.by_rate)
+    if by_table is not None:
+        added = by_table if added is None else np.hypot(added, by_table)
     return Tracker(sensor, settings, observed, model, limit, first, added, static)
 
 
@@ -209,6 +214,13 @@ def _check(sensor: Sensor, scene: Scene, settings: TrackingSettings) -> None:
         raise RefusedError(
             f"{listed(drifting)} unknown: what that does to a range changes with the temperature, "
             "and a tracker takes a number; calibrate, and state what has been found"
+        )
+    _, wave = instrument(sensor)
+    if wave is not None and wave[0] * scene.model_error.range_m > _TURN:
+        raise RefusedError(
+            f"an error of the distance of {scene.model_error.range_m:g} m turns the sine wave by "
+            "more than a radian: a tracker takes it as a small error of the readings; state "
+            "discrepancy.range_m as it is, or a lower frequency"
         )
     if settings.observables in ("w1", "w2") and not isinstance(sensor, PulsedSensor):
         raise InvalidInputError.at(
