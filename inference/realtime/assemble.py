@@ -29,6 +29,7 @@ FOLD = AMBIGUOUS + 1
 FILTERED = AMBIGUOUS + 2
 OUTSIDE = AMBIGUOUS + 3
 DROWNED = AMBIGUOUS + 4
+FAINT = AMBIGUOUS + 5
 _SHARED_REASONS = (
     *COMMON_REASONS,
     "more than one range explains the readings",
@@ -36,6 +37,7 @@ _SHARED_REASONS = (
     "every solution needs a negative object, or a background below zero or above its strength",
     "every solution lies outside the ranges of the scene",
     "the noise is so many times the signal that its standard deviation is no number",
+    "the light is none within its noise: any farther range explains the readings too",
 )
 
 
@@ -53,7 +55,7 @@ class Candidates:
     roots : ndarray, shape (n, m)
         Ranges [m], nan-padded, in any order.
     noise : ndarray, shape (n, m)
-        First-order standard deviations by noise [m].
+        Standard deviations by noise [m]; infinite where any farther range explains a frame too.
     near : ndarray of bool, shape (n, m)
         Whether noise reaches the fold beside the root, so that ``noise`` does not hold.
     near_frame : ndarray of bool, shape (n,)
@@ -130,6 +132,7 @@ def assemble(
         sd = noise if candidates.model is None else np.hypot(noise, model)
         sd = np.where(np.isfinite(sd), sd, np.nan)
         drowned = (linear & np.isnan(sd)).any(axis=1)
+        faint = (linear & np.isposinf(candidates.noise)).any(axis=1)
         model = np.broadcast_to(model, sd.shape)
         if roots.shape[1] > 1:
             order = np.argsort(roots, axis=1, kind="stable")[:, :width]
@@ -149,6 +152,7 @@ def assemble(
     own = none & (outcome.reason > 0) & ~found.any(axis=1) & (reason != FOLD)
     reason[own] = outcome.reason[own]
     reason[(count == 1) & drowned] = DROWNED
+    reason[(count == 1) & faint] = FAINT
     reason[count > 1] = AMBIGUOUS
     ruled_out = state > 0
     reason[ruled_out] = state[ruled_out]

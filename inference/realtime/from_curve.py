@@ -1,5 +1,6 @@
 """Solve a technique that inverts a curve: targets in, candidates out."""
 
+import math
 from collections.abc import Sequence
 from typing import TypeVar
 
@@ -12,6 +13,7 @@ from inference.realtime.model_error import model_error_of, point_error, sd_of_ro
 from inference.realtime.solving.curves.curve import Curve, CurveParameters
 from inference.realtime.solving.invert import invert
 from inference.realtime.solving.monotone_intervals import monotone_intervals
+from inference.realtime.solving.reach import Span
 from inference.technique import Task
 from simulator.sensor import Sensor, SineWaveSensor
 
@@ -79,14 +81,17 @@ def candidates_of(
     high = (high_m if task.high_m is None else task.high_m) / unit
     intervals = monotone_intervals(curve, p, 0.0, high)
     bottom = np.ones_like(top) if bottom is None else bottom
+    nearest_m, farthest_m = task.known.support if task.physical else (0.0, math.inf)
+    span = Span(nearest_m / unit, min(high, farthest_m / unit), NOISE_BAND)
     step = max(_CHUNK // max(intervals.low.size, 1), 1)
+    chunks = [slice(i, i + step) for i in range(0, top.size, step)]
     parts = [
         _trimmed(
-            invert(curve.kind, p, intervals, curve.period, top[i : i + step], bottom[i : i + step])
+            invert(curve.kind, p, intervals, curve.period, top[rows], bottom[rows], sd[rows], span)
         )
-        for i in range(0, top.size, step)
+        for rows in chunks
     ]
-    roots, slopes, gaps, nearest = parts[0] if len(parts) == 1 else _joined(parts)
+    roots, slopes, gaps, nearest, reaches = parts[0] if len(parts) == 1 else _joined(parts)
     error = model_error_of(task)
     model = None
     if error.flux > 0 or error.range_m > 0:
@@ -95,7 +100,7 @@ def candidates_of(
         slopes = slopes / unit
         candidates = Candidates(
             roots=roots * unit,
-            noise=sd[:, None] / np.abs(slopes),
+            noise=np.maximum(sd[:, None] / np.abs(slopes), reaches * unit),
             model=model,
             near=gaps < NOISE_BAND * sd[:, None],
             near_frame=nearest < NOISE_BAND * sd,
@@ -103,19 +108,20 @@ def candidates_of(
     return candidates, slopes
 
 
-Part = tuple[Array, Array, Array, Array]
+Part = tuple[Array, Array, Array, Array, Array]
 
 
 def _joined(parts: Sequence[Part]) -> Part:
-    roots, slopes, gaps, nearest = zip(*parts, strict=True)
-    return stacked(roots), stacked(slopes), stacked(gaps), np.concatenate(nearest)
+    roots, slopes, gaps, nearest, reaches = zip(*parts, strict=True)
+    one = np.concatenate(nearest)
+    return stacked(roots), stacked(slopes), stacked(gaps), one, stacked(reaches)
 
 
 def _trimmed(part: Part) -> Part:
     """Drop the columns that no frame uses: roots fill them from the left."""
-    roots, slopes, gaps, nearest = part
+    roots, slopes, gaps, nearest, reaches = part
     used = max(int(np.count_nonzero(np.isfinite(roots).any(axis=0))), 1)
-    return roots[:, :used], slopes[:, :used], gaps[:, :used], nearest
+    return roots[:, :used], slopes[:, :used], gaps[:, :used], nearest, reaches[:, :used]
 
 
 def stacked(parts: Sequence[NDArray[T]]) -> NDArray[T]:

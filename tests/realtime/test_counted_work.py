@@ -16,8 +16,10 @@ from inference.realtime.solving.curves.curve import Curve, CurveParameters
 from inference.realtime.solving.curves.registry import CURVES
 from inference.realtime.solving.invert import invert
 from inference.realtime.solving.monotone_intervals import monotone_intervals
+from inference.realtime.solving.reach import Span
 from inference.realtime.techniques import background_intensity
 from simulator.frames import Frames
+from simulator.sensor import Noise
 from tests.contract.scenes import MENU, frames_of, sensor_of, span
 from tests.counting import counted_calls, counting, peak_bytes, types_asked_for
 
@@ -38,8 +40,11 @@ MEAN = {
 WORST = 32  # today 21: where Newton's steps leave the interval, and a bracket is needed as well
 
 
-def evaluations(curve: Curve) -> Iterator[tuple[int, int]]:
-    """Yield evaluations and roots of a target for random objects, walls and ranges."""
+def evaluations(curve: Curve, noise: float = 0.0) -> Iterator[tuple[int, int]]:
+    """Yield evaluations and roots of a target for random objects, walls and ranges.
+
+    ``noise`` is that of the target, in units of what moves the range by a factor of e.
+    """
     rng = np.random.default_rng(3)
     for _ in range(12):
         c0, distance = 10.0 ** rng.uniform(-2, 2), 10.0 ** rng.uniform(-0.5, 1.5)
@@ -57,8 +62,10 @@ def evaluations(curve: Curve) -> Iterator[tuple[int, int]]:
         intervals = monotone_intervals(curve, p, 0.0, high)
         for u in high * 10.0 ** rng.uniform(-3, -1e-3, 8):
             target = np.array([dispatch.value(curve.kind, float(u), p)])
+            sd = np.array([noise * u * abs(dispatch.slope(curve.kind, float(u), p))])
+            span = Span(0.0, high, 3.0)
             (roots, *_), calls = counted_calls(
-                invert, curve.kind, p, intervals, curve.period, target, np.ones(1)
+                invert, curve.kind, p, intervals, curve.period, target, np.ones(1), sd, span
             )
             count = calls["dispatch.power_law"] + calls["dispatch.residual"]
             yield count, int(np.isfinite(roots).sum())
@@ -72,16 +79,31 @@ def test_evaluations_for_a_root(curve: Curve) -> None:
     assert max(count / roots for count, roots in made) <= WORST
 
 
+@pytest.mark.parametrize("curve", CURVES, ids=[curve.name for curve in CURVES])
+def test_evaluations_for_a_root_in_noise(curve: Curve) -> None:
+    """A root of small noise costs what it did; in more noise two more are looked for."""
+    quiet, little, much = (
+        sum(count for count, _ in evaluations(curve, noise)) for noise in (0.0, 1e-9, 0.02)
+    )
+    assert little == quiet
+    # ends count as roots where they are met, and the others are no harder
+    assert quiet < much < 4 * quiet
+
+
 def test_evaluations_for_a_root_before_a_wall(monkeypatch: pytest.MonkeyPatch) -> None:
     """Both ends of each interval, Newton's steps from the conventional range, and one more."""
     total: Counter[str] = Counter()
     monkeypatch.setattr(background_intensity, "solve_balance", counting(solve_balance, total))
     sensor, setting = sensor_of("pulsed"), MENU[6]
     frames = frames_of(sensor, setting, span(40), np.random.default_rng(4))
-    result = estimate(sensor, setting.scene, frames, ["background_intensity"]).results[0]
+    quiet = sensor.model_copy(update={"noise": Noise(read=(1e-9, 1e-9))})
+    result = estimate(quiet, setting.scene, frames, ["background_intensity"]).results[0]
     assert int(result.root_count.sum()) == 40
     # today 3 a frame: two ends and the last step; the rest is Newton's
     assert total["background_balance._balance"] <= 4 * 40
+    estimate(sensor, setting.scene, frames, ["background_intensity"])
+    # noise of some percent of the range: four more answers a frame
+    assert total["background_balance._balance"] <= (4 + 5 * 4) * 40
 
 
 def variants(frames: Frames) -> Iterator[Frames]:

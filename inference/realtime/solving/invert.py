@@ -9,6 +9,7 @@ from inference.realtime.solving.curves import dispatch
 from inference.realtime.solving.curves.curve import CurveParameters
 from inference.realtime.solving.intervals import MonotoneIntervals
 from inference.realtime.solving.newton import solve_between
+from inference.realtime.solving.reach import Span, reach_of
 from simulator.compiled import compiled
 
 __all__ = ["invert"]
@@ -44,7 +45,9 @@ def invert(
     period: float,
     top: Array,
     bottom: Array,
-) -> tuple[Array, Array, Array, Array]:
+    sd: Array,
+    span: Span,
+) -> tuple[Array, Array, Array, Array, Array]:
     """Find all roots of value(u) = top / bottom.
 
     Parameters
@@ -59,6 +62,10 @@ def invert(
         The target is known modulo this number; 0 if it is not an angle.
     top, bottom : ndarray, shape (n,)
         Targets; nan in ``top`` stands for a frame without a target.
+    sd : ndarray, shape (n,)
+        Their standard deviations; nan where there is none.
+    span : Span
+        Where ranges end, and how far noise is followed along the curve.
 
     Returns
     -------
@@ -70,6 +77,8 @@ def invert(
         Distance of the target from the nearer turning value of the root's interval, inf without.
     nearest : ndarray, shape (n,)
         Distance of the target from the nearest turning value of all.
+    reaches : ndarray, shape (n, m)
+        Standard deviations of the roots along the curve (`reach_of`), 0 where the tangent holds.
     """
     n, k = top.size, intervals.low.size
     m = _capacity(intervals, period)
@@ -77,6 +86,7 @@ def invert(
     slopes = np.full((n, m), np.nan)
     gaps = np.full((n, m), np.inf)
     nearest = np.full(n, np.inf)
+    reaches = np.zeros((n, m))
     for i in range(n):
         if not math.isfinite(top[i]):
             continue
@@ -110,9 +120,12 @@ def invert(
                         gaps[i, found] = min(gaps[i, found], abs(at_low - goal))
                     if intervals.turns_high[j]:
                         gaps[i, found] = min(gaps[i, found], abs(at_high - goal))
+                    if bottom[i] != 0.0:
+                        root = (u, goal, slopes[i, found], gaps[i, found])
+                        reaches[i, found] = reach_of(kind, p, intervals, j, root, sd[i], span)
                     found += 1
                     last = u
                 if period <= 0.0:
                     break
                 goal += period
-    return roots, slopes, gaps, nearest
+    return roots, slopes, gaps, nearest, reaches

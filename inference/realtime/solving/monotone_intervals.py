@@ -24,6 +24,7 @@ from inference.realtime.solving.curves.curve import (
 from inference.realtime.solving.intervals import MonotoneIntervals
 from inference.realtime.solving.invert import invert
 from inference.realtime.solving.polynomials import real_roots
+from inference.realtime.solving.reach import Span
 from inference.realtime.solving.searching import DENOMINATOR, TURNING, search_grid, sign_changes
 from simulator.compiled import compiled
 
@@ -120,7 +121,10 @@ def _crossings(level: Level, p: CurveParameters, low: float, high: float) -> lis
     other = level.curve
     intervals = monotone_intervals(other, p, low, high)
     target = np.array([level.value(p)])
-    roots, _, _, _ = invert(other.kind, p, intervals, other.period, target, np.ones(1))
+    exactly = Span(0.0, math.inf, 0.0)
+    roots, _, _, _, _ = invert(
+        other.kind, p, intervals, other.period, target, np.ones(1), np.zeros(1), exactly
+    )
     return [float(u) for u in roots.ravel() if math.isfinite(u)]
 
 

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
 from inference.realtime.assemble import NOISE_BAND, Candidates, Outcome, assemble, reasons_of
@@ -18,6 +19,8 @@ from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor
 
 __all__ = ["BACKGROUND_INTENSITY"]
 
+Array = NDArray[np.float64]
+
 _REASONS = reasons_of(
     "no light: w2 is not positive",
     "w1 is not positive: at or near contact",
@@ -26,6 +29,7 @@ _REASONS = reasons_of(
     "no range before the background gives these readings",
 )
 _DARK, _CONTACT, _BEYOND, _SILENT, _NO_RANGE = range(len(_REASONS) - 5, len(_REASONS))
+_SMALL = 0.005  # share of the range up to which the tangent says what noise does
 _CHUNK = 200_000  # candidate roots held at a time, so that they stay in the cache
 
 
@@ -74,6 +78,45 @@ def _solve(task: Task) -> TechniqueResult:
 
 
 def _part(sensor: Sensor, net: Net, background: KnownBackground, unit: float, width: int) -> Found:
+    """Solve some of the frames, and widen the standard deviations that noise bends."""
+    found = _solved(sensor, net, background, unit, width)
+    with np.errstate(invalid="ignore"):
+        bent = np.flatnonzero((found.sds > _SMALL * found.roots).any(axis=1))
+    if not bent.size:
+        return found
+    some = net.select(bent)
+    roots = found.roots[bent]
+    square = np.zeros_like(roots)
+    for d1, d2 in _principal(some):
+        moves = np.zeros_like(roots)
+        for side in (-NOISE_BAND, NOISE_BAND):
+            moved = some._replace(first=some.first + side * d1, second=some.second + side * d2)
+            others = _solved(sensor, moved, background, unit, width).roots
+            moves = np.fmax(moves, _move(roots, others, background.distance))
+        square += (moves / NOISE_BAND) ** 2
+    found.sds[bent] = np.maximum(found.sds[bent], np.sqrt(square))
+    return found
+
+
+def _principal(net: Net) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """Return two independent errors of a standard deviation, each of both readings, shape (n,)."""
+    with np.errstate(all="ignore"):
+        first = np.sqrt(net.var1)
+        along = np.where(first > 0, net.cov / np.where(first > 0, first, 1.0), 0.0)
+        second = np.sqrt(np.maximum(net.var2 - along * along, 0.0))
+    return (first, along), (np.zeros_like(second), second)
+
+
+def _move(roots: Array, others: Array, distance: float) -> Array:
+    """Return how far the nearest of other roots is, shape (n, m); to an end where there is none."""
+    away = np.abs(roots[:, :, None] - others[:, None, :])
+    nearest = np.where(np.isnan(away), np.inf, away).min(axis=2)
+    return np.where(np.isinf(nearest), np.maximum(roots, distance - roots), nearest)
+
+
+def _solved(
+    sensor: Sensor, net: Net, background: KnownBackground, unit: float, width: int
+) -> Found:
     """Solve some of the frames, and drop the columns that none of them uses."""
     n = net.first.size
     found = Found(

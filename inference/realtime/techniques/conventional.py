@@ -17,6 +17,7 @@ from inference.realtime.assemble import (
 )
 from inference.realtime.model_error import model_error_of
 from inference.realtime.net import ABSENT, SATURATED, UNREPRESENTABLE, known_net_readings
+from inference.realtime.phase_reach import phase_reach
 from inference.realtime.solving.pulse_ratio import (
     Codes,
     Columns,
@@ -175,6 +176,7 @@ def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
         # gradient of the phase: (-q, i) / modulus^2
         sd = np.sqrt(net.variance(-net.second / safe / safe, net.first / safe / safe))
         band = np.minimum(NOISE_BAND * sd, 0.5 * np.pi)
+        turned = phase_reach(phase, sd, 2 * np.pi)
         contact = (phase > 2 * np.pi - band) | (phase == 0.0)
         usable = (modulus > 0) & np.isfinite(modulus)
         if task.physical:
@@ -188,7 +190,7 @@ def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
             roots[roots > task.high_m] = np.nan
         candidates = Candidates(
             roots=roots,
-            noise=np.broadcast_to((sd / k)[:, None], roots.shape),
+            noise=np.broadcast_to((turned / k)[:, None], roots.shape),
             model=np.broadcast_to(error, roots.shape) if error > 0 else None,
             near=np.zeros(roots.shape, dtype=np.bool_),
             near_frame=np.zeros(len(task.frames), dtype=np.bool_),

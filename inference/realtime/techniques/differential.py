@@ -19,6 +19,7 @@ from inference.realtime.from_curve import candidates_of
 from inference.realtime.model_error import model_error_of
 from inference.realtime.motion import MotionLaw, law_of_model, law_of_motion
 from inference.realtime.net import Net, net_readings
+from inference.realtime.phase_reach import phase_reach
 from inference.realtime.solving.curves import differential_phase, differential_ratio
 from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor, Sensor
@@ -110,7 +111,8 @@ def target_of(task: Task, rate: Net) -> Targets:
         sd = np.sqrt(rate.variance(-d2 / length / size, d1 / length / size))
         band = np.minimum(NOISE_BAND * sd, 0.25 * np.pi)
         contact = (phase > np.pi - band) | (phase == 0)
-        return Targets(np.where(usable, phase, np.nan), np.ones_like(phase), sd, contact, still)
+        turned = phase_reach(phase, sd, np.pi)
+        return Targets(np.where(usable, phase, np.nan), np.ones_like(phase), turned, contact, still)
 
 
 def farthest_by_derivatives(sensor: Sensor) -> float:
