@@ -59,7 +59,7 @@ def readings_at(sensor: Sensor, u: Array, scene: dict[str, Any]) -> tuple[Array,
 
 
 def covariances(sensor: Sensor, mean: Array, own: Array) -> Array:
-    """Covariance matrices of the readings, shape (n, 2, 2), from the contract's words."""
+    """Covariance matrices of the readings, shape (n, 2, 2), written straight from docs/model.md."""
     noise = sensor.noise
     shot = noise.shot * np.abs(mean)
     matrix = np.zeros((mean.shape[1], 2, 2))
