@@ -165,9 +165,9 @@ def describe(error: HybridTofError) -> dict[str, Any]:
         (kind for cls, kind in _KINDS.items() if isinstance(error, cls)),
         (HTTPStatus.INTERNAL_SERVER_ERROR, "internal", "The service failed"),
     )
-    problems = error.problems if isinstance(error, InvalidInputError) else ()
+    problems = error.problems if isinstance(error, InvalidInputError | RefusedError) else ()
     detail = str(error)
-    if len(problems) > 1:
+    if len(problems) > 1 and isinstance(error, InvalidInputError):
         detail = f"{len(problems)} fields break a rule; {detail}"
     return _details(status, slug, title, detail, problems)
 

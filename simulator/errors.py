@@ -70,4 +70,19 @@ class InvalidInputError(HybridTofError, ValueError):
 
 
 class RefusedError(HybridTofError):
-    """Valid input for which an honest answer does not exist (the message has reason and remedy)."""
+    """Valid input for which an honest answer does not exist.
+
+    Parameters
+    ----------
+    message : str
+        The reason, and the remedy.
+    *problems : Problem
+        The fields that are the reason, where it is single ones.
+    """
+
+    def __init__(self, message: str = "", *problems: Problem) -> None:
+        self.problems = problems
+        super().__init__(message)
+
+    def __reduce__(self) -> tuple[type["RefusedError"], tuple[str | Problem, ...]]:
+        return type(self), (str(self), *self.problems)

@@ -16,7 +16,7 @@ from inference.self_calibration.state import CalibrationState
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.tracker import Tracker, tracker
 from simulator.at_temperature import at_reference
-from simulator.errors import InvalidInputError, RefusedError
+from simulator.errors import InvalidInputError, Problem, RefusedError
 from simulator.frames import Frames, check_frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
@@ -108,11 +108,13 @@ def plan_of(sensor: Sensor, scene: Scene, settings: TrackingSettings, seed: int)
         Where there is no tracker for it; where a temperature coefficient is unknown, or that of the
         delay is stated beside unknown crosstalk.
     """
-    if any(path in DRIFTS for path in sensor.unknown):
+    drifting = [path for path in sensor.unknown if path in DRIFTS]
+    if drifting:
         raise RefusedError(
             "temperature coefficients unknown: calibrations of a stream could not tell their drift "
             "from that of the crosstalk; calibrate from recorded frames, and state what has been "
-            "found"
+            "found",
+            *(Problem(f"/{path.replace('.', '/')}", "must be a number here") for path in drifting),
         )
     cold = sensor
     if sensor.temperature is not None:
@@ -121,7 +123,8 @@ def plan_of(sensor: Sensor, scene: Scene, settings: TrackingSettings, seed: int)
                 "the sensor's delay follows its temperature, which turns the light and not the "
                 "crosstalk: a stream that calibrates itself takes delay_drift_s_per_k beside "
                 "crosstalk as numbers alone; calibrate from recorded frames, and track with what "
-                "that has found"
+                "that has found",
+                Problem("/scene/crosstalk", "must be numbers here"),
             )
         cold = sensor.model_copy(update={"temperature": None})
     check_unknown(cold, scene)

@@ -25,7 +25,7 @@ from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
 from inference.tracking.tabulate import empty_readings, knots_of, places_of, table_of
 from inference.tracking.weighing import Model
-from simulator.errors import InvalidInputError, RefusedError, listed
+from simulator.errors import InvalidInputError, Problem, RefusedError, listed
 from simulator.model_error import ModelError
 from simulator.parameters import Terms, parameters_of
 from simulator.range_prior import RangePrior
@@ -213,7 +213,8 @@ def _check(sensor: Sensor, scene: Scene, settings: TrackingSettings) -> None:
     if drifting:
         raise RefusedError(
             f"{listed(drifting)} unknown: what that does to a range changes with the temperature, "
-            "and a tracker takes a number; calibrate, and state what has been found"
+            "and a tracker takes a number; calibrate, and state what has been found",
+            *(Problem(f"/{path.replace('.', '/')}", "must be a number here") for path in drifting),
         )
     _, wave = instrument(sensor)
     if wave is not None and wave[0] * scene.model_error.range_m > _TURN:

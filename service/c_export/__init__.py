@@ -19,7 +19,7 @@ from inference.techniques import ALL_TECHNIQUES
 from service.c_export.conventional import conventional
 from service.c_export.from_light import background_cancelling, from_late_light, from_light
 from service.c_export.source import ROUNDING, Asked, Exported, Generator, literal
-from simulator.errors import InvalidInputError, RefusedError
+from simulator.errors import InvalidInputError, Problem, RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import PulsedSensor, Sensor
@@ -117,9 +117,16 @@ def export_c(technique: str, sensor: Sensor, scene: Scene, tolerance: float = 1e
         raise InvalidInputError.at("/tolerance", f"must lie from 1e-9 to 0.1, is {tolerance:g}")
     known = known_of(scene)
     if isinstance(sensor, PulsedSensor) and sensor.timing_offset_s is not None:
-        raise RefusedError("timing_offset_s is not exported to C; leave it out, and take it off")
+        raise RefusedError(
+            "timing_offset_s is not exported to C; leave it out, and take it off",
+            Problem("/sensor/timing_offset_s", "is not exported"),
+        )
     if sensor.temperature is not None:
-        raise RefusedError("temperature is not exported to C; leave it out, and take it off")
+        raise RefusedError(
+            "the export to C knows no temperature: leave `temperature` out of the sensor, and turn "
+            "the readings back to reference_k before the call (docs/scenes.md, temperature)",
+            Problem("/sensor/temperature", "is not exported"),
+        )
     reason = obstacle(ALL_TECHNIQUES[technique], sensor, scene, known, None)
     if reason is not None:
         raise RefusedError(f"{technique}: {reason}")
