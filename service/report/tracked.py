@@ -31,6 +31,8 @@ __all__ = ["measure_tracker"]
 
 Array = NDArray[np.float64]
 
+_SAID = 0.005  # share of frames from which on a remark tells it
+
 
 def measure_tracker(cell: Cell, seed: int) -> Row:
     """Measure the tracker on whole ways, the time and memory of the first, and frame by frame."""
@@ -54,6 +56,7 @@ def measure_tracker(cell: Cell, seed: int) -> Row:
         return dataclasses.replace(row, remark=str(error))
     others = [track(scene.sensor, told, way.frames, settings) for way in ways[1:]]
     together = err_together(scene.sensor, told) and not learns_crosstalk(scene)
+    misfit = float(np.mean(np.concatenate([one.misfit for one in (found, *others)])))
     middle, tail = alone(_stepped(cell, told, settings, made.frames))
     return dataclasses.replace(
         row,
@@ -65,6 +68,9 @@ def measure_tracker(cell: Cell, seed: int) -> Row:
             run_s=seconds,
             peak_bytes=peak_bytes(run),
         ),
+        remark=f"says that the model does not fit in {100 * misfit:.0f} % of frames"
+        if misfit >= _SAID
+        else "",
     )
 
 

@@ -38,6 +38,7 @@ from service.report.terms import TermCost, operations_of
 from service.report.together import together
 from service.report.uncertain import blocks_of, error_of_mean, error_of_quantile, share_band
 from simulator.compiled import compiling_at_once
+from simulator.parameters import parameters_of
 from simulator.readings import object_readings
 
 BY_NAME = {scene.name: scene for scene in SCENES}
@@ -207,6 +208,28 @@ def test_catalogue_has_what_was_asked_for() -> None:
     assert {(s.sensor.kind, bool(s.plate)) for s in SCENES} == set(kinds)
     assert {s.snr for s in SCENES} == {10.0**k for k in range(1, 7)}
     assert {s.empty for s in SCENES} == {0, 5}
+
+
+def test_what_is_told_allows_what_is_true() -> None:
+    """A prior that excluded the truth would make every honest interval miss it.
+
+    The coordinates of unknowns are standard normal under their priors: within four of the middle.
+    """
+    told_something = 0
+    for scene in SCENES:
+        truth = scene.truth.model_dump(mode="json", exclude_unset=True)
+        parameters = parameters_of(scene.sensor, scene.free)
+        values = {f"object.{name}": value for name, value in truth["object"].items()}
+        wall = truth.get("background", {})
+        shadow = truth["object"] if wall.get("shadow") == "object" else wall.get("shadow", {})
+        values |= {f"background.shadow.{name}": value for name, value in shadow.items()}
+        values |= {"background.strength": wall.get("strength")}
+        values |= dict(zip(parameters.crosstalk or (), truth.get("crosstalk", ()), strict=False))
+        point = np.array([[values[name] for name in parameters.names]])
+        z = parameters.standard(point)
+        assert np.all(np.abs(z) < 4.0), scene.name
+        told_something += z.size
+    assert told_something > 3 * len(SCENES)
 
 
 @pytest.mark.parametrize("name", ["Real plate", "Real plate, sine wave"])
