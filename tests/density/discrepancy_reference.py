@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from simulator.sensor import PulsedSensor, Sensor
 
@@ -69,12 +68,12 @@ def sum_over_paths(
     for j, (one, two) in enumerate(readings):
         density = _log_normal(one - first - crosstalk[0], sensor.noise.read[0])
         density = density + _log_normal(two - second - crosstalk[1], sensor.noise.read[1])
-        found, sign = special.logsumexp(
-            density, axis=1, b=weight * np.ones_like(density), return_sign=True
-        )
-        assert (sign > 0).all()
-        total += found
-        means[:, j] = (np.exp(density - found[:, None]) * weight) @ u
+        density += np.log(weight)
+        top = density.max(axis=1)
+        mass = np.exp(density - top[:, None])
+        whole = mass.sum(axis=1)
+        total += top + np.log(whole)
+        means[:, j] = (mass @ u) / whole
     share = np.exp(total - total.max())
     mean = share.mean()
     error = share.std() / math.sqrt(paths) / mean
