@@ -3,14 +3,14 @@
 import math
 import time
 import tracemalloc
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import numpy as np
 
 from simulator import processor_time
 
-__all__ = ["alone", "best", "peak_bytes", "timed", "traced"]
+__all__ = ["alone", "best", "peak_bytes", "quantiles", "timed", "traced"]
 
 T = TypeVar("T")
 
@@ -61,5 +61,10 @@ def alone(calls: list[Callable[[], object]]) -> tuple[float, float]:
         begin = time.process_time()
         call()
         seconds.append(time.process_time() - begin)
+    return quantiles(seconds)
+
+
+def quantiles(seconds: Sequence[float]) -> tuple[float, float]:
+    """Return the median and the 99 % quantile of times [s]."""
     middle, tail = np.quantile(seconds, [0.5, 0.99]).tolist()
     return float(middle), float(tail)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from inference.estimate import estimate
 from inference.estimates import Status, TechniqueResult
 from service.report.cells import Cell
-from service.report.clock import peak_bytes, timed
+from service.report.clock import peak_bytes, quantiles, timed
 from service.report.readings import Readings, sets_of, told_of_object
 from service.report.row import Costs, Row
 from service.report.said import said
@@ -51,6 +51,7 @@ def measure_fit(cell: Cell, seed: int) -> Row:
             np.concatenate([part[k] for part in parts]) for k in range(5)
         )
         first = functools.partial(estimate, scene.sensor, scene_told, sets[0].frames, [name])
+        middle, tail = quantiles(seconds)
         missed = sum(result is None for result in served)
         object_told = scene_told is not scene.free
         remarks = [
@@ -70,6 +71,8 @@ def measure_fit(cell: Cell, seed: int) -> Row:
             ),
             costs=Costs(
                 frame_s=float(np.median(seconds)) / cell.frames,
+                p50_s=middle / cell.frames,
+                p99_s=tail / cell.frames,
                 run_s=float(np.median(seconds)),
                 peak_bytes=peak_bytes(first),
             ),

@@ -14,6 +14,7 @@ from simulator.optics.assembly import OpticalScene, modulation_of, read
 from simulator.optics.electronics import Electronics
 from simulator.optics.motion import series
 from simulator.optics.parametrisation import fit_object
+from simulator.optics.surfaces import Shell
 from simulator.parameters import parameters_of
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import PulsedSensor, Sensor
@@ -131,7 +132,9 @@ def _optical(scene: ReportScene, frames: int, seed: int, empty: int) -> Readings
     values = scene.truth.crosstalk_values
     crosstalk = (0.0, 0.0) if values is None else tuple(map(float, values))  # type: ignore[arg-type]
     electronics = Electronics(crosstalk=(crosstalk[0], crosstalk[1]))
-    bare = OpticalScene(electronics=electronics)
+    wall = scene.truth.background
+    shell = None if wall is None else Shell(radius_m=float(wall.distance_m))  # type: ignore[arg-type]
+    bare = OpticalScene(electronics=electronics, background=shell)
     ranges = np.geomspace(scene.from_m, scene.to_m, frames)
     seen = series(
         bare.model_copy(update={"surfaces": (plate.plate(1.0),)}),

@@ -26,7 +26,8 @@ class Costs:
     frame_s : float or None
         Processor time a frame, all frames in one call [s].
     p50_s, p99_s : float or None
-        Quantiles of the time of a frame that comes alone [s].
+        Quantiles of the time of a frame that comes alone; of what needs many frames, of the time a
+        frame over the data sets [s].
     run_s : float or None
         Processor time of the call [s].
     peak_bytes : int or None

@@ -13,7 +13,7 @@ from inference.posterior.answer.posterior import Posterior
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
 from service.report.cells import Cell
-from service.report.clock import timed, traced
+from service.report.clock import quantiles, timed, traced
 from service.report.readings import Readings, sets_of
 from service.report.row import Costs, Row, order_of
 from service.report.scores import Scores, crps_of_draws, scores_of
@@ -81,6 +81,8 @@ def measure_posterior(cell: Cell, seed: int) -> Row:
         scores=_scores_of_posteriors(sets, answers),
         costs=Costs(
             frame_s=None if run_s is None else run_s / cell.frames,
+            p50_s=None if run_s is None else quantiles(seconds)[0] / cell.frames,
+            p99_s=None if run_s is None else quantiles(seconds)[1] / cell.frames,
             run_s=run_s,
             peak_bytes=peak,
             draws_per_s=effective / run_s if known and run_s is not None else None,

@@ -20,6 +20,8 @@ _WALL: Body = {
     "distance_m": 3.0,
     "shadow": {"c0": 0.0561, "c1": 0.0132},  # of real diffuse plates, and possible by its prior
 }
+# the same wall behind the plate without tilt, whose shadow is not as the object's light is
+_REAL_WALL = _WALL | {"shadow": {"c0": 0.10204, "c1": -0.0285}}
 _SHADOWED = _WALL | {"shadow": "object"}
 _AT_1_M = 0.00771  # what the plate reads there
 _KINDS: dict[Kind, Body] = {
@@ -105,7 +107,8 @@ def _scene(
         unknown = crosstalk == "unknown"
         told["crosstalk"] = _UNKNOWN_CROSSTALK[kind] if unknown else _CROSSTALK[kind]
     if wall != "none":
-        truth["background"] = _SHADOWED if own_shadow else _WALL
+        cast = _REAL_WALL if more.get("plate") else _WALL
+        truth["background"] = _SHADOWED if own_shadow else cast
         told["background"] = truth["background"]
         more = {"to_m": 1.5} | more
     free = dict(told) if free_object is None else {"object": free_object} | told
@@ -128,6 +131,7 @@ SCENES: tuple[ReportScene, ...] = (
     _scene("Bare object", quick=True),
     _scene("Bare object, sine wave", "sine_wave", quick=True),
     _scene("Known crosstalk", crosstalk="known"),
+    _scene("Known crosstalk, sine wave", "sine_wave", crosstalk="known"),
     _scene("Unknown crosstalk", crosstalk="unknown", quick=True),
     _scene("Unknown crosstalk, 5 empty frames", crosstalk="unknown", empty=5, quick=True),
     _scene(
@@ -143,6 +147,13 @@ SCENES: tuple[ReportScene, ...] = (
         own_shadow=True,
         empty=5,
     ),
+    _scene(
+        "Wall of unknown strength, the object's own shadow, sine wave",
+        "sine_wave",
+        wall="unknown",
+        own_shadow=True,
+        empty=5,
+    ),
     _scene("Known crosstalk and known wall", crosstalk="known", wall="known"),
     _scene(
         "Unknown crosstalk, known wall, 5 empty frames", crosstalk="unknown", wall="known", empty=5
@@ -151,14 +162,25 @@ SCENES: tuple[ReportScene, ...] = (
         "Crosstalk and wall unknown, 5 empty frames", crosstalk="unknown", wall="unknown", empty=5
     ),
     _scene("Near: 3 to 20 cm", from_m=0.03, to_m=0.2),
+    _scene("Near: 3 to 20 cm, sine wave", "sine_wave", from_m=0.03, to_m=0.2),
     _scene("Far: 1 to 10 m", from_m=1.0, to_m=10.0),
+    _scene("Far: 1 to 10 m, sine wave", "sine_wave", from_m=1.0, to_m=10.0),
     _scene("Through the fold", body=_FOLDED, free_object=_ROUGH, from_m=0.1, to_m=0.8, quick=True),
+    _scene(
+        "Through the fold, sine wave",
+        "sine_wave",
+        body=_FOLDED,
+        free_object=_ROUGH,
+        from_m=0.1,
+        to_m=0.8,
+    ),
     _scene("Signal-to-noise ratio 10", snr=10.0),
     _scene("Signal-to-noise ratio 100", snr=100.0),
     _scene("Signal-to-noise ratio 10,000", snr=1e4),
     _scene("Signal-to-noise ratio 100,000", snr=1e5),
     _scene("Signal-to-noise ratio 1,000,000", snr=1e6),
     _scene("Real plate", plate="W04H08R00T00", exact=False, quick=True),
+    _scene("Real plate before a known wall", plate="W04H08R00T00", wall="known", exact=False),
     _scene("Real plate, sine wave", "sine_wave", plate="W04H08R00T00", exact=False),
     _scene("Real plate, told that the model is exact", plate="W04H08R00T00"),
     _scene("Real glossy plate, tilted", plate="W04H08R05T06", exact=False),

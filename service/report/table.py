@@ -31,8 +31,8 @@ COLUMNS = (
     "ambiguous",
     "refused",
     "a frame",
-    "alone p50",
-    "alone p99",
+    "p50",
+    "p99",
     "memory",
     "likelihood calls",
     "effective draws a second",
@@ -46,8 +46,10 @@ LEGEND = (
     "together; of one long sweep blocks of neighbouring frames stand for sets, and of fewer than "
     "five sets no standard error can be told. Single frames of which something is unknown, or of "
     "a surface that is not as the model, have that error in common: they are one set. "
-    "A frame: processor time of a call over its frames; alone: of a frame that comes by "
-    "itself. Memory: most that a call held. Effective draws a second: after a passed verdict. "
+    "A frame: processor time of a call over its frames; p50, p99: quantiles of the time of a frame "
+    "that comes by itself, and of fits and posteriors, which need many, over their data sets. "
+    "Memory: most that a call held, of posteriors where one set of several was run for that alone. "
+    "Effective draws a second: after a passed verdict. "
     "How often intervals of fits and posteriors hold the truth is told by many more sets: "
     "docs/coverage.md and docs/calibration.md."
 )
@@ -187,11 +189,14 @@ def line(row: Row) -> str:
 
 
 def left_out(rows: Iterable[Row]) -> dict[str, str]:
-    """Return which methods were left out of a scene, and why."""
+    """Return which methods, or settings of them, were left out of a scene, and why."""
     rows = list(rows)
     served = {row.method for row in rows if row.scores is not None}
-    reasons = {row.method: row.remark for row in rows if row.scores is None}
-    return {method: why for method, why in reasons.items() if method not in served}
+    return {
+        f"{row.method}, {row.knob}" if row.method in served else row.method: row.remark
+        for row in rows
+        if row.scores is None
+    }
 
 
 def markdown(rows: Iterable[Row]) -> str:

@@ -32,12 +32,16 @@ from service.report.run import Report, machine
 from service.report.said import in_words
 from service.report.scenes import SCENES, ReportScene
 from service.report.scores import Scores, crps_of_draws, crps_of_normals, scores_of_roots
-from service.report.table import percent, with_error
+from service.report.table import left_out, percent, with_error
 from service.report.taking import method_to_take
 from service.report.terms import TermCost, operations_of
 from service.report.together import together
 from service.report.uncertain import blocks_of, error_of_mean, error_of_quantile, share_band
+from simulator.catalogue import plate_scene
 from simulator.compiled import compiling_at_once
+from simulator.optics.assembly import OpticalScene, read
+from simulator.optics.parametrisation import fit_shadow
+from simulator.optics.surfaces import Shell
 from simulator.parameters import parameters_of
 from simulator.readings import object_readings
 
@@ -206,6 +210,11 @@ def test_time_left_is_told_by_kind_of_method() -> None:
 def test_catalogue_has_what_was_asked_for() -> None:
     kinds = itertools.product(("pulsed", "sine_wave"), (False, True))
     assert {(s.sensor.kind, bool(s.plate)) for s in SCENES} == set(kinds)
+    for start in ("Known wall", "Near", "Far", "Through the fold", "Known crosstalk", "Bare"):
+        assert {s.sensor.kind for s in SCENES if s.name.startswith(start)} == {
+            "pulsed",
+            "sine_wave",
+        }
     assert {s.snr for s in SCENES} == {10.0**k for k in range(1, 7)}
     assert {s.empty for s in SCENES} == {0, 5}
 
@@ -242,6 +251,23 @@ def test_a_calibration_of_a_plate_fits_what_a_sensor_reads_of_it(name: str) -> N
     light = np.hypot(one, other) if scene.sensor.kind == "sine_wave" else other
     told = body["c0"] * body["c2"] / (r**2 * (r**2 + body["c1"] * r + body["c0"]))
     np.testing.assert_allclose(light, told, rtol=0.1)
+
+
+def test_the_wall_behind_a_plate_is_as_it_is_told() -> None:
+    """To the digits that are told: the plate's shadow at 40 distances, and the bare wall."""
+    scene = BY_NAME["Real plate before a known wall"]
+    wall = scene.known.model_dump(mode="json")["background"]
+    shell, plate = Shell(radius_m=wall["distance_m"]), plate_scene(scene.plate)
+    bare = read(OpticalScene(background=shell), scene.sensor).mean
+    assert bare[1] == pytest.approx(wall["strength"], rel=1e-9)
+    lights = [
+        read(OpticalScene(surfaces=(plate.plate(r),), background=shell), scene.sensor).light
+        for r in np.geomspace(0.1, 2.4, 40).tolist()
+    ]
+    ranges = np.array([light.objects.distance_m for light in lights])
+    shadow = fit_shadow(ranges, np.array([light.visible_share for light in lights]))
+    assert shadow.c0 == pytest.approx(wall["shadow"]["c0"], abs=1e-5)
+    assert shadow.c1 == pytest.approx(wall["shadow"]["c1"], abs=1e-4)
 
 
 def test_reasons_are_in_words() -> None:
@@ -353,6 +379,7 @@ def test_a_posterior_is_scored_and_counted() -> None:
     assert row.scores.coverage > 0.5
     assert row.costs.draws_per_s is not None
     assert row.costs.draws_per_s > 0
+    assert row.costs.p50_s == row.costs.p99_s == row.costs.frame_s
 
 
 def test_more_draws_of_a_posterior_are_a_curve_of_their_own() -> None:
@@ -408,6 +435,16 @@ def test_shares_can_be_read() -> None:
     assert percent(0.0) == "0 %"
     assert with_error(0.012345, 0.00067) == "1.234 ± 0.067 %"
     assert with_error(0.012345, None) == "1.2 %"
+
+
+def test_settings_that_are_left_out_are_listed_with_their_reason() -> None:
+    served = scored("posterior", "posterior", 1e-4, (0.9, 1.0), 1.0)
+    refused = dataclasses.replace(served, knob="100 frames", scores=None, remark="too slow")
+    other = dataclasses.replace(refused, method="brightness", remark="not immune")
+    assert left_out([served, refused, other]) == {
+        "posterior, 100 frames": "too slow",
+        "brightness": "not immune",
+    }
 
 
 def test_intervals_are_put_together_by_sets_and_data_count_once() -> None:
