@@ -2,8 +2,8 @@
 
     python -m benchmarks.self_calibration [--minutes 10] [--seeds 1] [--picture PATH]
 
-An object goes to and fro between 0.3 and 1.5 m at 30 frames a second, leaves and returns; it errs
-from the model as the default `discrepancy` says. Crosstalk of a tenth of its light at 0.6 m drifts
+An object goes to and fro between 0.3 and 1.5 m at 30 frames a second, leaves and returns; it is as
+its model. Crosstalk of a tenth of its light at 0.6 m drifts
 by a tenth of itself in two minutes, as a random walk; at six tenths of the time a wall appears
 behind, and a fingerprint on the glass at eight tenths adds a fifth of the crosstalk at once. The
 stated scene knows priors of object, crosstalk and range alone: what the wall sends is crosstalk to
@@ -143,6 +143,7 @@ class Followed:
     events: list[dict[str, Any]]
     asked: int
     compute_s: float
+    laws: list[tuple[float, Scene]]  # of the scene, when each was taken [s]
 
 
 def followed(of: Course, seed: int, compute: Callable[..., Outcome] = answer) -> Followed:
@@ -161,7 +162,7 @@ def followed(of: Course, seed: int, compute: Callable[..., Outcome] = answer) ->
         spent += time.perf_counter() - begun
         return conclude(state, outcome, asked.decided_at + round(LAG_S * HZ))
 
-    rows, known, events = [], [], []
+    rows, known, events, laws = [], [], [], []
     n = len(of.frames)
     for start in range(0, n, HZ):
         part = of.frames.select(slice(start, start + HZ))
@@ -173,9 +174,12 @@ def followed(of: Course, seed: int, compute: Callable[..., Outcome] = answer) ->
                          piece.track.misfit))  # fmt: skip
             if piece.event is not None:
                 events.append(piece.event)
+                if piece.event["kind"] == "taken":
+                    laws.append((piece.event["sequence"] / HZ, state.scene))
     range_m, sd_m, status, misfit = (np.concatenate(column) for column in zip(*rows, strict=True))
+    unique = status == Status.UNIQUE
     return Followed(
-        range_m, sd_m, status == Status.UNIQUE, misfit, np.array(known), events, state.number, spent
+        range_m, sd_m, unique, misfit, np.array(known), events, state.number, spent, laws
     )
 
 

@@ -70,28 +70,36 @@ def _laid(template: bytes, n: int, rows: Sequence[Iterable[bytes]]) -> bytes:
 
 
 def _hypotheses(said: Said) -> tuple[bytes, list[list[bytes]]]:
-    """Return how the hypotheses of a frame are written, and the texts for its places."""
-    counts = np.unique(said.hypotheses).tolist()
-    if len(counts) == 1:
-        return _list_of(counts[0]), _columns_of(said, counts[0], slice(None))
-    lists = np.empty(len(said.sequence), dtype=object)
-    for count in counts:
+    """Return how the hypotheses of a frame are written, and the texts for its places.
+
+    Those that every frame has are a text for each of their numbers, and what some have beyond them
+    is one text of their frame.
+    """
+    least, *larger = np.unique(said.hypotheses).tolist()
+    columns = _columns_of(said, 0, least, slice(None))
+    if not larger:
+        return b"[%b]" % _list_of(least), columns
+    further = np.full(len(said.sequence), b"", dtype=object)
+    for count in larger:
         which = np.flatnonzero(said.hypotheses == count)
-        columns = _columns_of(said, count, which)
-        lists[which] = _laid(_list_of(count) + b"\n", len(which), columns).split(b"\n")[:-1]
-    return b"%b", [lists.tolist()]
+        form = (b"," if least else b"") + _list_of(count - least) + b"\n"
+        texts = _laid(form, len(which), _columns_of(said, least, count, which))
+        further[which] = texts.split(b"\n")[:-1]
+    return b"[%b%%b]" % _list_of(least), [*columns, further.tolist()]
 
 
-def _columns_of(said: Said, count: int, which: Any) -> list[list[bytes]]:
-    """Return the texts of the numbers of so many hypotheses of some frames."""
-    table = said.table[OWN : OWN + 3 * count, which]
+def _columns_of(said: Said, first: int, last: int, which: Any) -> list[list[bytes]]:
+    """Return the texts of the numbers of some of the hypotheses of some frames."""
+    table = said.table[OWN + 3 * first : OWN + 3 * last, which]
+    if not len(table):
+        return []
     texts, n = _texts(table.ravel()), table.shape[1]
     return [texts[k * n : (k + 1) * n] for k in range(len(table))]
 
 
 @functools.cache
 def _list_of(count: int) -> bytes:
-    return b"[%b]" % b",".join([b'{"range_m":%b,"sd_m":%b,"weight":%b}'] * count)
+    return b",".join([b'{"range_m":%b,"sd_m":%b,"weight":%b}'] * count)
 
 
 @functools.cache
