@@ -4,17 +4,25 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.missed_stretches import drawn
 from benchmarks.self_calibration import (
     HZ,
+    OBJECT,
+    SETTINGS,
+    STATED,
     course,
     draw,
     figures,
     followed,
     longest_s,
+    sensor_of,
     where_longest,
     wrong_of,
 )
 from inference.self_calibration.calibration import Asked, Outcome
+from inference.self_calibration.plan import plan_of
+from inference.self_calibration.scenes import trackable
+from simulator.scene import parse_scene
 from simulator.sensor import Sensor
 
 
@@ -51,3 +59,17 @@ def test_a_short_course_is_followed_counted_and_drawn(tmp_path: Path) -> None:
     assert found["width"] > 0.1
     draw(tmp_path / "picture.png", [("warm", of, said)])
     assert (tmp_path / "picture.png").stat().st_size > 10_000
+
+
+def test_truths_are_drawn_from_what_is_believed() -> None:
+    """A law a hundred times wider misses nothing less: its own draws are as far apart."""
+    plan = plan_of(sensor_of(), parse_scene(STATED), SETTINGS, 0)
+    ranges = np.full(115, 0.6)
+    for sigma in (1e-3, 0.1):
+        c2 = {"prior": "lognormal", "median": OBJECT["c2"], "sigma": sigma}
+        law = trackable(plan.sensor, parse_scene({"object": OBJECT | {"c2": c2}}))
+        found = drawn(plan, law, ranges, 2, 1)
+        assert found == drawn(plan, law, ranges, 2, 1)
+        # 25 frames are too few for a second; 5 standard deviations in one of 4 draws: 2e-6
+        assert found.longer == 0.0
+        assert found.off < 5.0
