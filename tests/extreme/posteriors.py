@@ -129,7 +129,7 @@ def held(case: PosteriorCase, target_ess: int = 200, max_seconds: float = 60.0) 
         return Verdict("refused", precision, math.nan, str(error))
     if not posterior.verdict.converged:
         return Verdict("flagged", precision, math.nan, "; ".join(posterior.verdict.reasons))
-    if any("its interval is widened" in (row.reason or "") for row in posterior.identifiability):
+    if posterior.draws.widened:
         return _widened(case, exact, posterior)
     off = {
         f"{name}, {what}": error

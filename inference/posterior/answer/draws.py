@@ -52,6 +52,10 @@ class Draws:
         Readings drawn anew at these parameters and ranges; nan for a saturated frame.
     log_likelihood : ndarray, shape (ensembles, walkers, t, frames)
         log p(readings of the frame | parameters), its range integrated out; nan likewise.
+    widened : bool
+        Whether parameters and ranges are moved by a random part of what the law of the ranges, or
+        the number of frames, would move them: they are then wider than the posterior whose
+        `log_density` this is.
     """
 
     names: tuple[str, ...]
@@ -64,6 +68,7 @@ class Draws:
     range_m: Array
     readings: Array
     log_likelihood: Array
+    widened: bool = False
 
 
 def _count(sample: Sample, frames: int) -> int:

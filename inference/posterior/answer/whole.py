@@ -114,7 +114,8 @@ def with_model_error(
     sensitivity = prior_sensitivity(sampled, chosen, log_r)
     if bias is not None and leaning(sensitivity) is None:
         sensitivity = following(bias, chosen, log_r)
-    budget = error_budget(job, density, chosen, log_r, larger, leaning(sensitivity), rng)
+    owed = leaning(sensitivity)
+    budget = error_budget(job, density, chosen, log_r, larger, owed, rng)
     errors = budget.errors(m, rng)
     z = budget.moved(sample.flat, budget.errors(len(sample.flat), rng)).reshape(sample.z.shape)
     z[:, :, draws.thinned] = budget.moved(chosen, errors).reshape(thinned.shape)
@@ -134,7 +135,9 @@ def with_model_error(
     return Whole(
         chosen,
         log_r,
-        dataclasses.replace(draws, parameters=parameters, range_m=range_m),
+        dataclasses.replace(
+            draws, parameters=parameters, range_m=range_m, widened=owed is not None
+        ),
         reported,
         Spread(density.parameters.marginal(flat).std(axis=0), scale),
         budget,
