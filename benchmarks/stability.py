@@ -40,8 +40,8 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=16, help="random ranges a scene")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--slopes", type=int, default=5_000, help="frames of the derivatives")
-    parser.add_argument("--tracks", type=int, default=2_500, help="streams, a fifth of them faint")
-    parser.add_argument("--fits", type=int, default=5, help="data sets a scene, kind and noise")
+    parser.add_argument("--tracks", type=int, default=2_000, help="streams, a fifth of them faint")
+    parser.add_argument("--fits", type=int, default=3, help="data sets a scene, kind and noise")
     rows = [*FAMILIES, *(f"{technique}, sine wave" for technique in WAVES), _DERIVATIVES, _ANSWERS]
     parser.add_argument("--only", nargs="+", choices=rows, default=rows, metavar="ROW")
     options = parser.parse_args()

@@ -230,14 +230,16 @@ def grid_miss(case: TrackCase) -> float | None:
         if i:
             grid.move(float(case.frames.time_s[i] - case.frames.time_s[i - 1]))
         grid.see(readings)
-        if grid.moments()[1] < _CELLS * (grid.u[1] - grid.u[0]):
-            break
-        cells = grid.mass.sum(axis=1)
-        exact = np.cumsum(cells) - 0.5 * cells
         weight = np.nan_to_num(found.hypotheses_weight[i])
         listed = weight > 0
         own = weight[listed]
         sd = found.hypotheses_sd_m[i, listed] / found.hypotheses_m[i, listed]
+        # of several modes each is narrower than all of them
+        narrowest = min(grid.moments()[1], float(sd[own > 0.01].min(initial=np.inf)))
+        if narrowest < _CELLS * (grid.u[1] - grid.u[0]):
+            break
+        cells = grid.mass.sum(axis=1)
+        exact = np.cumsum(cells) - 0.5 * cells
         x = (grid.u[:, None] - np.log(found.hypotheses_m[i, listed])) / sd
         # of the rest only that it may be there is known
         below = special.ndtr(x) @ own + (found.present[i] - own.sum()) * share
