@@ -75,7 +75,7 @@ class FitMiss:
 
 
 def _means(sensor: Sensor, v: dict[str, Any], r: Any) -> tuple[Any, Any]:
-    """Return the two readings of one frame: docs/model.md, written down once more."""
+    """Return the two readings of one frame, written down once more from docs/model.md."""
     gain = mpf(sensor.known_gain)
     c0, c1, c2 = (v[f"object.c{k}"] for k in range(3))
     light = gain * c0 * c2 / (r * r * (r * r + c1 * r + c0))
