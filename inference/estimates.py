@@ -57,11 +57,13 @@ class TechniqueResult:
     root_count : ndarray of int, shape (n,)
         Number of roots of each frame.
     near_fold : ndarray of bool, shape (n,)
-        Whether the noise could merge, part or remove a pair of roots.
+        Whether the noise could merge, part or remove a pair of roots, or reaches the r0 of a
+        pulse, from where on all ranges read alike.
     reason : ndarray of uint8, shape (n,)
         Index into ``reasons``; 0 says nothing.
     reasons : tuple of str
-        The reasons that occur, ``reasons[0] == ""``.
+        The reasons that the technique can give, whether they occur or not: what ``reason``
+        indexes; ``reasons[0] == ""``.
     sd_parts_m : SdParts, optional
         Their parts; without meaning where the whole is nan.
     range_bounds_m : ndarray, shape (n, 2), optional

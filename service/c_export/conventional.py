@@ -47,11 +47,18 @@ static int answer(real first, real second, @_answer *out)
 @NOISE        sd = SQRT(b * b * (own1 + shared) + a * a * (own2 + shared)) / (a * a + b * b) / size;
     }
     band = 3 * sd < TURN / 4 ? 3 * sd : TURN / 4;
-    if (!(phase > 0) || phase > TURN - band)
+    if (!(phase > 0) || phase > TURN - band + LOW * WAVE_NUMBER)
         return @_NONE;
     range = phase / WAVE_NUMBER;
     if (!(range >= LOW * (1 - 8 * EPSILON)) || !(range <= HIGH * (1 + 8 * EPSILON)))
         return @_NONE;
+    if (20 * sd > 1) { /* noise turns a faint phasor by more than its tangent */
+        const real most = 3 * sd;
+        if (most > 1)
+            sd = (phase > TURN - phase ? phase : TURN - phase) / 3;
+        else
+            sd = ATAN2(most, SQRT((1 - most) * (1 + most))) / 3;
+    }
     sd = sd / WAVE_NUMBER;
     if (sd < EPSILON * range)
         sd = EPSILON * range;

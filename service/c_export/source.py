@@ -51,7 +51,7 @@ class Bound:
         kind : "float" or "double"
             The type.
         range_m, sd_m : float
-            The exact range, and its standard deviation by noise [m].
+            The exact range, and its standard deviation by noise, of first order [m].
         readings : (float, float)
             Of the frame.
         """

@@ -69,6 +69,14 @@ def _run(args: argparse.Namespace) -> int:
             args.output.write_text(estimates_as(args.output.suffix, document), encoding="utf-8")
     if args.output is None:
         write_result(encoded)
+    for result in estimates.results:
+        if result.fit is not None and result.fit["misfit"]:
+            note(
+                args,
+                f"note: {result.technique} gives no ranges: its fit does not explain the frames "
+                f"(misfit, p value {result.fit['p_value']:.2g}); something is not as the scene "
+                "states it",
+            )
     if estimates.results:
         return 0
     if args.output is not None:

@@ -11,6 +11,7 @@ from scipy import special
 
 from inference.estimate import estimate
 from inference.estimates import Status, TechniqueResult
+from inference.fits.answer.ranges import MISFIT
 from inference.fits.techniques.crosstalk_fit import with_error
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
@@ -370,3 +371,10 @@ def test_a_misfit_is_said_at_its_false_alarm_rate(
     assert found.fit is not None
     assert found.fit["p_value"] == pytest.approx(p_value, rel=0.05)
     assert found.fit["misfit"] is misfit
+    # what it contradicts is not handed out, whichever way the ranges came
+    assert (found.status == (Status.NONE if misfit else Status.UNIQUE)).all()
+    assert np.isfinite(found.roots_m).all() == (not misfit)
+    assert {found.reasons[k] for k in found.reason} == {MISFIT if misfit else ""}
+    if misfit:
+        assert found.parameters is not None
+        assert {one["status"] for one in found.parameters.values()} == {"not_identified"}

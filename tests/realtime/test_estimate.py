@@ -38,6 +38,7 @@ def noise_of(noise: float) -> dict[str, list[float]]:
 
 
 PULSED, SINE = sensor_of("pulsed"), sensor_of("sine_wave")
+SINE_WAVE_NUMBER = 4.0 * math.pi * 2e7 / 299792458.0
 
 
 def frame(*pair: float) -> Frames:
@@ -179,6 +180,50 @@ def test_a_phase_just_below_zero_is_contact() -> None:
     assert result.status.tolist() == [Status.NONE, Status.UNIQUE]
     assert "at or near contact" in reason_of(result, 0)
     assert result.range_m[1] > 7.4
+
+
+@pytest.mark.parametrize(
+    ("phase", "low", "high", "root", "words"),
+    [
+        (-2e-6, 0.0, 5.0, False, "at or near contact"),
+        (-2e-6, 0.0, 20.0, False, "at or near contact, or at the end of the unambiguous range"),
+        (-2e-6, 1.0, 20.0, True, ""),
+        # a nearest range that is not zero, and lies within the noise of the phase too
+        (-2e-6, 3e-7 / SINE_WAVE_NUMBER, 20.0, False, "or at the end of the unambiguous range"),
+        (2e-6, 1.0, 20.0, False, "every solution lies outside the ranges of the scene"),
+    ],
+)
+def test_a_phase_below_zero_is_contact_only_where_the_scene_allows_it(
+    phase: float, low: float, high: float, root: bool, words: str
+) -> None:
+    """The noise of the phase is 1e-6 rad: within three of it lies a range near zero, or the end."""
+    scene = parse_scene({"range_m": {"prior": "uniform", "low": low, "high": high}})
+    readings = frame(math.cos(phase), math.sin(phase))
+    (result,) = estimate(SINE, scene, readings, ["conventional"]).results
+    assert (result.status[0] == Status.UNIQUE) == root
+    assert reason_of(result, 0).endswith(words)
+    if root:
+        expected = (2 * math.pi + phase) / SINE_WAVE_NUMBER
+        assert result.range_m[0] == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_end_of_a_pulse_is_a_fold() -> None:
+    """Beyond r0 both windows hold the whole pulse: noise puts half of such frames below r0."""
+    r0, noise = 14.9896229, 1e-6 * math.sqrt(2.0)
+    shares = [1.0 - 2.9 * noise, 1.0 - 3.1 * noise, 1.0, 1.0 + noise, 0.5, 0.1]
+    readings = np.column_stack([shares, np.ones(6)])
+    (result,) = estimate(PULSED, parse_scene({}), Frames(readings)).results
+    assert result.near_fold.tolist() == [True, False, True, False, False, False]
+    assert "beyond r0" in reason_of(result, 3)
+    assert np.isfinite(result.sd_m[[0, 1, 2, 4, 5]]).all()
+    # noise as wide as the range reaches every end
+    dark = Frames(np.array([[3e-6, 4e-6], [1e-6, 4e-6]]))
+    (result,) = estimate(PULSED, parse_scene({}), dark).results
+    assert result.range_m == pytest.approx([0.75 * r0, 0.25 * r0])
+    assert result.near_fold.tolist() == [True, False]
+    empty = Frames(np.ones((2, 2)), object_present=np.array([True, False]))
+    (result,) = estimate(PULSED, parse_scene({}), empty).results
+    assert result.near_fold.tolist() == [True, False]
 
 
 def test_only_a_stated_support_limits_the_roots() -> None:

@@ -256,6 +256,29 @@ def test_estimates_as_csv(capsys: pytest.CaptureFixture[str], tmp_path: Path, sc
     ] == lines[0]
 
 
+def test_a_fit_that_misfits_gives_no_range_and_says_so(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """A plane of which c2 alone is told, and readings that scatter by 30 times their noise."""
+    ranges, rng = np.linspace(0.2, 2.0, 12), np.random.default_rng(1)
+    scatter = 1.0 + 0.03 * rng.standard_normal(12)
+    whole = 0.1 / ranges**2 * scatter
+    columns = {"w1": (whole * ranges / 14.9896229).tolist(), "w2": whole.tolist()}
+    noise = {"read": [1e-6, 1e-4]}
+    system = {"sensor": SENSOR | {"noise": noise}, "scene": {"discrepancy": 0}}
+    frames = written(tmp_path / "f.json", columns)
+    scene = written(tmp_path / "s.json", system)
+    out = tmp_path / "out.csv"
+    said = Said(capsys, "estimate", frames, "--scene", scene, "--technique", "object_fit",
+                "--output", out)  # fmt: skip
+    assert said.code == 0
+    assert "note: object_fit gives no ranges: its fit does not explain the frames" in said.err
+    assert "(misfit, p value " in said.err
+    rows = out.read_text().splitlines()[1:]
+    assert len(rows) == 12
+    assert all(",none,,,,,false," in row and "(misfit)" in row for row in rows)
+
+
 @pytest.mark.parametrize("command", ["estimate", "simulate"])
 def test_a_file_that_cannot_be_written_is_refused_before_the_work(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, command: str

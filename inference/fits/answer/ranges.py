@@ -21,7 +21,7 @@ from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.problem import FitProblem
 from inference.realtime.net import ABSENT, COMMON_REASONS, SATURATED
 
-__all__ = ["DECIDED", "WITHIN", "Answer", "frame_ranges"]
+__all__ = ["DECIDED", "MISFIT", "WITHIN", "Answer", "frame_ranges"]
 
 Array = NDArray[np.float64]
 
@@ -31,12 +31,14 @@ WITHIN = 3.8414588206941285
 _IMPOSSIBLE = 36.0  # chi-square of a single frame that nothing explains
 _ONE = 1.0  # standard deviations below which two modes are one
 
+# why a fit that does not explain the frames gives no range
+MISFIT = "the fit does not explain the frames (misfit): something is not as the scene states it"
 _REASONS = (
     *COMMON_REASONS,
     "more than one range explains the readings, and the fit over all frames does not decide",
     "no range explains the readings within six standard deviations",
     "the best range lies at the end of the ranges of the scene",
-    "the fit does not explain the frames (misfit): something is not as the scene states it",
+    MISFIT,
     "the readings contradict what is known of the range (known_range_m, displacement_m): a misfit",
 )
 _AMBIGUOUS, _UNEXPLAINED, _EDGE, _MISFIT, _CONTRADICTED = range(len(COMMON_REASONS), len(_REASONS))

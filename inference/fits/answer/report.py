@@ -118,10 +118,10 @@ def spoiled(parameters: Mapping[str, Any], report: Mapping[str, Any]) -> dict[st
     Parameters
     ----------
     parameters : mapping
-        From `describe`.
+        From `describe`, or of a linear fit.
     report : mapping
-        From `fit_report`: standard deviations grow with the root of chi-square over its degrees of
-        freedom.
+        From `fit_report`, or of a linear fit: standard deviations grow with the root of chi-square
+        over its degrees of freedom.
 
     Returns
     -------
@@ -131,7 +131,8 @@ def spoiled(parameters: Mapping[str, Any], report: Mapping[str, Any]) -> dict[st
     factor = math.sqrt(max(report["chi_square"] / max(report["degrees_of_freedom"], 1), 1.0))
     answer = {}
     for path, entry in parameters.items():
-        sd, parts = entry["sd"], entry["sd_parts"]
+        # what is not identified anyway has no parts
+        sd, parts = entry["sd"], entry.get("sd_parts")
         answer[path] = {
             **entry,
             "sd": None if sd is None else factor * sd,

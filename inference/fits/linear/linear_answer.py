@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
 from inference.fits.answer.ranges import Answer, frame_ranges
-from inference.fits.answer.report import FALSE_ALARM, entries, with_parts
+from inference.fits.answer.report import FALSE_ALARM, entries, spoiled, with_parts
+from inference.fits.answer.withheld import without_ranges
 from inference.fits.likelihood.model_error import unexplained
 from inference.fits.likelihood.problem import fit_problem
 from inference.fits.linear.follow import Follow
@@ -60,7 +61,8 @@ def linear_answer(
     Returns
     -------
     TechniqueResult
-        Ranges by all readings and parameters together where every parameter is identified.
+        Ranges by all readings and parameters together where every parameter is identified; none
+        of a fit that does not explain the frames.
     """
     numbers = [fit.chi_square, *(value for value, _ in natural.values())]
     if not np.isfinite(numbers).all():
@@ -94,8 +96,11 @@ def linear_answer(
         "rank": fit.rank,
         "optima": [],
     }
+    if report["misfit"]:
+        parameters = spoiled(parameters, report)
     if missing:
-        return dataclasses.replace(single, technique=name, parameters=parameters, fit=report)
+        stands = without_ranges(single) if report["misfit"] else single
+        return dataclasses.replace(stands, technique=name, parameters=parameters, fit=report)
     report["optima"] = [
         {
             "excess_deviance": 0.0,

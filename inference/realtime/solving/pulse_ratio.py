@@ -39,6 +39,8 @@ class Pulse(NamedTuple):
         Full scale, inf where there is none.
     error : float
         Standard deviation of the error of the effective distance, the model's part [m].
+    band : float
+        Standard deviations of noise within which r0 is reached.
     """
 
     r0: float
@@ -51,18 +53,21 @@ class Pulse(NamedTuple):
     full_late: float
     full_whole: float
     error: float
+    band: float
 
 
 class Columns(NamedTuple):
     """Results of n frames: ranges, standard deviations, and why there is none (0: there is).
 
-    The standard deviations are the whole and, of these, what noise does.
+    The standard deviations are the whole and, of these, what noise does; ``near`` is 1 where noise
+    reaches r0, at which the ratio ends: objects beyond it have w1 = w2.
     """
 
     roots: Array
     sds: Array
     noise: Array
     reason: NDArray[np.uint8]
+    near: NDArray[np.uint8]
 
 
 class Codes(NamedTuple):
@@ -125,7 +130,9 @@ def pulsed_ranges(flat: Array, pulse: Pulse, columns: Columns) -> int:
         Receives the results.
     """
     roots, sds, noise, reason = columns.roots, columns.sds, columns.noise, columns.reason
+    near = columns.near
     square = pulse.error * pulse.error
+    half = 0.5 * pulse.r0
     bad = 0
     for i in range(roots.size):
         raw1, raw2 = flat[2 * i], flat[2 * i + 1]
@@ -150,6 +157,8 @@ def pulsed_ranges(flat: Array, pulse: Pulse, columns: Columns) -> int:
         # the square of what is tiny or huge is no number
         sds[i] = (whole_sd if sd < whole_sd < math.inf else sd) if good else math.nan
         reason[i] = 0 if good else 1
+        # noise as wide as the range tells of no end
+        near[i] = 1 if good & (r > half) & (pulse.r0 - r < pulse.band * sd) else 0
         bad += 0 if good else 1
     return bad
 

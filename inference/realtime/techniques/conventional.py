@@ -41,8 +41,10 @@ _REASONS = reasons_of(
     "w1 is above w2: beyond r0, or too little light",
     "no signal: i and q are zero",
     "the phase is below zero within its noise: at or near contact",
+    "the phase is below zero within its noise: at or near contact, or at the end of the "
+    "unambiguous range",
 )
-_DARK, _CONTACT, _BEYOND, _SILENT, _WRAPPED = range(len(_REASONS) - 5, len(_REASONS))
+_DARK, _CONTACT, _BEYOND, _SILENT, _WRAPPED, _EITHER = range(len(_REASONS) - 6, len(_REASONS))
 _SLACK = 8 * float(np.finfo(float).eps)
 _CODES = Codes(
     dark=_DARK,
@@ -128,18 +130,18 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
         full_late=full_late,
         full_whole=full_whole,
         error=model_error_of(task).range_m,
+        band=NOISE_BAND,
     )
     # one block for all columns: freshly mapped pages would cost more than the arithmetic
     block = np.empty(35 * n, dtype=np.uint8)
     roots, sds, noise = (block[8 * i * n : 8 * (i + 1) * n].view(np.float64) for i in range(3))
     count = block[24 * n : 32 * n].view(np.intp)
     status, reason, near = (block[(32 + i) * n : (33 + i) * n] for i in range(3))
-    columns = Columns(roots, sds, noise, reason)
+    columns = Columns(roots, sds, noise, reason, near)
     flat = np.ascontiguousarray(frames.readings).reshape(-1)
     bad = pulsed_ranges(flat, pulse, columns)
     count.fill(1)
     status.fill(Status.UNIQUE)
-    near.fill(0)
     if bad:
         explain(flat, pulse, _CODES, columns)
     if shift != 0.0:
@@ -147,6 +149,7 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
     if frames.object_present is not None:
         absent = ~frames.object_present & (reason != SATURATED)
         reason[absent], roots[absent], sds[absent] = ABSENT, np.nan, np.nan
+        near[absent] = 0
         bad += int(np.count_nonzero(absent))
     if bad:
         rootless = np.isnan(roots)
@@ -169,6 +172,7 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
 def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
     net = known_net_readings(task)
     k, error = sensor.wave_number, model_error_of(task).range_m
+    support = task.known.support if task.physical else (0.0, np.inf)
     with np.errstate(all="ignore"):
         modulus = np.hypot(net.first, net.second)
         phase = _phase(net.first, net.second, sensor.known_phase_rad)
@@ -177,7 +181,8 @@ def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
         sd = np.sqrt(net.variance(-net.second / safe / safe, net.first / safe / safe))
         band = np.minimum(NOISE_BAND * sd, 0.5 * np.pi)
         turned = phase_reach(phase, sd, 2 * np.pi)
-        contact = (phase > 2 * np.pi - band) | (phase == 0.0)
+        # a range that the scene allows lies within the noise of zero, or this is the far end
+        contact = (phase > 2 * np.pi - band + k * support[0]) | (phase == 0.0)
         usable = (modulus > 0) & np.isfinite(modulus)
         if task.physical:
             usable &= ~contact
@@ -195,8 +200,9 @@ def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
             near=np.zeros(roots.shape, dtype=np.bool_),
             near_frame=np.zeros(len(task.frames), dtype=np.bool_),
         )
-    reason = np.where(modulus > 0, _WRAPPED, _SILENT).astype(np.uint8)
-    support = task.known.support if task.physical else (0.0, np.inf)
+        far = (phase > np.pi) & (phase <= k * support[1])
+    wrapped = np.where(far, _EITHER, _WRAPPED)
+    reason = np.where(modulus > 0, wrapped, _SILENT).astype(np.uint8)
     outcome = Outcome(None, support, reason, _REASONS)
     return assemble("conventional", net.state, candidates, outcome)
 
