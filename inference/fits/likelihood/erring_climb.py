@@ -126,13 +126,15 @@ def climbed(
             da = np.linalg.lstsq(triangle[:k, :k], left, rcond=None)[0]
             there = point_at(problem, new, _ranges(problem, at, seen, dx, da), at.a + da)
             there = _settled(problem, there)
-            if there.deviance < at.deviance:
-                better = there
-                break
+            if math.isfinite(there.deviance):
+                gained = at.deviance - there.deviance_weighted_as(at)
+                if gained > 0.0:
+                    better = there
+                    break
             damping *= 6.0
         if better is None:
             break
-        gained, at, damping = at.deviance - better.deviance, better, max(damping / 4.0, 1e-9)
+        at, damping = better, max(damping / 4.0, 1e-9)
         if gained < _ENOUGH:
             break
     return at, remaining

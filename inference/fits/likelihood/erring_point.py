@@ -12,6 +12,7 @@ from inference.fits.likelihood.linearisation import whitened_slopes
 from inference.fits.likelihood.model_error import errors_of_readings, share_left
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import Told, told_at, with_column
+from inference.frame.delayed import delayed
 from inference.frame.sensitivity import Value
 from inference.identifiability.elimination import eliminate
 
@@ -34,7 +35,10 @@ _DIFFERENCE = 1e-4
 
 
 class Point(NamedTuple):
-    """Unknowns, ranges and errors, and the readings linearised there; whitened."""
+    """Unknowns, ranges and errors, and the readings linearised there; whitened by ``root``.
+
+    ``volume`` is the part of the deviance that is no sum of squares.
+    """
 
     x: Array
     u: Array
@@ -46,6 +50,19 @@ class Point(NamedTuple):
     along: Array
     errors: Array
     told: Told | None
+    root: Array
+    volume: float
+
+    def deviance_weighted_as(self, other: "Point") -> float:
+        """Return its deviance with the covariances of another point.
+
+        Steps are computed with covariances that stay. Of many frames these differ between points
+        by enough to hide what a step gains, so that it is judged as it was computed.
+        """
+        bare = self.root @ self.residual[:, :, None]
+        square = np.square(np.linalg.solve(other.root, bare)).sum()
+        change = float(square - np.square(self.residual).sum())
+        return self.deviance - self.volume + other.volume + change
 
 
 def moved_by_errors(problem: FitProblem, x: Array, u: Array, of_x: Array) -> tuple[Array, Array]:
@@ -100,10 +117,14 @@ def slopes_of_priors(problem: FitProblem, x: Array) -> Array:
     return np.asarray((z[1:] - z[0]).T / _DIFFERENCE)
 
 
-def linearised(problem: FitProblem, x: Array, u: Array) -> tuple[Array, ...]:
+def linearised(
+    problem: FitProblem, x: Array, u: Array, a: Array | None = None
+) -> tuple[Array, ...]:
     """Return residuals, derivatives along unknowns, log r and errors, and from readings to noise.
 
-    All but the last in units of the noise.
+    All but the last in units of the noise. With ``a``, of the light as it is with these errors:
+    where many frames leave little of what errors do not take up, derivatives of the bare light end
+    a climb away from its top.
     """
     n, values = u.size, problem.values(x)
     by_value, along, residual = np.empty((n, 2, SLOTS)), np.empty((n, 2)), np.empty((n, 2))
@@ -114,19 +135,61 @@ def linearised(problem: FitProblem, x: Array, u: Array) -> tuple[Array, ...]:
     signal = by_value[:, :, Value.C2] * values[Value.C2]
     light = np.linalg.solve(whitener, signal[:, :, None])[:, :, 0]
     errors = whitener @ errors_of_readings(problem, light, u)
-    errors = with_column(problem.known, np.where(np.isnan(errors), 0.0, errors))
-    return residual, by_value @ problem.chain(x), along, errors, whitener
+    errors = np.where(np.isnan(errors), 0.0, errors)
+    if a is not None:
+        erring = _Erring(problem, u, a[: errors.shape[2]], whitener)
+        for column in (Value.C0, Value.C1, Value.C2):
+            bare = np.linalg.solve(whitener, by_value[:, :, column, None])
+            by_value[:, :, column] += erring.change(np.asarray(bare[:, :, 0], np.float64))
+        along = along + erring.change(light, _slope_of_light(problem, values, light, u))
+    return (
+        residual,
+        by_value @ problem.chain(x),
+        along,
+        with_column(problem.known, errors),
+        whitener,
+    )
+
+
+class _Erring(NamedTuple):
+    """Errors of the model at given ranges, and what turns readings into noise."""
+
+    problem: FitProblem
+    u: Array
+    a: Array
+    whitener: Array
+
+    def change(self, light: Array, slopes: Array | None = None) -> Array:
+        """Return what the errors do to light or, of its slopes, to these; whitened, (n, 2)."""
+        moved = errors_of_readings(self.problem, light, self.u, slopes)
+        moved = np.where(np.isnan(moved), 0.0, moved) @ self.a
+        return np.asarray((self.whitener @ moved[:, :, None])[:, :, 0])
+
+
+def _slope_of_light(problem: FitProblem, values: Array, light: Array, u: Array) -> Array:
+    """Return the derivative of the object's readings along log r (docs/model.md, 4.13, 4.17)."""
+    r, c0, c1 = np.exp(u), values[Value.C0], values[Value.C1]
+    # c0 + c1 r + r^2 without cancellation beside its pole
+    vertex = 0.5 * c1
+    q = np.square(r + vertex) + (c0 - vertex * vertex)
+    steep = -2.0 - r * (2.0 * r + c1) / q
+    late = delayed(light, u, problem.instrument.r0, problem.instrument.wave)
+    return np.asarray(steep[:, None] * light + r[:, None] * late)
 
 
 def whitened_of(problem: FitProblem, u: Array, errors: Array, parts: Array) -> Array:
     """Divide by the noise and what is left of errors."""
+    return np.asarray(np.linalg.solve(_root_of_covariance(problem, u, errors), parts))
+
+
+def _root_of_covariance(problem: FitProblem, u: Array, errors: Array) -> Array:
+    """Return the Cholesky factor of noise and what is left of errors, in units of the noise."""
     with np.errstate(over="ignore", invalid="ignore"):
         left = share_left(problem, u) * np.einsum("nik,njk->nij", errors, errors)
     left = np.where(np.isfinite(left).all(axis=(1, 2), keepdims=True), left, 0.0)
     # beside errors of 1e8 the noise's own 1 would be lost
     own = 1.0 + 1e-12 * np.trace(left, axis1=1, axis2=2)
-    factor = np.linalg.cholesky(own[:, None, None] * np.eye(2) + left)
-    return np.asarray(np.linalg.solve(factor, parts))
+    return np.asarray(np.linalg.cholesky(own[:, None, None] * np.eye(2) + left))
 
 
 def left_of_frames(
@@ -150,21 +213,35 @@ def left_of_frames(
     return np.asarray(across(residual[:, :, None]) / spread)
 
 
+def _volume(root: Array, along: Array, white: Array) -> float:
+    """Return the log determinant of what is left of errors, across the range of every frame.
+
+    Without it more light, which makes the share of errors larger, would make every residual less;
+    along a range that is free there is none.
+    """
+    bare, divided = (np.square(part).sum(axis=1) for part in (along, white))
+    free = (bare > 0.0) & (divided > 0.0) & np.isfinite(bare)
+    whole = 2.0 * float(np.log(np.diagonal(root, axis1=1, axis2=2)).sum())
+    return whole + float((np.log(divided[free]) - np.log(bare[free])).sum())
+
+
 def point_at(problem: FitProblem, x: Array, u: Array, a: Array, z: Array | None = None) -> Point:
     """Linearise in units of the noise and of what is left of errors; ``z`` is `standard` of x."""
-    residual, jacobian, along, errors, _ = linearised(problem, x, u)
+    residual, jacobian, along, errors, _ = linearised(problem, x, u, a)
     parts = [(residual - errors @ a)[:, :, None], jacobian, along[:, :, None], errors]
-    white = whitened_of(problem, u, errors, np.concatenate(parts, axis=2))
+    root = _root_of_covariance(problem, u, errors)
+    white = np.asarray(np.linalg.solve(root, np.concatenate(parts, axis=2)), np.float64)
     d = x.size
+    volume = _volume(root, along, white[:, :, d + 1])
     residual, z = white[:, :, 0], standard(problem, x[None])[0] if z is None else z
     at = white[:, :, 1 : d + 1], white[:, :, d + 1], white[:, :, d + 2 :]
     told = told_at(problem.known, u, a)
     with np.errstate(over="ignore", invalid="ignore"):
-        deviance = float(np.square(residual).sum() + a @ a + z @ z)
+        deviance = float(np.square(residual).sum() + a @ a + z @ z) + volume
         if told is not None:
             deviance += float(np.square(told.residual).sum())
         if problem.mode is not None:
             deviance += problem.mode.deviance
         known = math.isfinite(deviance + float(np.abs(at[0]).sum() + np.abs(at[2]).sum()))
     deviance = deviance if known else math.inf
-    return Point(x, u, a, z, deviance, residual, *at, told)
+    return Point(x, u, a, z, deviance, residual, *at, told, root, volume)

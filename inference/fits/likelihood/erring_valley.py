@@ -24,6 +24,7 @@ _ENOUGH = 4.0  # deviance that two standard deviations cost
 _FLAT = 0.5  # of the deviance that curvature foresees, below which a valley is followed
 _DOUBLINGS = 6
 _BASES = 3  # optima whose valleys are followed
+_ONE = 0.1  # standard deviations between two ends that are one
 _STRIDE = 1.0  # most that a logarithm is moved at once
 _BETTER = 0.05  # deviance by which another optimum is better
 
@@ -46,12 +47,23 @@ def valleys(problem: FitProblem, found: Sequence[Erring]) -> tuple[list[Erring],
     """
     points: list[Erring] = []
     best = found[0].deviance
-    for base in [one for one in found if one.deviance - best < _ENOUGH][:_BASES]:
+    bases: list[Erring] = []
+    for base in (one for one in found if one.deviance - best < _ENOUGH):
+        if len(bases) == _BASES or any(_near(base, other) for other in bases):
+            continue
+        bases.append(base)
         more, better = _valley(problem, base, best)
         points += more
         if better is not None:
             return points, better
     return points, None
+
+
+def _near(one: Erring, other: Erring) -> bool:
+    """Return whether two ends of climbs are one optimum, to a part of its standard deviations."""
+    of_x, _ = other.whole.factors
+    sds = np.linalg.norm(of_x, axis=1)
+    return bool((np.abs(one.x - other.x) < _ONE * sds).all())
 
 
 def _valley(problem: FitProblem, base: Erring, best: float) -> tuple[list[Erring], Erring | None]:
@@ -72,7 +84,8 @@ def _valley(problem: FitProblem, base: Erring, best: float) -> tuple[list[Erring
                     break
                 if at.deviance < best - _BETTER:
                     end, remaining = climbed(problem, at, 5 * _STEPS)
-                    return points, end_of(problem, end, remaining)
+                    if end.deviance < best - _BETTER:
+                        return points, end_of(problem, end, remaining)
                 away = abs(float(at.x[j] - base.x[j])) / sds[j]
                 if at.deviance - base.deviance >= _FLAT * away * away:
                     break
