@@ -103,7 +103,7 @@ def test_what_is_not_known_is_left_out_by_name() -> None:
     assert "sensor.temperature.delay_drift_s_per_k" in reasons["conventional"]
     with pytest.raises(RefusedError, match="delay_drift_s_per_k unknown"):
         tracker(sensor, parse_scene(SCENE))
-    with pytest.raises(RefusedError, match="not exported"):
+    with pytest.raises(RefusedError, match="export to C knows no temperature"):
         export_c("conventional", sensor, parse_scene(SCENE))
     known, frames = _seen("pulsed")
     unknown = parse_scene(SCENE | {"crosstalk": [prior, prior]})
