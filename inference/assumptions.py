@@ -1,12 +1,14 @@
-"""What an answer supposes that no reading can test, and that moves ranges where it is wrong."""
+"""What an answer supposes without a check, and what looks like a mistake in what is stated."""
 
 import numpy as np
 
+from inference.empty_frames import contradiction
+from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK, taken_for_crosstalk
 from simulator.frames import Frames
 from simulator.scene import Scene
-from simulator.sensor import Sensor
+from simulator.sensor import PulsedSensor, Sensor
 
-__all__ = ["assumptions_of", "unused_temperature"]
+__all__ = ["assumptions_of", "doubtful_unit", "unused_temperature"]
 
 _OWN_SHADOW = (
     'the shadow is taken for the object\'s own (c0\' = c0, c1\' = c1), as "shadow": "object" says. '
@@ -17,6 +19,9 @@ _TEMPERATURE = (
     "gain and delay do not follow the temperature: temperature_k is given and not used, since the "
     "sensor states no coefficients in `temperature`"
 )
+# unambiguous ranges that a sensor of this kind may have [m]: it ends neither where scenes begin by
+# default nor beyond a horizon
+_SHORTEST, _LONGEST = 2e-2, 1e5
 
 
 def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, ...]:
@@ -30,12 +35,38 @@ def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, .
     Returns
     -------
     tuple of str
-        For a person; empty where everything is either stated in numbers or unknown.
+        For a person; empty where everything is either stated in numbers or unknown, and nothing
+        looks like a mistake.
     """
     supposed = (_OWN_SHADOW,) if scene.shadow_is_object else ()
     if sensor.temperature is None and frames.temperature_k is not None:
         supposed = (*supposed, _TEMPERATURE)
+    if frames.object_present is not None:
+        if taken_for_crosstalk(scene, frames):
+            supposed = (*supposed, TAKEN_FOR_CROSSTALK)
+        elif contradicted := contradiction(scene, sensor, frames):
+            supposed = (*supposed, contradicted)
+    if doubt := doubtful_unit(sensor):
+        supposed = (*supposed, doubt)
     return supposed
+
+
+def doubtful_unit(sensor: Sensor) -> str | None:
+    """Return the doubt whether a sensor's time or frequency is in its unit, None without one.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        As stated.
+    """
+    farthest = sensor.max_range_m
+    if _SHORTEST <= farthest <= _LONGEST:
+        return None
+    if isinstance(sensor, PulsedSensor):
+        stated, unit = f"pulse_width_s {sensor.pulse_width_s:g}", "seconds"
+    else:
+        stated, unit = f"frequency_hz {sensor.frequency_hz:g}", "hertz"
+    return f"{stated} gives an unambiguous range of {farthest:.3g} m: is it in {unit}?"
 
 
 def unused_temperature(sensor: Sensor, frames: Frames) -> tuple[int, str] | None:

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from simulator.errors import InvalidInputError, Problem, escape
 from simulator.frames import FrameColumns
 
-__all__ = ["NAMES", "check_names", "ignored_names", "meant"]
+__all__ = ["NAMES", "check_names", "check_readings", "ignored_names", "meant"]
 
 NAMES = tuple(FrameColumns.model_fields)
 
 # names that loggers give to columns which this project has under another name
 _OTHER_WORDS = {"t": "time_s", "time": "time_s", "timestamp": "time_s", "present": "object_present"}
+_READINGS = frozenset({"w1", "w2", "i", "q"})
 _ALIKE = 0.75  # difflib's ratio: one letter in four
 
 
@@ -76,13 +77,37 @@ def check_names(names: Sequence[str]) -> None:
         if likely := meant(name):
             hint = f"did you mean {' or '.join(likely)}?"
         elif re.fullmatch(r"[-+.\d]+(e[-+]?\d+)?|", name, re.IGNORECASE):
-            hint = "the first line must name the columns"
+            hint = "the first line must name the columns."
         if hint:
             wanted = ", ".join(NAMES)
             message = f"is not a column: {hint} The columns are {wanted}"
             problems.append(Problem(f"/{escape(name)}", message))
     if problems:
         raise InvalidInputError(*problems)
+
+
+def check_readings(names: Sequence[str]) -> None:
+    """Refuse a file that has columns, and none of them a reading.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the columns of a file.
+
+    Raises
+    ------
+    InvalidInputError
+        Naming the columns that were found.
+    """
+    if ignored_names(names) and not _READINGS.intersection(names):
+        found = ", ".join(names)
+        raise InvalidInputError(
+            Problem(
+                "",
+                f"no column holds readings: found {found}; a pulsed sensor has w1 (the late "
+                "window) and w2 (the whole pulse), a sine_wave sensor i and q",
+            )
+        )
 
 
 def ignored_names(names: Sequence[str]) -> list[str]:

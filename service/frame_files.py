@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from service.column_names import check_names, ignored_names, meant
+from service.column_names import check_names, check_readings, ignored_names, meant
 from service.errors import MalformedError
 from service.frame_table import FrameTable, Row, table_of, value_of_json, value_of_text
 from service.strict_json import check_bulk, decode
@@ -118,6 +118,7 @@ def _from_json(raw: bytes) -> FrameTable:
     ignored: list[str] = []
     if isinstance(columns, dict):
         check_names(list(columns))
+        check_readings(list(columns))
         ignored = ignored_names(list(columns))
         columns = {name: column for name, column in columns.items() if name not in ignored}
     check_bulk(columns)
@@ -168,7 +169,20 @@ def _from_csv(raw: bytes) -> FrameTable:
         else Row(line, reason=f"has {len(cells)} fields where the header has {len(header)}")
         for line, cells in read[1:]
     ]
+    _refuse_mixed(header, rows)
     return table_of(header, rows, value_of_text)
+
+
+def _refuse_mixed(header: Sequence[str], rows: Sequence[Row]) -> None:
+    """Refuse a column of truths that says some in words and some in digits: two logs, or a slip."""
+    if "object_present" not in header:
+        return
+    at = header.index("object_present")
+    said = {row.cells[at].strip().lower() for row in rows if not row.reason}
+    if said & {"1", "0"} and said & {"true", "false"}:
+        raise InvalidInputError.at(
+            "/object_present", "mixes 1 and 0 with true and false: write all rows in one form"
+        )
 
 
 def check_separator(header: Sequence[str]) -> None:

@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from service.column_names import NAMES, check_names, ignored_names
+from service.column_names import NAMES, check_names, check_readings, ignored_names
 from service.errors import MalformedError
 from service.strict_json import check_bulk
 from simulator.errors import HybridTofError, InvalidInputError, escape
@@ -116,9 +116,10 @@ def table_of(
     Raises
     ------
     InvalidInputError, MalformedError
-        For a column's name (`check_names`); where no row is good, for the first.
+        For columns' names (`check_names`, `check_readings`); where no row is good, for the first.
     """
     check_names(names)
+    check_readings(names)
     wanted = [(position, name) for position, name in enumerate(names) if name in NAMES]
     columns: dict[str, list[Any]] = {name: [] for _, name in wanted}
     bad: list[BadRow] = []
@@ -147,7 +148,7 @@ def _take(
         cell = row.cells[position]
         value = value_of(name, cell)
         if value is None:
-            must = "true or false" if name == "object_present" else "a finite number"
+            must = _TRUE_OR_FALSE if name == "object_present" else "a finite number"
             said = cell.strip() if isinstance(cell, str) else cell
             return BadRow(index, row.line, name, f"must be {must}, is {repr(said)[:42]}")
         if name == "gain" and value <= 0:
@@ -169,10 +170,14 @@ def value_of_json(name: str, value: Any) -> float | bool | None:
     return value if math.isfinite(value) else None
 
 
+_TRUE_OR_FALSE = "true or false (in a CSV also 1 or 0)"
+_TRUTHS = {"true": True, "false": False, "1": True, "0": False}
+
+
 def value_of_text(name: str, text: str) -> float | bool | None:
     """Return the value of a CSV field; None for what Python alone takes for a number (1_000)."""
     if name == "object_present":
-        return {"true": True, "false": False}.get(text.strip().lower())
+        return _TRUTHS.get(text.strip().lower())
     if name in MAY_BE_NULL and text.strip().lower() in ("", "nan", "null"):
         return math.nan
     try:

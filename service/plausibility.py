@@ -6,16 +6,14 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.assumptions import doubtful_unit
 from simulator.frames import Frames
-from simulator.sensor import PulsedSensor, Sensor
+from simulator.sensor import Sensor
 
 __all__ = ["doubts"]
 
 Array = NDArray[np.float64]
 
-# unambiguous ranges that a sensor of this kind may have [m]: light is seen neither over less than
-# its own electronics resolve nor over more than a horizon
-_SHORTEST, _LONGEST = 1e-2, 1e5
 # a few numbers that were typed are round by themselves
 _FEWEST = 6
 # decimal digits to which a double is exact
@@ -42,22 +40,13 @@ def doubts(sensor: Sensor, frames: Frames | None = None) -> list[str]:
     list of str
         Sentences for a person; nothing follows from them.
     """
-    found = list(_of_sensor(sensor))
+    doubt = doubtful_unit(sensor)
+    found = [] if doubt is None else [doubt]
     if frames is not None:
         found += _of_noise(sensor, frames)
         if frames.time_s is not None:
             found += _of_times(frames.time_s)
     return found
-
-
-def _of_sensor(sensor: Sensor) -> Iterator[str]:
-    farthest = sensor.max_range_m
-    if not _SHORTEST <= farthest <= _LONGEST:
-        if isinstance(sensor, PulsedSensor):
-            stated, unit = f"pulse_width_s {sensor.pulse_width_s:g}", "seconds"
-        else:
-            stated, unit = f"frequency_hz {sensor.frequency_hz:g}", "hertz"
-        yield f"{stated} gives an unambiguous range of {farthest:.3g} m: is it in {unit}?"
 
 
 def _of_noise(sensor: Sensor, frames: Frames) -> Iterator[str]:

@@ -149,7 +149,7 @@ def frames_from_columns(
     first, second = sensor.columns
     slopes, allowed = _columns_of(first, second)
     problems = [
-        Problem(f"/{name}", f"is not a column of a {sensor.kind} sensor")
+        Problem(f"/{name}", f"is not a column of a {sensor.kind} sensor{_of_another(name)}")
         for name in given
         if name not in allowed
     ]
@@ -196,6 +196,14 @@ def frames_from_columns(
 
 
 @functools.cache
+def _of_another(name: str) -> str:
+    """Return of which sensor a column is that this one has not; nothing of a name that none has."""
+    for kind, columns in (("pulsed", ("w1", "w2")), ("sine_wave", ("i", "q"))):
+        if name in columns or name in _columns_of(*columns)[0]:
+            return f": it looks like one of a {kind} sensor; is the sensor's `kind` right?"
+    return ""
+
+
 def _columns_of(first: str, second: str) -> tuple[tuple[str, str], frozenset[str]]:
     """Return the names of the derivatives of two readings, and all names of columns."""
     slopes = (f"d{first}_dt", f"d{second}_dt")

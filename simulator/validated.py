@@ -13,6 +13,7 @@ T = TypeVar("T", bound="Validated")
 
 # products of any six of them are numbers, too; no unit of anything needs more
 _LARGEST = 1e50
+_ALIKE = 0.8  # difflib's ratio: one letter in five
 
 
 def is_number(value: float) -> bool:
@@ -82,6 +83,19 @@ def _pointer(location: Sequence[int | str], data: object, missing: bool) -> str:
     return "".join("/" + part for part in parts)
 
 
+def _names(model: type[pydantic.BaseModel]) -> set[str]:
+    """Return the members of all validated types."""
+    return set(model.model_fields).union(*map(_names, model.__subclasses__()))
+
+
+def _hint(name: str) -> str:
+    """Return which member may be meant by one that there is not, if any is alike."""
+    from difflib import get_close_matches  # seldom needed
+
+    alike = get_close_matches(name.lower(), sorted(_names(Validated)), n=1, cutoff=_ALIKE)
+    return f": did you mean {alike[0]}?" if alike and alike[0] != name else ""
+
+
 def problems_of(error: pydantic.ValidationError, data: object) -> tuple[Problem, ...]:
     """List what pydantic found, one `Problem` for each field and message.
 
@@ -101,6 +115,8 @@ def problems_of(error: pydantic.ValidationError, data: object) -> tuple[Problem,
             pointer += "/" + str(item["ctx"]["discriminator"]).strip("'")
         # pydantic puts the class of a raised ValueError before its text
         message = _WORDS.get(item["type"], item["msg"]).removeprefix("Value error, ")
+        if item["type"] == "extra_forbidden":
+            message += _hint(str(item["loc"][-1]))
         found[Problem(pointer, message.replace("Tuple should", "List should"))] = None
     return tuple(found)
 

@@ -25,7 +25,7 @@ ALLOWED: dict[str, str] = {
     "simulator/optics": "simulator.optics",
     "simulator/optics/emitters": "simulator.optics",
     "simulator/optics/figures": "simulator.optics",
-    "inference": "inference.realtime inference.fits",
+    "inference": "inference.frame inference.realtime inference.fits",
     "inference/frame": "",
     "inference/density": "inference.frame",
     "inference/identifiability": "inference.frame",

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.frame.known_range import rates_of
+from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK, taken_for_crosstalk
 from inference.frame.warmth import gains_of
 from inference.identifiability.after_data import statuses_of_draws
 from inference.identifiability.status import Identifiability, weak_at_best
@@ -66,11 +67,10 @@ def _left_out(job: Job, selection: Selection | None) -> tuple[LeftOutTerm, ...]:
         "crosstalk": scene.crosstalk,
         "background": scene.background,
     }
-    rows = [
-        LeftOutTerm(term, "the scene states none")
-        for term, value in absent.items()
-        if value is None
-    ]
+    none = dict.fromkeys(absent, "the scene states none")
+    if taken_for_crosstalk(scene, job.frames):
+        none["background"] += f"; {TAKEN_FOR_CROSSTALK}"
+    rows = [LeftOutTerm(term, none[term]) for term, value in absent.items() if value is None]
     if scene.model_error.flux == scene.model_error.range_m == 0:
         rows.append(LeftOutTerm("discrepancy", "the scene states none"))
     if job.sensor.temperature is None and job.frames.temperature_k is not None:

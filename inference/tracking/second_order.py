@@ -66,6 +66,7 @@ def slope_variance(
     for j in range(nuisance_count(table)):
         here1, here2 = nuisance_at(i, 0.0, j, table)
         next1, next2 = nuisance_at(i, 1.0, j, table)
-        square += (size * (next1 - here1)) ** 2 + (size * (next2 - here2)) ** 2
+        away1, away2 = size * (next1 - here1), size * (next2 - here2)
+        square += away1 * away1 + away2 * away2
     whole = slope1 * slope1 + slope2 * slope2
     return square / whole if whole > 0.0 else 0.0

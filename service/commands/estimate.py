@@ -51,6 +51,7 @@ def _run(args: argparse.Namespace) -> int:
     from service.commands.frames import checked
     from service.commands.output import write_result
     from service.estimate_files import check_estimate_suffix, estimates_as
+    from service.plausibility import doubts
 
     if args.output is not None:
         check_estimate_suffix(args.output)
@@ -69,6 +70,10 @@ def _run(args: argparse.Namespace) -> int:
             args.output.write_text(estimates_as(args.output.suffix, document), encoding="utf-8")
     if args.output is None:
         write_result(encoded)
+    doubted = doubts(sensor)  # said already
+    for supposed in estimates.assumptions:
+        if supposed not in doubted:
+            note(args, f"note: {supposed}")
     for result in estimates.results:
         if result.fit is not None and result.fit["misfit"]:
             note(

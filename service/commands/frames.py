@@ -40,9 +40,9 @@ def checked(args: argparse.Namespace) -> tuple[Sensor, Scene, Frames, FrameTable
     """
     system = read_document(SystemDescription, args.scene)
     table = read_table(args.frames)
+    _say(args, args.frames, table)
     with naming({"/frames": source(args.frames), "": str(args.scene)}):
         sensor, scene, frames = checked_frames(system.sensor, system.scene, table.columns)
-    _say(args, args.frames, table)
     for doubt in doubts(sensor, frames):
         note(args, f"note: {doubt}")
     return sensor, scene, frames, table

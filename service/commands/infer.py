@@ -56,7 +56,11 @@ def add_posterior_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--method", choices=("emcee", "importance", "auto"))
     parser.add_argument("--ensembles", type=int)
     parser.add_argument("--target-ess", type=int)
-    parser.add_argument("--max-seconds", type=float)
+    parser.add_argument(
+        "--max-seconds",
+        type=float,
+        help="processor time to spend, compiling apart: of several processes the sum [s]",
+    )
     parser.add_argument("--seed", type=int, help="left out: drawn and printed")
 
 

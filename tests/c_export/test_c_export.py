@@ -130,7 +130,7 @@ def test_ranges_are_within_the_proven_error(case: str, kind: str, tmp_path: Path
     s, w = parse_sensor(sensor), parse_scene(scene)
     (expected,) = estimate(s, w, Frames(readings), [technique]).results
     assert expected.sd_parts_m is not None
-    close, answered = 0, 0
+    close, answered, compared = 0, 0, 0
     for n, (status, range_m, sd_m) in enumerate(compiled(text, kind, tmp_path)(readings)):
         root = expected.range_m[n]
         # the export looks between its ends alone, and at them a status may be either
@@ -147,6 +147,8 @@ def test_ranges_are_within_the_proven_error(case: str, kind: str, tmp_path: Path
         answered += 1
         noise = expected.sd_parts_m.noise[n, 0]
         first, second = readings[n]
+        if math.isnan(noise):  # so faint that the technique states none: the first-order one
+            noise = sd_m
         if isinstance(s, SineWaveSensor) and technique == "conventional":
             # of first order, as the bound wants it: that of the answer is of the curve
             x, y = first - CROSSTALK[0], second - CROSSTALK[1]
@@ -158,9 +160,15 @@ def test_ranges_are_within_the_proven_error(case: str, kind: str, tmp_path: Path
         own += 64 * np.finfo(float).eps * root
         assert abs(range_m - root) <= allowed + own, (readings[n], root, range_m, allowed)
         if math.isfinite(expected.sd_m[n]) and not expected.near_fold[n]:
-            # a smooth function of the range, which it moves with
-            assert sd_m == pytest.approx(expected.sd_m[n], rel=1e-3)
+            # a smooth function of the range, which it moves with. That of the technique follows the
+            # curve to 3 sd, the export's is of first order: where light falls as r^-N, N <= 4, they
+            # part by 3 (N + 1) / 2 sd / r; twice that holds the next order, to sd / r = 0.03
+            bend = 0.0 if technique == "conventional" else 7.5 * noise / root
+            if bend < 7.5 * 0.03:
+                assert sd_m == pytest.approx(expected.sd_m[n], rel=1e-3 + 2.0 * bend)
+                compared += 1
     assert answered > 800
+    assert compared > 400
     assert close <= 4
 
 

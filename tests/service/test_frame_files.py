@@ -106,7 +106,7 @@ def test_csv_odd_cell(tmp_path: Path, odd: str) -> None:
     [
         ("w1,w9\n1,2\n", "/w9"),
         ("w1,w1\n1,2\n", "/w1"),
-        ("w1,w2,object_present\n1,2,1\n", "/object_present/0"),
+        ("w1,w2,object_present\n1,2,yes\n", "/object_present/0"),
         ("1,2\n3,4\n", "/1"),
     ],
 )

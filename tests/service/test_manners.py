@@ -94,6 +94,9 @@ def test_standard_input_is_named(
         ("time_s\tw1\tw2", "is the file separated by '\\t'?"),
         ("time_s w1 w2", "is the file separated by ' '?"),
         ("W1 (V),w1,w2", "did you mean w1?"),
+        ("0.1,w1,w2", "the first line must name the columns. The columns are"),
+        ("Late,Total,n", "no column holds readings: found Late, Total, n; a pulsed sensor has w1"),
+        ("i,q,n", "i: is not a column of a pulsed sensor: it looks like one of a sine_wave sensor"),
     ],
 )
 def test_hints(
@@ -103,6 +106,37 @@ def test_hints(
     said = Said(capsys, "estimate", path, "--scene", scene)
     assert (said.code, said.out) == (2, "")
     assert hint in said.err
+
+
+def test_whether_an_object_is_there_in_digits(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path
+) -> None:
+    rows = "0.02,1.7,{}\n0.03,1.6,{}\n"
+    answers = []
+    for words in (("1", "0"), ("true", "False")):
+        path = written(tmp_path / "f.csv", "w1,w2,object_present\n" + rows.format(*words))
+        said = Said(capsys, "estimate", path, "--scene", scene, "--technique", "conventional")
+        assert said.code == 0
+        answers.append([frame["status"] for frame in said.frames])
+    assert answers == [["unique", "none"]] * 2
+    path = written(tmp_path / "f.csv", "w1,w2,object_present\n" + rows.format("1", "false"))
+    said = Said(capsys, "estimate", path, "--scene", scene)
+    assert said.code == 2
+    assert "#/object_present: mixes 1 and 0 with true and false" in said.err
+    path = written(tmp_path / "f.csv", "w1,w2,object_present\n" + rows.format("1", "2"))
+    said = Said(capsys, "estimate", path, "--scene", scene)
+    assert "object_present must be true or false (in a CSV also 1 or 0), is '2'" in said.err
+
+
+def test_a_member_of_a_scene_that_is_nearly_one(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    document = {"sensor": SENSOR, "scene": SCENE | {"cross_talk": [0.0, 0.0]}}
+    path = written(tmp_path / "s.json", document)
+    said = Said(capsys, "identifiability", "--scene", path, "--ranges", "0.5")
+    assert said.code == 2
+    assert "#/scene/cross_talk" in said.err
+    assert "did you mean crosstalk?" in said.err
 
 
 @pytest.mark.parametrize("name", ["I", "Q"])
