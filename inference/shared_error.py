@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import SdParts, TechniqueResult
+from inference.realtime.nearest_roots import nearest
 
 __all__ = ["with_shared_error"]
 
@@ -40,7 +41,7 @@ def with_shared_error(
     roots = result.roots_m
     square = np.zeros_like(roots)
     for plus, minus in around:
-        square += np.square(0.5 * (_nearest(roots, plus.roots_m) - _nearest(roots, minus.roots_m)))
+        square += np.square(0.5 * (nearest(roots, plus.roots_m) - nearest(roots, minus.roots_m)))
     shared = np.sqrt(square)
     lost = np.isfinite(roots) & np.isnan(shared)
     parts = result.sd_parts_m
@@ -50,13 +51,3 @@ def with_shared_error(
         near_fold=result.near_fold | lost.any(axis=1),
         sd_parts_m=None if parts is None else SdParts(parts.noise, shared, parts.model),
     )
-
-
-def _nearest(roots: Array, others: Array) -> Array:
-    """Return for each root, shape (n, m), the nearest of others, shape (n, k); nan of none."""
-    if others.shape[1] == 1:
-        return np.broadcast_to(others, roots.shape)
-    away = np.abs(roots[:, :, None] - others[:, None, :])
-    away = np.where(np.isnan(away), np.inf, away)
-    nearest = np.argmin(away, axis=2)
-    return np.take_along_axis(others, nearest, axis=1)

@@ -195,7 +195,6 @@ def frames_from_columns(
     )
 
 
-@functools.cache
 def _of_another(name: str) -> str:
     """Return of which sensor a column is that this one has not; nothing of a name that none has."""
     for kind, columns in (("pulsed", ("w1", "w2")), ("sine_wave", ("i", "q"))):
@@ -204,6 +203,7 @@ def _of_another(name: str) -> str:
     return ""
 
 
+@functools.cache
 def _columns_of(first: str, second: str) -> tuple[tuple[str, str], frozenset[str]]:
     """Return the names of the derivatives of two readings, and all names of columns."""
     slopes = (f"d{first}_dt", f"d{second}_dt")

@@ -165,7 +165,9 @@ def test_ranges_are_within_the_proven_error(case: str, kind: str, tmp_path: Path
             # part by 3 (N + 1) / 2 sd / r; twice that holds the next order, to sd / r = 0.03
             bend = 0.0 if technique == "conventional" else 7.5 * noise / root
             if bend < 7.5 * 0.03:
-                assert sd_m == pytest.approx(expected.sd_m[n], rel=1e-3 + 2.0 * bend)
+                # below half a percent of the range the technique too takes the tangent
+                rel = 1e-3 if noise < 0.0045 * root else 1e-3 + 2.0 * bend
+                assert sd_m == pytest.approx(expected.sd_m[n], rel=rel)
                 compared += 1
     assert answered > 800
     assert compared > 400

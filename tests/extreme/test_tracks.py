@@ -190,7 +190,7 @@ def test_a_stream_at_the_ends_may_be_cut_anywhere(number: int) -> None:
 
 
 def test_a_stream_of_one_frame_over_and_over_has_no_holes() -> None:
-    """At rest, stated to move: 20,000 identical frames, noise of 1e-2 to 1e12 of the light."""
+    """At rest, stated to move: 4,000 identical frames, noise of 1e-2 to 1e12 of the light."""
     for kind in ("pulsed", "sine_wave"):
         for snr in (1e-2, 1e5, 1e12):
             sensor, scene = sensor_of(7.72e-3 / snr, kind), scene_of(PLATE)

@@ -15,6 +15,7 @@ from inference.fits.likelihood.told import Told, told_at, with_column
 from inference.frame.delayed import delayed
 from inference.frame.sensitivity import Value
 from inference.identifiability.elimination import eliminate
+from simulator.object_arrays import quadratics
 
 __all__ = [
     "Point",
@@ -169,10 +170,7 @@ class _Erring(NamedTuple):
 def _slope_of_light(problem: FitProblem, values: Array, light: Array, u: Array) -> Array:
     """Return the derivative of the object's readings along log r (docs/model.md, 4.13, 4.17)."""
     r, c0, c1 = np.exp(u), values[Value.C0], values[Value.C1]
-    # c0 + c1 r + r^2 without cancellation beside its pole
-    vertex = 0.5 * c1
-    q = np.square(r + vertex) + (c0 - vertex * vertex)
-    steep = -2.0 - r * (2.0 * r + c1) / q
+    steep = -2.0 - r * (2.0 * r + c1) / quadratics(r, c0, c1)
     late = delayed(light, u, problem.instrument.r0, problem.instrument.wave)
     return np.asarray(steep[:, None] * light + r[:, None] * late)
 

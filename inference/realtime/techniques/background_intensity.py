@@ -9,6 +9,7 @@ from inference.estimates import TechniqueResult
 from inference.realtime.assemble import NOISE_BAND, Candidates, Outcome, assemble, reasons_of
 from inference.realtime.from_curve import stacked
 from inference.realtime.model_error import model_error_of
+from inference.realtime.nearest_roots import nearest
 from inference.realtime.net import Net, known_net_readings
 from inference.realtime.solving.background_balance import solve_balance
 from inference.realtime.solving.background_phase import Phase, solve_phase
@@ -109,9 +110,8 @@ def _principal(net: Net) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
 
 def _move(roots: Array, others: Array, distance: float) -> Array:
     """Return how far the nearest of other roots is, shape (n, m); to an end where there is none."""
-    away = np.abs(roots[:, :, None] - others[:, None, :])
-    nearest = np.where(np.isnan(away), np.inf, away).min(axis=2)
-    return np.where(np.isinf(nearest), np.maximum(roots, distance - roots), nearest)
+    away = np.abs(roots - nearest(roots, others))
+    return np.where(np.isnan(away), np.maximum(roots, distance - roots), away)
 
 
 def _solved(
