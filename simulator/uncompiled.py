@@ -279,3 +279,5 @@ def run(function: Any, arguments: tuple[Any, ...], most_s: float) -> tuple[Any, 
             for array, before in kept:
                 array[...] = before
             raise NotSoError(str(error)) from None
+        finally:
+            _limit[0] = math.inf  # what is run outside is under no limit

@@ -1,6 +1,7 @@
 """Kernels without a compiler: the same bits, and no longer than compiling would take."""
 
 import ast
+import contextlib
 import itertools
 import math
 import subprocess
@@ -123,6 +124,14 @@ def test_what_would_take_too_long_is_given_up_after_a_few_turns(
 @compiled
 def ratio(one: int, other: int) -> float:
     return one / other
+
+
+def test_limit_ends_with_its_run() -> None:
+    for most_s in (0.0, math.inf):
+        out = np.zeros(600)
+        with contextlib.suppress(uncompiled.NotSoError):
+            uncompiled.run(counted.__wrapped__, (out, 600), most_s)  # type: ignore[attr-defined]
+        uncompiled.twin(counted)(out, 600)
 
 
 def test_what_python_refuses_is_compiled() -> None:
