@@ -24,6 +24,10 @@ _WINDOWS = 4  # on either side of the middle one
 _SPACING = 0.5  # of windows, in standard deviations, and their width
 _NEGLIGIBLE_WINDOW = 1e-3  # share of a mode below which a window's part is left out
 _FAINT = 0.3  # standard deviations of the noise: nuisance parameters that do less are not felt
+_DROWNED = 1.0  # standard deviations of the noise: it hides nuisance parameters that do less
+_TAIL = 6.0  # standard deviations from a mode at which the noise may hold it open
+_OPEN = 0.5  # share of its parabola's fall that is less than a mode's with such a tail
+_NARROW = 0.03  # standard deviation of log r of modes that have none: their light is not faint
 _INTERVALS = 32  # of Simpson's rule on either side of a mode
 _ROOT3 = math.sqrt(3.0)
 _LOG_ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
@@ -135,8 +139,10 @@ def _divide(
 
 
 @compiled
-def _by_noise(u: float, frame: TrackedFrame, prior: Prior, table: ReadingsTable) -> bool:
-    """Tell whether a frame's noise hides what nuisance parameters do to it, as of a faint object.
+def _by_noise(
+    u: float, most: float, frame: TrackedFrame, prior: Prior, table: ReadingsTable
+) -> bool:
+    """Tell whether nuisance parameters do less to a frame than its noise, as of a faint object.
 
     Its density is then as wide as the noise makes it, which comes anew with every frame.
     """
@@ -145,7 +151,27 @@ def _by_noise(u: float, frame: TrackedFrame, prior: Prior, table: ReadingsTable)
         return False
     _, _, d1, d2 = mean_at(u, table)
     felt = spread_at(Root(0.0, 0.0, 0.0), u, frame.gain, (d1, d2), X, table)
-    return felt.r11 < _FAINT and math.hypot(felt.r21, felt.r22) < _FAINT
+    return felt.r11 < most and math.hypot(felt.r21, felt.r22) < most
+
+
+@compiled
+def _fades(mode: PeakedMode, frame: TrackedFrame, prior: Prior, table: ReadingsTable) -> bool:
+    """Tell whether a mode goes over into ranges at which the object drowns in the noise.
+
+    There the density hardly falls, however narrow the mode is where the light is seen, and they may
+    hold as much as the mode.
+    """
+    if prior.position.born or mode.scale < _NARROW:
+        return False
+    top = log_density(mode.u, frame, prior, table)
+    for end in (mode.low, mode.high):
+        away = min(_TAIL * mode.scale, abs(end - mode.u))
+        tail = mode.u + math.copysign(away, end - mode.u)
+        fall = 0.5 * (away / mode.scale) ** 2
+        held = top - log_density(tail, frame, prior, table) < _OPEN * fall
+        if held and _by_noise(tail, _DROWNED, frame, prior, table):
+            return True
+    return False
 
 
 @compiled
@@ -165,7 +191,8 @@ def integrate(
     of the distance.
 
     Where u is wide because nuisance parameters or crosstalk are uncertain, only the mode is taken,
-    but for an object that has just come, or one so faint that the noise hides what they do.
+    but for an object that has just come, or one so faint that the noise hides what they do, there
+    or at ranges that the mode goes over into.
     What they do to the readings is linear here, and the curve is not: integrated over a wide
     density, the difference would pass for knowledge of the range, a little in every frame.
 
@@ -192,7 +219,9 @@ def integrate(
     u, scale = mode.u, mode.scale
     once = prior.position.born and not prior.position.again
     shared = prior.added.spread.shape[1] > WITHOUT_CROSSTALK
-    if shared and not once and not _by_noise(u, frame, prior, table):
+    if shared and not once and not _by_noise(u, _FAINT, frame, prior, table):
+        if _fades(mode, frame, prior, table):
+            return _divide(to, count, parent, mode, frame, prior, table, nodes)
         if not prior.position.born and bends(prior.added.spread.shape[0], table):
             u, scale, top = refined(mode, frame, prior, table)
         else:

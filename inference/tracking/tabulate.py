@@ -271,13 +271,12 @@ def places_of(
     observed, rate_sd
         As for `knots_of`.
     """
-    scan = scan_of(knots.positions, knots.means[:, MEAN], observed.by_rate, rate_sd)
-    boxes, groups = boxes_of(
-        knots.positions, knots.means, knots.log_prior, _spread_roots(nuisance), scan
-    )
+    means, slopes, roots = knots.means[:, MEAN], knots.means[:, SLOPE], _spread_roots(nuisance)
+    scan = scan_of(knots.positions, means, roots, observed.by_rate, rate_sd)
+    boxes, groups = boxes_of(knots.positions, knots.means, knots.log_prior, roots, scan)
     positions = knots.positions[scan]
     if not observed.by_rate:
-        around = places_around_folds(knots.positions, knots.means[:, MEAN], knots.means[:, SLOPE])
+        around = places_around_folds(knots.positions, means, slopes, roots)
         positions = np.unique(np.concatenate([positions, around]))
     next_one = np.searchsorted(positions, knots.positions).astype(np.int64)
     return Places(Scan(positions, next_one), empty, boxes, groups)

@@ -21,11 +21,15 @@ from tests.tracking.reference import GridFilter
 from tests.tracking.scenes import PLATE, frames_of, read, scene_of, sensor_of
 from tests.tracking.test_track import joined, same
 
+# beside a wall, with errors of the model: an object in the dark, whose ranges are many; a reading
+# that turns back along the range while errors of the distance hide the other one
+_WERE_WRONG = (1284, 1735)
+
 
 def test_tracks_hold_the_truth_and_have_no_holes() -> None:
     """No range that is called the only one is six standard deviations off: docs/stability.md."""
     refused = 0
-    for number in range(25):
+    for number in (*range(25), *_WERE_WRONG):
         verdict = verdict_of(random_track(number))
         assert not verdict.wrong, (number, verdict)
         assert not verdict.worst > 6, (number, verdict)
