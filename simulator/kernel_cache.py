@@ -72,7 +72,7 @@ def _digest(path: Path) -> str:
 def digest_of_all() -> str:
     """Return a digest of every file of kernels."""
     digest = hashlib.sha256()
-    for package in ("simulator", "inference"):
+    for package in ("simulator", "inference", "service"):
         for path in sorted((_ROOT / package).rglob("*.py")):
             digest.update(_read(path)[0])
     return digest.hexdigest()[:16]

@@ -3,8 +3,7 @@
 import functools
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import islice
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from inference.estimates import Status
 from service.problems import describe
+from service.streams.laying import Column, json_of, laid
 from service.streams.lines import lines_in
 from service.streams.said import MARKS, OWN, Said, said_from_bytes
 from simulator.errors import HybridTofError
@@ -21,80 +21,53 @@ __all__ = ["answers_in", "encoded", "error_of", "more_of", "text_of"]
 
 _STATUS = {int(status): status.name.lower().encode() for status in Status}
 _FLAGS: dict[int, bytes] = {False: b"false", True: b"true"}
+_HERE = b"%b"  # in what answers have in common, where each has a text of its own
 
 
 def text_of(said: Said) -> bytes:
-    """Return the answers to frames as JSON, each with a line end; what is nan is null.
-
-    The texts of all numbers are made in one go and laid between those that answers have in common:
-    an object a frame costs several times as much. What is the same in all answers is such a text.
-    """
-    n, columns = len(said.sequence), _own_columns(said.table[:OWN])
+    """Return the answers to frames as JSON, each with a line end; what is nan is null."""
+    own = [_column(row) for row in said.table[:OWN]]
     form, hypotheses = _hypotheses(said)
-    kinds = _texts_of(said.status, _STATUS)
-    misfit = _texts_of(said.misfit, _FLAGS)
-    rows = [_texts(said.sequence), _texts(said.time_s), kinds, *columns[:5], *hypotheses]
-    rows += [*columns[5:8], misfit, columns[8]]
+    columns = [
+        *(said.sequence, said.time_s, _texts_of(said.status, _STATUS), *own[:5], *hypotheses),
+        *(*own[5:8], _texts_of(said.misfit, _FLAGS), own[8]),
+    ]
     if said.more:
-        rows.append([text.encode() for text in said.more])
-    alike = tuple(row if isinstance(row, bytes) else b"%b" for row in rows)
-    template = _template(form, bool(said.more)) % alike
-    return _laid(template, n, [row for row in rows if not isinstance(row, bytes)])
+        columns.append([text.encode() for text in said.more])
+    return laid(_fixed(form, bool(said.more)), columns, len(said.sequence))
 
 
-def _texts_of(values: NDArray[Any], names: Mapping[int, bytes]) -> Iterable[bytes] | bytes:
+def _column(row: NDArray[np.float64]) -> Column:
+    """Return numbers, or the text of the one that all of them are."""
+    bits = row.view(np.int64)
+    return json_of(row[:1])[1:-1] if (bits == bits[0]).all() else row
+
+
+def _texts_of(values: NDArray[Any], names: Mapping[int, bytes]) -> list[bytes] | bytes:
     """Return the names of values, or the one that all have."""
     found = values.tolist()
     if found.count(found[0]) == len(found):
         return names[found[0]]
-    return map(names.__getitem__, found)
+    return [names[value] for value in found]
 
 
-def _own_columns(table: NDArray[np.float64]) -> list[list[bytes] | bytes]:
-    """Return the texts of rows of numbers, or the one of all numbers of a row."""
-    first = table[:, :1]
-    same = ((table == first) | (np.isnan(table) & np.isnan(first))).all(axis=1)
-    # equal, and written in another way
-    same &= ~((first[:, 0] == 0.0) & np.signbit(table).any(axis=1))
-    one, n = _texts(first.ravel()), table.shape[1]
-    many = iter(_texts(table[~same].ravel()) if not same.all() else ())
-    return [one[k] if alike else list(islice(many, n)) for k, alike in enumerate(same.tolist())]
+def _hypotheses(said: Said) -> tuple[bytes, list[Column]]:
+    """Return how the hypotheses of a frame are written, and what stands in the places for them.
 
-
-def _laid(template: bytes, n: int, rows: Sequence[Iterable[bytes]]) -> bytes:
-    """Return n times a template, with the texts of each row in one of its places."""
-    pieces = [b""] * (n * len(rows))
-    for k, row in enumerate(rows):
-        pieces[k :: len(rows)] = row
-    return template * n % tuple(pieces)
-
-
-def _hypotheses(said: Said) -> tuple[bytes, list[list[bytes]]]:
-    """Return how the hypotheses of a frame are written, and the texts for its places.
-
-    Those that every frame has are a text for each of their numbers, and what some have beyond them
-    is one text of their frame.
+    Those that every frame has are a column for each of their numbers, and what some have beyond
+    them is one text of their frame.
     """
     least, *larger = np.unique(said.hypotheses).tolist()
-    columns = _columns_of(said, 0, least, slice(None))
+    columns: list[Column] = list(said.table[OWN : OWN + 3 * least])
     if not larger:
         return b"[%b]" % _list_of(least), columns
     further = np.full(len(said.sequence), b"", dtype=object)
     for count in larger:
         which = np.flatnonzero(said.hypotheses == count)
         form = (b"," if least else b"") + _list_of(count - least) + b"\n"
-        texts = _laid(form, len(which), _columns_of(said, least, count, which))
-        further[which] = texts.split(b"\n")[:-1]
+        rows = said.table[OWN + 3 * least : OWN + 3 * count, which]
+        further[which] = lines_in(laid(form.split(_HERE), list(rows), len(which)))
     return b"[%b%%b]" % _list_of(least), [*columns, further.tolist()]
-
-
-def _columns_of(said: Said, first: int, last: int, which: Any) -> list[list[bytes]]:
-    """Return the texts of the numbers of some of the hypotheses of some frames."""
-    table = said.table[OWN + 3 * first : OWN + 3 * last, which]
-    if not len(table):
-        return []
-    texts, n = _texts(table.ravel()), table.shape[1]
-    return [texts[k * n : (k + 1) * n] for k in range(len(table))]
 
 
 @functools.cache
@@ -103,22 +76,16 @@ def _list_of(count: int) -> bytes:
 
 
 @functools.cache
-def _template(hypotheses: bytes, more: bool) -> bytes:
-    """Return what answers have in common, %b for each text between."""
-    return (
+def _fixed(hypotheses: bytes, more: bool) -> list[bytes]:
+    """Return what answers have in common, before, between and after their own texts."""
+    form = (
         b'{"sequence":%b,"time_s":%b,"status":"%b","range_m":%b,"sd_m":%b,'
         b'"sd_parts_m":{"noise":%b,"scene":%b,"model":%b},'
         b'"hypotheses":' + hypotheses + b","
         b'"present":%b,"outlier":%b,"rate_m_s":%b,"misfit":%b,"latency_s":%b'
         + (b"%b}\n" if more else b"}\n")
     )
-
-
-def _texts(values: NDArray[Any]) -> list[bytes]:
-    """Return the JSON texts of numbers."""
-    # what was kept begins at any byte, and orjson reads whole numbers
-    values = np.require(values, requirements=["C", "A"])
-    return orjson.dumps(values, option=orjson.OPT_SERIALIZE_NUMPY)[1:-1].split(b",")
+    return form.split(_HERE)
 
 
 def more_of(also: Sequence[dict[str, Any] | None] | None) -> tuple[str, ...]:

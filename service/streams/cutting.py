@@ -31,7 +31,12 @@ class Cutter:
             first, _, data = data.partition(b"\n")
             found += self._ended(first)
             *lines, data = data.split(b"\n")
-            found += [line if len(line) <= LONGEST else None for line in lines if line.strip()]
+            if any(map(bytes.isspace, lines)) or not all(lines):
+                lines = [line for line in lines if line.strip()]
+            if max(map(len, lines), default=0) > LONGEST:
+                found += [line if len(line) <= LONGEST else None for line in lines]
+            else:
+                found += lines
         if not self._skipping:
             self._rest += data
             if len(self._rest) > LONGEST:

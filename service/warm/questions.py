@@ -92,6 +92,20 @@ def _posterior(sensor: Body, scene: Body, **data: bool) -> None:
         fold.run(ahead[0])
 
 
+def _lines() -> object:
+    """Read lines of a stream, and write as many answers; neither needs a tracker."""
+    from itertools import repeat
+
+    import numpy as np
+
+    from service.streams.laying import laid
+    from service.streams.number_lines import number_lines
+
+    n = 40
+    numbers = number_lines([*repeat(b'{"time_s":0.1,"w1":1e-3,"w2":1}', n)])
+    return numbers and laid([b"[", b",", b"]\n"], [np.arange(n), [*repeat(b"a", n)]], n)
+
+
 def _single() -> dict[str, Callable[[], object]]:
     plain, wall = {"object": _OBJECT}, {"object": _OBJECT, "background": _WALL}
     without = ("conventional", "intensity", "intensity_w1", "differential")
@@ -118,6 +132,7 @@ def _many() -> dict[str, Callable[[], object]]:
         "joint_fit, sine wave": partial(_estimate, "joint_fit", _SINE, {}),
         "tracker": partial(_track, _PULSED, plain),
         "tracker, crosstalk": partial(_track, _PULSED, plain | _CROSSTALK, crosstalk=True),
+        "lines of a stream": _lines,
     }
 
 

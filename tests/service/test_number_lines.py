@@ -4,6 +4,7 @@ import json
 import math
 import struct
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import orjson
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 
 from inference.estimates import Status
 from service.errors import MalformedError
+from service.streams import laying
 from service.streams.answered import answers_in, more_of, text_of
 from service.streams.forms import JsonLines
 from service.streams.number_lines import number_lines
@@ -132,7 +134,9 @@ def _said(draw: st.DrawFn) -> Said:
 @given(_said())
 def test_a_batch_of_answers_is_an_object_a_frame(said: Said) -> None:
     lines = [obvious(said, at) for at in range(len(said.sequence))]
-    assert text_of(said) == b"".join(line + b"\n" for line in lines)
+    for few in (0, 100):  # by the kernel, and without
+        with mock.patch.object(laying, "_FEW", few):
+            assert text_of(said) == b"".join(line + b"\n" for line in lines)
     assert [json.loads(line)["sequence"] for line in lines] == said.sequence.tolist()
     kept = said_to_bytes(said)
     assert text_of(said_from_bytes(kept)) == text_of(said)
