@@ -11,6 +11,7 @@ from simulator.compiled import compiled
 from simulator.discrepancy import matern
 from simulator.errors import InvalidInputError
 from simulator.frames import Frames
+from simulator.model_error import ModelError
 from simulator.overflow import check_drawn, check_readings
 from simulator.parameters import Terms, parameters_of
 from simulator.readings import (
@@ -25,7 +26,7 @@ from simulator.sensor_unknowns import sensor_at
 from simulator.trajectories import RadialTrajectory, SampledTrajectory
 from simulator.warmed import temperatures, warmed
 
-__all__ = ["Simulation", "mean_readings", "simulate"]
+__all__ = ["Simulation", "erring_readings", "mean_readings", "simulate"]
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
@@ -137,6 +138,42 @@ def mean_readings(sensor: Sensor, terms: Terms, ranges: Array) -> Array:
     return _moments(sensor, terms, ranges, np.ones(ranges.size))[:, :2]
 
 
+def erring_readings(
+    sensor: Sensor, terms: Terms, ranges: Array, wrong: ModelError, rng: np.random.Generator
+) -> Array:
+    """Return noise-free readings of an object that errs from its model.
+
+    Parameters
+    ----------
+    sensor, terms, ranges
+        As for `mean_readings`.
+    wrong : ModelError
+        Sizes of the errors, which are drawn.
+    rng : numpy.random.Generator
+        Source of randomness.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        w1, w2 or i, q [reading units].
+    """
+    ranges = np.where(np.isfinite(ranges), ranges, np.inf)
+    factor, late = _errors(rng, ranges, wrong)
+    return _moments(sensor, terms, ranges, factor, late)[:, :2]
+
+
+def _errors(
+    rng: np.random.Generator, ranges: Array, wrong: ModelError
+) -> tuple[Array, Array | None]:
+    """Draw by what factor the flux errs, and by how much the effective distance [m]."""
+    factor, late = np.ones(ranges.size), None
+    if wrong.flux > 0:
+        factor = np.exp(_smooth_error(rng, ranges, wrong.flux))
+    if wrong.range_m > 0:
+        late = _smooth_error(rng, ranges, wrong.range_m)
+    return factor, late
+
+
 def _smooth_error(rng: np.random.Generator, ranges: Array, sd: float) -> Array:
     """Draw a Gaussian process along log r with Matern 5/2 covariance at given ranges."""
     logs = np.log(ranges[np.isfinite(ranges)])
@@ -205,10 +242,9 @@ def simulate(
     with np.errstate(over="ignore", invalid="ignore"):
         late = None
         wrong = scene.model_error
-        if wrong.integrated and wrong.flux > 0:
-            factor = factor * np.exp(_smooth_error(rng, ranges, wrong.flux))
-        if wrong.integrated and wrong.range_m > 0:
-            late = _smooth_error(rng, ranges, wrong.range_m)
+        if wrong.integrated:
+            by, late = _errors(rng, ranges, wrong)
+            factor = factor * by
         terms = parameters.terms(z)
         moments = _moments(sensor, terms, ranges, factor, late)
         temperature = temperatures(sensor, trajectory)
