@@ -78,8 +78,9 @@ class TechniqueResult:
         How well a technique of many frames explains them: ``chi_square`` (less what
         errors of the model take up), ``deviance``
         (-2 log likelihood relative to no residual under read noise alone; of fits by likelihood),
-        ``degrees_of_freedom``, ``p_value``, ``misfit``, ``rank``, ``widening`` (factor on all
-        standard deviations; of fits by likelihood) and ``optima``.
+        ``degrees_of_freedom``, ``checks`` (p-value of each), ``p_value`` of all together,
+        ``misfit`` and its ``reasons``, ``rank``, ``widening`` (factor on all standard deviations;
+        of fits by likelihood) and ``optima``.
     runtime_s : float
         Time that the technique took [s].
     """

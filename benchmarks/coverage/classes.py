@@ -141,7 +141,7 @@ def at(plate: PlateScene, radius: float, distance_m: float) -> Rectangle | Disk:
     return Disk(radius_m=radius, pose=rectangle.pose, material=rectangle.material)
 
 
-def draw(group: SceneClass, number: int) -> DataSet:
+def draw(group: SceneClass, number: int, snr: float = SNR) -> DataSet:
     """Draw a data set of a class.
 
     The stroke starts at 0.1 to 0.4 m and ends 2 to 6 times as far; positions are spread evenly in
@@ -155,6 +155,8 @@ def draw(group: SceneClass, number: int) -> DataSet:
         The class.
     number : int
         Of the data set: it alone fixes everything. Even ones are pulsed, odd ones sine waves.
+    snr : float
+        Of the object in the middle of its stroke.
 
     Returns
     -------
@@ -173,7 +175,7 @@ def draw(group: SceneClass, number: int) -> DataSet:
         return read(scene, silent, tolerance=1e-6).mean
 
     middle = float(np.hypot(*signal(math.sqrt(low * high))))
-    noise = middle / SNR
+    noise = middle / snr
     sensor = parse_sensor({**kind, "noise": {"read": [noise, noise]}})
     scene = OpticalScene(surfaces=(at(plate, radius, 1.0),))
     terms: dict[str, Any] = {}

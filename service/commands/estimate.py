@@ -79,8 +79,8 @@ def _run(args: argparse.Namespace) -> int:
             note(
                 args,
                 f"note: {result.technique} gives no ranges: its fit does not explain the frames "
-                f"(misfit, p value {result.fit['p_value']:.2g}); something is not as the scene "
-                "states it",
+                f"(misfit, p value {result.fit['p_value']:.2g}): "
+                f"{'; '.join(result.fit['reasons'])}",
             )
     if estimates.results:
         return 0

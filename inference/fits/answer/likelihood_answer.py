@@ -16,8 +16,9 @@ from inference.fits.answer.determined import (
     refuse_if_undetermined,
 )
 from inference.fits.answer.inflation import inflation, shift_of
+from inference.fits.answer.model_checks import model_checks
 from inference.fits.answer.profile_scan import profile_scan
-from inference.fits.answer.ranges import DECIDED, WITHIN, Answer, frame_ranges
+from inference.fits.answer.ranges import CONTRADICTION, DECIDED, WITHIN, Answer, frame_ranges
 from inference.fits.answer.report import FALSE_ALARM, describe, fit_report, p_value_of, spoiled
 from inference.fits.likelihood.erring import Erring, contradicting, erring_maxima, softened
 from inference.fits.likelihood.erring_valley import valleys
@@ -190,8 +191,11 @@ def _erring_answer(
     # another mode of the law is another answer; near in the same mode, a wider one
     others = {id(one.clean.mode): one for one in reversed(near) if one.clean.mode is not None}
     others.pop(id(top.clean.mode), None)
-    report = fit_report(problem, found, top.chi_square, facts.rank, wider)
-    report["misfit"] |= bool(contradicted)
+    checks = model_checks(problem, top)
+    report = fit_report(problem, found, top.chi_square, facts.rank, wider, checks)
+    if contradicted:
+        report["misfit"] = True
+        report["reasons"].append(CONTRADICTION)
     parameters = describe(top.clean, top, top.facts, wider, near, top.whole)
     return frame_ranges(
         name,

@@ -21,7 +21,7 @@ from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.problem import FitProblem
 from inference.realtime.net import ABSENT, COMMON_REASONS, SATURATED
 
-__all__ = ["DECIDED", "MISFIT", "WITHIN", "Answer", "frame_ranges"]
+__all__ = ["CONTRADICTION", "DECIDED", "MISFIT", "WITHIN", "Answer", "frame_ranges"]
 
 Array = NDArray[np.float64]
 
@@ -32,6 +32,9 @@ _IMPOSSIBLE = 36.0  # chi-square of a single frame that nothing explains
 _ONE = 1.0  # standard deviations below which two modes are one
 
 # why a fit that does not explain the frames gives no range
+CONTRADICTION = (
+    "the readings contradict what is known of the range (known_range_m, displacement_m): a misfit"
+)
 MISFIT = "the fit does not explain the frames (misfit): something is not as the scene states it"
 _REASONS = (
     *COMMON_REASONS,
@@ -39,7 +42,7 @@ _REASONS = (
     "no range explains the readings within six standard deviations",
     "the best range lies at the end of the ranges of the scene",
     MISFIT,
-    "the readings contradict what is known of the range (known_range_m, displacement_m): a misfit",
+    CONTRADICTION,
 )
 _AMBIGUOUS, _UNEXPLAINED, _EDGE, _MISFIT, _CONTRADICTED = range(len(COMMON_REASONS), len(_REASONS))
 

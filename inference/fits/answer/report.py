@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inference.fits.answer.model_checks import REASONS, Check
 from inference.fits.answer.ranges import WITHIN
 from inference.fits.likelihood.maximum import Maximum
 from inference.fits.likelihood.problem import FitProblem
@@ -28,6 +30,7 @@ __all__ = [
 Array = NDArray[np.float64]
 
 FALSE_ALARM = 1e-3
+_ONE = 1.0 - 1e-12  # for 1, whose logarithm of what is left is no number
 
 
 def describe(
@@ -191,7 +194,12 @@ def p_value_of(problem: FitProblem, chi_square: float) -> float:
 
 
 def fit_report(
-    problem: FitProblem, optima: Sequence[Maximum], chi_square: float, rank: int, wider: float
+    problem: FitProblem,
+    optima: Sequence[Maximum],
+    chi_square: float,
+    rank: int,
+    wider: float,
+    checks: Mapping[str, Check] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """Return how well a fit explains the frames.
 
@@ -207,21 +215,31 @@ def fit_report(
         Directions of the unknowns that the frames tell.
     wider : float
         Factor on all standard deviations (`inflation`).
+    checks : mapping of str to Check
+        Others than that of chi-square (`model_checks`).
 
     Returns
     -------
     dict
         ``chi_square`` less what errors of the model take up, ``deviance``, ``degrees_of_freedom``,
-        ``p_value``, ``misfit``, ``rank``, ``widening`` and ``optima``, each with its deviance above
-        the best and its values.
+        ``p_value`` of the worst of all checks, made up for their number as if they were independent
+        (Sidak), ``misfit`` and its ``reasons``, ``checks`` with the p-value of each, ``rank``,
+        ``widening`` and ``optima``, each with its deviance above the best and its values.
     """
-    p_value = p_value_of(problem, chi_square)
+    each = {"chi_square": p_value_of(problem, chi_square)}
+    each |= {name: check.p_value for name, check in checks.items()}
+    together = {
+        name: -math.expm1(len(each) * math.log1p(-min(p, _ONE))) for name, p in each.items()
+    }
+    p_value = min(together.values())
     return {
         "chi_square": chi_square,
         "deviance": optima[0].deviance,
         "degrees_of_freedom": _freedom(problem),
         "p_value": p_value,
         "misfit": p_value < FALSE_ALARM,
+        "reasons": [REASONS[name] for name, p in together.items() if p < FALSE_ALARM],
+        "checks": each,
         "rank": rank,
         "widening": wider,
         "optima": [

@@ -8,6 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
+from inference.fits.answer.model_checks import REASONS
 from inference.fits.answer.ranges import Answer, frame_ranges
 from inference.fits.answer.report import FALSE_ALARM, entries, spoiled, with_parts
 from inference.fits.answer.withheld import without_ranges
@@ -93,6 +94,8 @@ def linear_answer(
         "degrees_of_freedom": freedom,
         "p_value": p_value,
         "misfit": p_value < FALSE_ALARM,
+        "reasons": [REASONS["chi_square"]] if p_value < FALSE_ALARM else [],
+        "checks": {"chi_square": p_value},
         "rank": fit.rank,
         "optima": [],
     }

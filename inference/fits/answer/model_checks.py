@@ -1,0 +1,145 @@
+"""What the best fit of a model that errs owes to errors that a scene cannot have.
+
+Errors of the model and unknowns follow light that the scene leaves out, and chi-square stays small.
+Where they are linear, readings less the model, errors and unknowns in units of their laws are
+together normal noise with what the fit took up projected out (docs/model.md, fit-checks). So it is
+known how far unknowns may be off their priors, and how much of the rest may look like crosstalk.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from inference.fits.likelihood.arguments import CROSSTALK
+from inference.fits.likelihood.erring import Erring
+from inference.fits.likelihood.erring_point import linearised, point_at, slopes_of_priors
+from inference.fits.likelihood.problem import FitProblem
+from inference.fits.likelihood.told import eliminated
+
+__all__ = ["REASONS", "Check", "model_checks"]
+
+Array = NDArray[np.float64]
+
+_FREE = 0.05  # least share of its variance that the fit leaves of a direction that is looked at
+_APART = 1e-6  # of a column, below which the fit can make it itself
+
+REASONS: Mapping[str, str] = {
+    "chi_square": "readings lie farther off the model than noise and its errors allow",
+    "crosstalk": (
+        "light that is the same in all frames, as crosstalk, would explain the readings better: "
+        "state crosstalk as unknown, or give empty frames"
+    ),
+    "priors": (
+        "the unknowns lie where their priors have next to no mass: something is not as the scene "
+        "states it, or the object is unlike those of its priors"
+    ),
+}
+"""What it means that a check fails, by its name."""
+
+
+class Check(NamedTuple):
+    """A sum of squares, and how many independent standard normal numbers it is of."""
+
+    statistic: float
+    freedom: int
+
+    @property
+    def p_value(self) -> float:
+        """How often noise and errors within their laws make it larger."""
+        return float(scipy.special.chdtrc(self.freedom, self.statistic)) if self.freedom else 1.0
+
+
+class _Rows(NamedTuple):
+    """What is standard normal before a fit: readings across their ranges, errors, unknowns.
+
+    Attributes
+    ----------
+    target : ndarray, shape (m,)
+        At the best fit.
+    followed : ndarray, shape (m, k + d)
+        Derivatives along all that was fitted.
+    crosstalk : ndarray, shape (m, c)
+        Along the crosstalk that is no unknown.
+    """
+
+    target: Array
+    followed: Array
+    crosstalk: Array
+
+
+def _rows(problem: FitProblem, top: Erring) -> _Rows:
+    at = point_at(problem, top.x, top.positions, top.a)
+    whitener = linearised(problem, top.x, top.positions)[-1]
+    # crosstalk moves the readings themselves
+    known = [i for i, slot in enumerate(CROSSTALK) if slot not in problem.slots]
+    columns = [at.errors, at.residual[:, :, None], np.linalg.solve(at.root, whitener)[:, :, known]]
+    told, (k, d, c) = at.told, (at.a.size, at.x.size, len(known))
+    if told is not None:
+        none = np.zeros((at.u.size, 2, c))
+        told = told._replace(
+            errors=np.concatenate([told.errors, told.residual[:, :, None], none], axis=2)
+        )
+    seen = eliminated(problem.names, at.jacobian, at.along, np.concatenate(columns, axis=2), told)
+    errors, residual, crosstalk = np.split(seen.errors, [k, k + 1], axis=1)
+    slopes = slopes_of_priors(problem, at.x)
+    return _Rows(
+        np.concatenate([residual[:, 0], -at.a, -at.z]),
+        np.block([[errors, seen.jacobian], [np.eye(k, k + d)], [np.zeros((d, k)), slopes]]),
+        np.vstack([crosstalk, np.zeros((k + d, c))]),
+    )
+
+
+def _unit(columns: Array) -> Array:
+    size = np.linalg.norm(columns, axis=0)
+    return np.asarray(columns / np.where(size > 0.0, size, 1.0))
+
+
+def _basis(columns: Array) -> Array:
+    """Return an orthonormal basis of what columns span, those that are next to nothing left out."""
+    left, values, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(left[:, values > _APART])
+
+
+def model_checks(problem: FitProblem, top: Erring) -> dict[str, Check]:
+    """Look at what a fit whose model errs had to suppose.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    top : Erring
+        Its best maximum.
+
+    Returns
+    -------
+    dict of str to Check
+        ``crosstalk``: a score test (Rao 1948) of constant light that the scene says to be another,
+        or none at all; ``priors``: the unknowns against their laws. Each is chi-square distributed
+        where the scene is as stated, up to what is not linear.
+    """
+    rows = _rows(dataclasses.replace(problem, mode=top.clean.mode), top)
+    followed = _basis(_unit(rows.followed))
+
+    def left(part: Array) -> Array:
+        for _ in range(2):  # the second time takes off what rounding left
+            part = part - followed @ (followed.T @ part)
+        return part
+
+    target = left(rows.target)
+    light = _basis(left(_unit(rows.crosstalk)))
+    d = top.x.size
+    of_priors = followed[rows.target.size - d :]
+    share, turn = np.linalg.eigh(np.eye(d) - of_priors @ of_priors.T)
+    free = share > _FREE
+    off = (turn.T @ target[rows.target.size - d :])[free] / np.sqrt(share[free])
+    return {"crosstalk": _check(light.T @ target), "priors": _check(off)}
+
+
+def _check(off: Array) -> Check:
+    statistic = float(off @ off)
+    return Check(statistic if math.isfinite(statistic) else math.inf, off.size)

@@ -1,0 +1,68 @@
+"""What a fit by default says of light that its scene leaves out."""
+
+import numpy as np
+import pytest
+from scipy import special
+
+import hybridtof
+from tests.posterior.scenes import KINDS, OBJECT, data, sensor_of
+
+NOISE = 1e-4
+
+
+@pytest.mark.parametrize(
+    ("kind", "crosstalk"),
+    [("pulsed", (0.004, 0.02)), ("pulsed", (0.0004, 0.002)), ("sine_wave", (0.001, 0.02))],
+)
+def test_crosstalk_that_is_not_stated_is_a_misfit(
+    kind: str, crosstalk: tuple[float, float]
+) -> None:
+    """It was none, by chi-square: ranges 11 to 240 standard deviations off, and unique."""
+    sensor = hybridtof.parse_sensor({**KINDS[kind], "noise": {"read": [NOISE, NOISE]}})
+    truth = {"crosstalk": list(crosstalk), "discrepancy": 0}
+    frames = data(sensor, truth, 24, 1, (0.25, 1.2)).frames
+    (result,) = hybridtof.estimate(sensor, hybridtof.parse_scene({}), frames, ["joint_fit"]).results
+    assert result.fit is not None
+    assert result.parameters is not None
+    assert result.fit["misfit"]
+    assert any("crosstalk" in reason for reason in result.fit["reasons"])
+    assert np.isnan(result.range_m).all()
+    assert {each["status"] for each in result.parameters.values()} == {"not_identified"}
+
+
+def test_the_check_for_crosstalk_is_what_its_fit_would_gain() -> None:
+    """A score test against the deviance of a fit whose crosstalk is unknown, all else as it is.
+
+    Of crosstalk that is small beside the light all is linear to 2 %.
+    """
+    sensor = sensor_of("sine_wave")
+    noise = sensor.noise.read[0]
+    told = {"prior": "normal", "mean": 0.0, "sd": 1e3 * noise}
+    truth = {"crosstalk": [8.0 * noise, -5.0 * noise], "discrepancy": 0}
+    frames = data(sensor, truth, 20, 1).frames
+    without, with_it = (
+        hybridtof.estimate(sensor, hybridtof.parse_scene(scene), frames, ["joint_fit"])
+        .results[0]
+        .fit
+        for scene in ({}, {"crosstalk": [told, told]})
+    )
+    assert without is not None
+    assert with_it is not None
+    gain = special.chdtri(2, without["checks"]["crosstalk"])
+    assert gain == pytest.approx(without["deviance"] - with_it["deviance"], rel=0.02)
+    assert with_it["checks"]["crosstalk"] == 1.0
+    assert without["misfit"]
+    assert not with_it["misfit"]
+    assert with_it["reasons"] == []
+
+
+def test_an_object_unlike_its_priors_is_a_misfit_that_says_so() -> None:
+    """The scene has c1 = 0.5 m +- 5 cm, which is -0.12 m, and knows the rest of the object."""
+    sensor = sensor_of("pulsed")
+    law = {"prior": "normal", "mean": 0.5, "sd": 0.05}
+    scene = hybridtof.parse_scene({"object": {**OBJECT, "c1": law}})
+    frames = data(sensor, {"discrepancy": 0}, 20, 1).frames
+    (result,) = hybridtof.estimate(sensor, scene, frames, ["joint_fit"]).results
+    assert result.fit is not None
+    assert result.fit["checks"]["priors"] < 1e-3
+    assert any("priors" in reason for reason in result.fit["reasons"])
