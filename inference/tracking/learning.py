@@ -199,7 +199,8 @@ def learn(
         told = pull1 * tangent.slope1 + pull2 * tangent.slope2
         unsure = slope_variance(at, gain, tangent.slope1, tangent.slope2, table)
         bring_anchor(of, row, at, prior.share, told, unsure)
-        shared = straighten(of, row, gain, tangent.slope1, tangent.slope2, table)
+        along = at, tangent.slope1, tangent.slope2
+        shared = straighten(of, row, gain, along, noise, table)
     if position.born:
         begin(of, row, u, prior.rate.sd)
     beside = 0.0

@@ -12,6 +12,10 @@ from it. What is motion for certain turns it with the errors of the crosstalk ke
 motion tells range and crosstalk apart. It is certain where the rate is known, and where a frame
 shows it well beyond what the frame itself may err: of an object far slower than it may be the rate
 is never known, and its motion taken for corrections would turn crosstalk that stays.
+
+Errors of readings are kept as far as frames tell them. What nuisance parameters hide, far beyond
+what noise and crosstalk could be, no frame has told, and crosstalk that took it up would leave what
+is known of it.
 """
 
 from typing import NamedTuple
@@ -26,7 +30,13 @@ from inference.tracking.hypotheses import (
     V,
     variance_of,
 )
-from inference.tracking.readings_table import ReadingsTable, mean_at
+from inference.tracking.readings_table import (
+    ReadingsTable,
+    mean_at,
+    nuisance_count,
+    nuisance_root,
+)
+from inference.tracking.roots import Root, add_factor, add_root, solve
 from simulator.compiled import compiled
 
 __all__ = [
@@ -41,7 +51,21 @@ __all__ = [
 
 _MOST = 0.5  # of the common part that a change of tangent may take up
 _CERTAIN = 9.0  # variances of its error at which half of a motion counts as certain
+_UNFELT = 1e-2  # variance of the noise: along what the crosstalk errs by less, nothing follows it
 _SINGULAR = 1e-14  # of a determinant against the product of its diagonal
+
+
+class Told(NamedTuple):
+    """The share of a change of the readings that frames tell, beside nuisance parameters.
+
+    By its elements, of the matrix V (V + N)^-1: V is the covariance by noise and crosstalk, N that
+    by nuisance parameters.
+    """
+
+    by11: float
+    by12: float
+    by21: float
+    by22: float
 
 
 class Shared(NamedTuple):
@@ -56,9 +80,39 @@ class Shared(NamedTuple):
     # means before the update
     crosstalk1: float
     crosstalk2: float
+    told: Told
 
 
-NOT_SHARED = Shared(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_ALL = Told(1.0, 0.0, 0.0, 1.0)
+NOT_SHARED = Shared(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _ALL)
+
+
+@compiled
+def _told_of(
+    of: Hypotheses, row: int, noise: Root, u: float, gain: float, table: ReadingsTable
+) -> Told:
+    """Return the share of noise and crosstalk in what a hypothesis expects of the readings."""
+    if nuisance_count(table) == 0:
+        return _ALL
+    X = of.X
+    own = noise
+    for j in range(X.shape[1]):
+        own = add_factor(own, X[row, CROSSTALK1, j], X[row, CROSSTALK2, j])
+    both = add_root(own, nuisance_root(u, gain, table))
+    v11, v12 = own.r11 * own.r11, own.r11 * own.r21
+    v22 = own.r21 * own.r21 + own.r22 * own.r22
+    by11, by12 = solve(both, v11, v12)
+    by21, by22 = solve(both, v12, v22)
+    return Told(by11, by12, by21, by22)
+
+
+@compiled
+def _kept(told: Told, first: float, second: float) -> tuple[float, float]:
+    """Return the part of a change of the readings that frames tell."""
+    return (
+        told.by11 * first + told.by12 * second,
+        told.by21 * first + told.by22 * second,
+    )
 
 
 @compiled
@@ -85,16 +139,12 @@ def shared_part(of: Hypotheses, row: int) -> tuple[float, float, float]:
         k11 += first * first
         k12 += first * second
         k22 += second * second
+    k11, k22 = k11 + _UNFELT, k22 + _UNFELT
     determinant = k11 * k22 - k12 * k12
-    if determinant > _SINGULAR * k11 * k22:
-        back1 = (k22 * u1 - k12 * u2) / determinant
-        back2 = (k11 * u2 - k12 * u1) / determinant
-    elif k11 >= k22 and k11 > 0.0:
-        back1, back2 = u1 / k11, 0.0
-    elif k22 > 0.0:
-        back1, back2 = 0.0, u2 / k22
-    else:
+    if not determinant > _SINGULAR * k11 * k22:
         return 0.0, 0.0, 0.0
+    back1 = (k22 * u1 - k12 * u2) / determinant
+    back2 = (k11 * u2 - k12 * u1) / determinant
     share = (back1 * u1 + back2 * u2) / uu if uu > 0.0 else 0.0
     return back1, back2, min(max(share, 0.0), 1.0)
 
@@ -137,7 +187,12 @@ def bring_anchor(
 @borrowed
 @compiled
 def straighten(
-    of: Hypotheses, row: int, gain: float, slope1: float, slope2: float, table: ReadingsTable
+    of: Hypotheses,
+    row: int,
+    gain: float,
+    tangent: tuple[float, float, float],
+    noise: Root,
+    table: ReadingsTable,
 ) -> Shared:
     """Let the crosstalk's errors take up what the common part of u does along another tangent.
 
@@ -147,15 +202,19 @@ def straighten(
         The hypothesis; its root is changed in place.
     gain : float
         The frame's factor on the sensor's gain.
-    slope1, slope2 : float
-        Derivatives of the frame's readings along u that will be taken.
+    tangent : (float, float, float)
+        log r, and the derivatives of the frame's readings along it that will be taken.
+    noise : Root
+        Of the covariance of the frame's own errors.
     table : ReadingsTable
         Mean readings.
     """
     x, X = of.x, of.X
+    at, slope1, slope2 = tangent
+    told = _told_of(of, row, noise, at, gain, table)
     back1, back2, _ = shared_part(of, row)
     _, _, s1, s2 = mean_at(x[row, ANCHOR], table)
-    turn1, turn2 = gain * s1 - slope1, gain * s2 - slope2
+    turn1, turn2 = _kept(told, gain * s1 - slope1, gain * s2 - slope2)
     # held to what can be undone
     along = back1 * turn1 + back2 * turn2
     held = min(1.0, _MOST / abs(along)) if along != 0.0 else 1.0
@@ -164,7 +223,7 @@ def straighten(
         common = back1 * X[row, CROSSTALK1, j] + back2 * X[row, CROSSTALK2, j]
         X[row, CROSSTALK1, j] += turn1 * common
         X[row, CROSSTALK2, j] += turn2 * common
-    return Shared(back1, back2, turn1, turn2, x[row, CROSSTALK1], x[row, CROSSTALK2])
+    return Shared(back1, back2, turn1, turn2, x[row, CROSSTALK1], x[row, CROSSTALK2], told)
 
 
 @borrowed
@@ -191,11 +250,14 @@ def follow(of: Hypotheses, row: int, shared: Shared, gain: float, table: Reading
     here1, here2, _, _ = mean_at(x[row, U] - common, table)
     there1, there2, _, _ = mean_at(x[row, U], table)
     _, _, s1, s2 = mean_at(x[row, ANCHOR], table)
-    x[row, CROSSTALK1] += gain * (here1 + s1 * common - there1) - turn1 * common
-    x[row, CROSSTALK2] += gain * (here2 + s2 * common - there2) - turn2 * common
+    away1, away2 = gain * (here1 + s1 * common - there1), gain * (here2 + s2 * common - there2)
+    away1, away2 = _kept(shared.told, away1, away2)
+    x[row, CROSSTALK1] += away1 - turn1 * common
+    x[row, CROSSTALK2] += away2 - turn2 * common
     # what an update corrects is no motion: the readings' errors stay what they are
     _, _, e1, e2 = mean_at(x[row, U], table)
-    bend1, bend2 = gain * (s1 - e1) - turn1, gain * (s2 - e2) - turn2
+    bend1, bend2 = _kept(shared.told, gain * (s1 - e1), gain * (s2 - e2))
+    bend1, bend2 = bend1 - turn1, bend2 - turn2
     x[row, ANCHOR] = x[row, U]
     for j in range(X.shape[1]):
         follows = (back1 * X[row, CROSSTALK1, j] + back2 * X[row, CROSSTALK2, j]) / scale

@@ -169,6 +169,29 @@ def test_a_discrepancy_does_not_make_crosstalk_known(discrepancy: float | None) 
     assert np.nanmax(np.abs(z)) < 5.0
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_crosstalk_known_to_the_noise_takes_up_no_error_of_the_model(seed: int) -> None:
+    """A near object whose light errs by hundreds of read noises, crosstalk known to 1.25 of them.
+
+    What its range errs with the crosstalk is told by the late window. Of the whole one, crosstalk
+    was let go 40 standard deviations off to keep an error that no frame had told, and where both
+    erred along one line, by hundreds of read noises in a frame; ranges were up to 52 off.
+    """
+    sd = 1.25 * READ
+    scene = parse_scene(scene_of(sd, discrepancy="default"))
+    rng = np.random.default_rng(seed)
+    r = 0.24 * np.exp(1.15 * np.linspace(0.0, 1.0, 300) ** 2)
+    crosstalk = sd * rng.standard_normal(2)
+    found = track(SENSOR, scene, frames_at(r, crosstalk, rng), QUIET)
+    assert found.crosstalk is not None
+    assert found.crosstalk_sd is not None
+    # with what its correlation with the model's error adds to it
+    assert (found.crosstalk_sd < 1.3 * sd).all()
+    # errors of a track go together: five standard deviations at every frame is what is asked
+    assert (np.abs(found.crosstalk - crosstalk) < 5.0 * found.crosstalk_sd).all()
+    assert (np.abs(found.best_m - r) < 5.0 * found.best_sd_m).all()
+
+
 def test_an_object_that_may_be_anywhere_after_a_step_is_found_again() -> None:
     """Half a second at three e-folds a second, crosstalk unknown: tracks were lost for good.
 
