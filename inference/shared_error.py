@@ -10,14 +10,11 @@ import dataclasses
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inference.estimates import SdParts, TechniqueResult
 from inference.realtime.nearest_roots import nearest
 
 __all__ = ["with_shared_error"]
-
-Array = NDArray[np.float64]
 
 
 def with_shared_error(

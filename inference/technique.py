@@ -4,9 +4,6 @@ import dataclasses
 from collections.abc import Callable
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from inference.estimates import TechniqueResult
 from inference.known import Known
 from simulator.frames import Frames
@@ -15,7 +12,6 @@ from simulator.sensor import Sensor
 
 __all__ = ["Kind", "Task", "Technique"]
 
-Array = NDArray[np.float64]
 Kind = Literal["pulsed", "sine_wave"]
 
 

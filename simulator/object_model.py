@@ -6,9 +6,6 @@ conventions).
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from simulator.compiled import compiled
 
 __all__ = [
@@ -23,7 +20,6 @@ __all__ = [
     "quadratic_minimum",
 ]
 
-Array = NDArray[np.float64]
 
 # least c1 / sqrt(c0) for which a curve is monotone (docs/model.md, 4.1, 4.4 and 4.68)
 C1_LIMIT_INTENSITY = -math.sqrt(32 / 9)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from benchmarks.samplers.outcome import Outcome, enough, equal, judged
 from benchmarks.samplers.scenes import FRAMES
 from inference.density.collapsed import CollapsedDensity
-from inference.density.profile import best_ranges
 from inference.frame.arguments import scene_of
 from inference.frame.blocks import block_of
 from inference.frame.log_density import log_density
@@ -69,7 +68,7 @@ def plain_emcee(job: Job, density: CollapsedDensity, optima: list[Optimum], cap:
     states, samplers = [], []
     for _ in range(4):
         ball = mixture.centres + 0.1 * rng.standard_normal((walkers, d)) @ mixture.factors[0].T
-        best = best_ranges(density, ball)
+        best = density.best_ranges(ball)
         x = np.column_stack([ball, best[:, :, 0] + 0.1 * best[:, :, 2] * _normal(rng, best)])
         sampler = emcee.EnsembleSampler(
             walkers, size, lambda x: _joint_density(density, x), vectorize=True

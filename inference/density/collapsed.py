@@ -9,16 +9,10 @@ from numpy.typing import NDArray
 
 from inference.density.best_ranges import fill_best_ranges
 from inference.density.frame_integrals import fill_log_likelihoods
-from inference.density.pieces import at_reference, pieces
+from inference.density.pieces import pieces
 from inference.density.range_draw import fill_range_draws
-from inference.frame.arguments import (
-    Instrument,
-    ReferencePrior,
-    Rows,
-    instrument_of,
-    row_of,
-)
-from inference.frame.blocks import GAIN, Data, own_blocks
+from inference.frame.arguments import Instrument, ReferencePrior, Rows, instrument_of
+from inference.frame.blocks import Data, own_blocks
 from inference.frame.known_range import columns_of, with_displacements
 from inference.frame.warmth import with_warmth, without_warmth
 from simulator.at_temperature import warmth
@@ -147,18 +141,6 @@ class CollapsedDensity:
         """Which of the ranges each frame has, shape (frames,)."""
         return np.arange(len(self.frames))
 
-    def paired_log_likelihood(self, z: Array, readings: Array) -> Array:
-        """Return log p(readings_i | z_i) for readings of shape (n, frames, 2), shape (n,)."""
-        terms = self.parameters.terms(z)
-        rows = self.integral_rows(terms)
-        out = np.empty(len(z))
-        for i in range(len(z)):
-            frames = self.frames.copy()
-            frames[:, :GAIN] = readings[i]
-            seen = self.blocks_of(at_reference(self.sensor, frames, terms, i))
-            out[i] = self._of_rows(row_of(rows, i), seen).sum()
-        return out
-
     def _of_terms(self, terms: Terms) -> Array:
         """Return log p(y_j | terms_i) for physical terms."""
         parts = pieces(self, terms, self.integral_rows(terms))
@@ -234,7 +216,19 @@ class CollapsedDensity:
         return out, unfinished
 
     def best_ranges(self, z: Array) -> Array:
-        """Find each frame's best range (`inference.density.profile.best_ranges`)."""
+        """Find each frame's best range for given parameters.
+
+        Parameters
+        ----------
+        z : ndarray, shape (n, d)
+            Parameter vectors.
+
+        Returns
+        -------
+        ndarray, shape (n, frames, 3)
+            log r, log p(y, log r | z) and its standard deviation in log r; nan, log likelihood and
+            nan for a frame without object.
+        """
         terms = self.parameters.terms(z)
         found = np.empty((len(z), self.data.blocks, 3))
         for k, rows, data in pieces(self, terms, self.rows(terms)):
@@ -287,10 +281,5 @@ def collapsed_density(sensor: Sensor, scene: Scene, frames: Frames) -> Collapsed
     columns = columns_of(frames)
     parameters = with_displacements(parameters_of(sensor, scene), columns)
     columns = with_warmth(columns, warmth(sensor, frames))
-    return CollapsedDensity(
-        parameters,
-        columns,
-        None if all_present else frames.object_present,
-        sensor,
-        None,
-    )
+    present = None if all_present else frames.object_present
+    return CollapsedDensity(parameters, columns, present, sensor, None)

@@ -132,7 +132,7 @@ class DiscrepantDensity(CollapsedDensity):
         Returns
         -------
         (ndarray, ndarray)
-            What `inference.density.profile.best_ranges` returns, shape (n, frames, 3), and the
+            What `CollapsedDensity.best_ranges` returns, shape (n, frames, 3), and the
             coefficients, shape (n, functions).
         """
         out = np.empty((len(z), len(self.frames), 3))
@@ -143,7 +143,7 @@ class DiscrepantDensity(CollapsedDensity):
         return out, centres
 
     def best_ranges(self, z: Array) -> Array:
-        """Find each frame's best range (`inference.density.profile.best_ranges`)."""
+        """Find each frame's best range (`CollapsedDensity.best_ranges`)."""
         return self.joint_maxima(z)[0]
 
 

@@ -17,7 +17,7 @@ from simulator.at_temperature import readings_at_reference
 from simulator.sensor import Sensor
 from simulator.terms import Terms
 
-__all__ = ["at_reference", "pieces"]
+__all__ = ["pieces"]
 
 Array = NDArray[np.float64]
 
@@ -53,35 +53,20 @@ def pieces(of: _Density, terms: Terms, rows: Rows) -> Iterator[tuple[slice, Rows
         yield slice(None), rows, of.data
         return
     for i in range(len(rows.shapes)):
-        frames = at_reference(of.sensor, of.frames, terms, i)
-        yield slice(i, i + 1), row_of(rows, i), of.blocks_of(frames)
+        yield slice(i, i + 1), row_of(rows, i), of.blocks_of(_at_reference(of, terms, i))
 
 
-def at_reference(sensor: Sensor, frames: Array, terms: Terms, i: int) -> Array:
+def _at_reference(of: _Density, terms: Terms, i: int) -> Array:
     """Return frames as vector i supposes that they were at the sensor's reference temperature.
 
-    Parameters
-    ----------
-    sensor : Sensor
-        The sensor.
-    frames : ndarray, shape (n, 3, 7 or 8)
-        As of `inference.density.collapsed.CollapsedDensity`.
-    terms : Terms
-        Parameter vectors.
-    i : int
-        Which of them.
-
-    Returns
-    -------
-    ndarray, shape (n, 3 or 7)
-        Where no frame tells a temperature they are what they were.
+    Of shape (n, 3 or 7). Where no frame tells a temperature they are what they were.
     """
-    out = without_warmth(frames)
+    frames, out = of.frames, without_warmth(of.frames)
     if terms.drift is None or frames.shape[1] <= WARM:
         return out
     gain_drift, delay_drift = terms.drift[i].tolist()
     static = np.zeros(2) if terms.crosstalk is None else terms.crosstalk[i]
     warm, out = frames[:, WARM], out.copy()
-    out[:, :GAIN] = readings_at_reference(sensor, frames[:, :GAIN], warm, delay_drift, static)
+    out[:, :GAIN] = readings_at_reference(of.sensor, frames[:, :GAIN], warm, delay_drift, static)
     out[:, GAIN] *= np.maximum(1.0 + gain_drift * warm, _LEAST_GAIN)
     return out

@@ -1,4 +1,4 @@
-"""The likelihood with every range at its best value, and its linearisation: for starting points."""
+"""The likelihood with every range at its best value, linearised: for starting points."""
 
 import dataclasses
 
@@ -9,28 +9,9 @@ from inference.density.collapsed import CollapsedDensity, FluxBasis
 from inference.density.whitened import whitened
 from inference.frame.arguments import prior_of
 
-__all__ = ["Linearisation", "best_ranges", "linearise"]
+__all__ = ["Linearisation", "linearise"]
 
 Array = NDArray[np.float64]
-
-
-def best_ranges(density: CollapsedDensity, z: Array) -> Array:
-    """Find each frame's best range for given parameters.
-
-    Parameters
-    ----------
-    density : CollapsedDensity
-        The density.
-    z : ndarray, shape (n, d)
-        Parameter vectors.
-
-    Returns
-    -------
-    ndarray, shape (n, frames, 3)
-        log r, log p(y, log r | z) and its standard deviation in log r; nan, log likelihood and
-        nan for a frame without object.
-    """
-    return density.best_ranges(z)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

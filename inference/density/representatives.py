@@ -15,7 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.density.profile import best_ranges, linearise
+from inference.density.profile import linearise
 
 __all__ = ["Representatives", "calibrated", "drawn_by_information", "standing_for"]
 
@@ -73,7 +73,7 @@ def drawn_by_information(
         the range: every part of it is met.
     """
     n, d = len(density.frames), z.size
-    log_r = best_ranges(density, z[None])[0, :, 0]
+    log_r = density.best_ranges(z[None])[0, :, 0]
     jacobian = linearise(density, z, log_r).jacobian.reshape(-1, d)
     basis = scipy.linalg.qr(np.concatenate([jacobian, np.eye(d)]), mode="economic")[0]
     told = np.square(basis[: len(jacobian)]).sum(axis=1).reshape(n, -1).sum(axis=1)

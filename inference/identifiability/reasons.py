@@ -5,7 +5,6 @@ import functools
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inference.identifiability.experiment import Experiment, information
 from inference.identifiability.information import Information
@@ -17,7 +16,6 @@ from simulator.sensor_unknowns import PHASE, TIMING
 
 __all__ = ["Diagnosis"]
 
-Array = NDArray[np.float64]
 
 _ALIKE = 0.98  # correlation of two bounds above which one parameter hides behind the other
 _HELP = 2.0  # a change that lowers a bound by less is not worth its words

@@ -21,7 +21,6 @@ import math
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulator.parameters import Parameters
 
@@ -38,7 +37,6 @@ __all__ = [
     "weak_at_best",
 ]
 
-Array = NDArray[np.float64]
 
 # Of normal laws, spread^2 is the share that the prior has in the answer: by so much of the distance
 # between prior and data the prior moves the answer, and so much of the precision is its own.

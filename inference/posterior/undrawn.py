@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.density.profile import best_ranges
 from inference.frame.blocks import GAIN
 from inference.frame.known_range import rates_of
 from inference.identifiability.before_data import identifiability
@@ -58,7 +57,7 @@ def without_draws(job: Job, density: CollapsedDensity, stage: Tempering | Walkin
     n, folds, foreseen = len(job.frames), np.zeros(len(job.frames), dtype=bool), None
     for part in job.parts():
         own = part.density()
-        log_r = best_ranges(own, best)[:, :, 0]
+        log_r = own.best_ranges(best)[:, :, 0]
         folds[part.of_sent(np.arange(len(part.frames)))] = near_fold(part, own, best, log_r)
         foreseen = foreseen or _foreseen(part, own, best, log_r[0])
     unknown = {name: np.full(n, nan) for name in RANGE_COLUMNS}

@@ -8,7 +8,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inference.tracking.borrowed import borrowed
 from inference.tracking.candidates import (
@@ -48,7 +47,6 @@ from simulator.compiled import compiled
 
 __all__ = ["Model", "Room", "room_for", "weigh_frame", "weigh_known"]
 
-Array = NDArray[np.float64]
 
 _SPARE = 5  # times as many hypotheses may be made by a frame as are kept after it
 

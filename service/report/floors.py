@@ -1,7 +1,6 @@
 """What no method can do better: the Cramer-Rao bound, and one division a frame."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from inference.identifiability.before_data import identifiability
@@ -13,7 +12,6 @@ from simulator.scene import Scene, parse_scene
 
 __all__ = ["division_s", "least_error"]
 
-Array = NDArray[np.float64]
 
 _FRAMES = 40
 _BATCH = 100_000

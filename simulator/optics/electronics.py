@@ -5,7 +5,6 @@ from typing import Annotated
 
 import numpy as np
 import pydantic
-from numpy.typing import NDArray
 from scipy.constants import h, speed_of_light
 
 from simulator.errors import InvalidInputError
@@ -17,7 +16,6 @@ from simulator.validated import Validated
 
 __all__ = ["Electronics", "digitise", "draw_noise", "mean_pair", "physical_gain", "saturation"]
 
-Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
 

@@ -24,7 +24,6 @@ __all__ = [
 Array = NDArray[np.float64]
 
 ELLIPSE, STRETCHED = 0, 1
-_OUTLINES: dict[str, int] = {"pulsed": ELLIPSE, "sine_wave": STRETCHED}
 
 
 def facet_polar_grid(n: int) -> tuple[Array, float]:

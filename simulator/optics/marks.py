@@ -26,7 +26,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-Vector = tuple[float, float, float]
 Chart = tuple[int, Array, tuple[Array, Array], tuple[Array, Array, Array, Array, Array]]
 
 # kinds of surface rows: kind 0, centre 1:4, width axis 4:7, height axis 7:10, normal 10:13,

@@ -3,9 +3,7 @@
 import math
 from typing import Annotated
 
-import numpy as np
 import pydantic
-from numpy.typing import NDArray
 
 from simulator.validated import Validated
 
@@ -20,7 +18,6 @@ __all__ = [
     "rotated",
 ]
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 

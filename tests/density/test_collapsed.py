@@ -12,7 +12,7 @@ from inference.density.collapsed import CollapsedDensity, collapsed_density
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor, parse_sensor
-from tests.posterior.scenes import KINDS, OBJECT, UNKNOWN_CROSSTALK, data, example, sensor_of
+from tests.posterior.scenes import KINDS, OBJECT, UNKNOWN_CROSSTALK, data, sensor_of
 
 NOTHING = np.empty((1, 0))
 BACKGROUND: dict[str, Any] = {
@@ -151,16 +151,3 @@ def test_an_absent_term_is_a_term_of_zeros(sensor: Sensor) -> None:
     absent = of(sensor, {}, frames).frame_log_likelihoods(z)
     zeros = of(sensor, {"crosstalk": [0.0, 0.0]}, frames).frame_log_likelihoods(z)
     assert absent == pytest.approx(zeros, rel=1e-12)
-
-
-@pytest.mark.parametrize("crosstalk", [False, True])
-def test_pairs_row_by_row(crosstalk: bool) -> None:
-    sensor, scene, frames = example("pulsed", crosstalk, frames=5)
-    density = collapsed_density(sensor, scene, frames)
-    rng = np.random.default_rng(4)
-    z = 0.2 * rng.standard_normal((6, len(density.parameters)))
-    readings = frames.readings * (1 + 0.01 * rng.standard_normal((6, 5, 2)))
-    found = density.paired_log_likelihood(z, readings)
-    for k in range(6):
-        one = collapsed_density(sensor, scene, Frames(readings[k]))
-        assert found[k] == one.log_likelihood(z[k : k + 1])[0]

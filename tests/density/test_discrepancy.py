@@ -9,7 +9,7 @@ from scipy import stats
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.density.discrepant import DiscrepantDensity, with_discrepancy
-from inference.density.profile import best_ranges, linearise
+from inference.density.profile import linearise
 from inference.frame.gaussian import log_top
 from inference.posterior import fold
 from inference.posterior.answer.replicate import replicate
@@ -162,8 +162,6 @@ def test_far_from_the_data_the_density_stays_finite_and_never_nan() -> None:
     found, plain = density(z), collapsed_density(sensor, parse_scene(scene), frames)(z)
     assert not np.isnan(found).any()
     np.testing.assert_array_equal(np.isfinite(found), np.isfinite(plain))
-    paired = density.paired_log_likelihood(z[:4], np.array([frames.readings] * 4))
-    np.testing.assert_array_equal(paired, density.log_likelihood(z[:4]))
 
 
 def test_where_nothing_fits_laplace_takes_over_without_a_step() -> None:
@@ -177,7 +175,7 @@ def test_where_nothing_fits_laplace_takes_over_without_a_step() -> None:
     frames = data(sensor, {}, 10, span=(0.4, 1.2)).frames
     density = density_of(sensor, scene, frames, 0.05)
     z = np.linspace(6.0, 9.0, 61)[:, None]
-    joint = best_ranges(density, z)[:, :, 1].sum(axis=1)
+    joint = density.best_ranges(z)[:, :, 1].sum(axis=1)
     below = joint - 10 * log_top(density.instrument.read)
     assert below.min() < -1000.0 < below.max()
     steps = np.abs(np.diff(density.log_likelihood(z) - joint))
@@ -195,10 +193,10 @@ def test_the_gradient_of_the_joint_maximum_is_that_of_its_linearisation(kind: st
     frames = data(sensor, {"crosstalk": CROSSTALK, "discrepancy": 0.05}, 12, span=(0.4, 1.2)).frames
     density = density_of(sensor, scene, frames, 0.05)
     z = density.parameters.standard(np.array([[*C, 0.0023, 0.011]]))[0]
-    line = linearise(density, z, best_ranges(density, z[None])[0, :, 0])
+    line = linearise(density, z, density.best_ranges(z[None])[0, :, 0])
     h = 1e-3
     steps = h * np.eye(z.size)
-    value = best_ranges(density, np.concatenate([z + steps, z - steps]))[:, :, 1].sum(axis=1)
+    value = density.best_ranges(np.concatenate([z + steps, z - steps]))[:, :, 1].sum(axis=1)
     difference = (value[: z.size] - value[z.size :]) / (2 * h)
     gradient = -np.einsum("ni,nid->d", line.residual, line.jacobian)
     # the climb ends within a hundredth of a nat of the top

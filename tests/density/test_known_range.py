@@ -11,7 +11,7 @@ from scipy import integrate
 
 from inference.density.collapsed import collapsed_density
 from inference.density.discrepant import with_discrepancy
-from inference.density.profile import best_ranges, linearise
+from inference.density.profile import linearise
 from inference.density.static import with_common_range
 from inference.density.whitened import whitened
 from simulator.frames import Frames
@@ -174,10 +174,10 @@ def test_linearisation_against_differences(kind: str, flux: float) -> None:
     if flux:
         density = with_discrepancy(density, flux)
     z = np.array([0.05])
-    line = linearise(density, z, best_ranges(density, z[None])[0, :, 0])
+    line = linearise(density, z, density.best_ranges(z[None])[0, :, 0])
     slope = float(line.jacobian.reshape(-1) @ line.residual.reshape(-1))
     h = 1e-4
-    ends = [density.total(best_ranges(density, z[None] + s * h)[:, :, 1])[0] for s in (-1, 1)]
+    ends = [density.total(density.best_ranges(z[None] + s * h)[:, :, 1])[0] for s in (-1, 1)]
     wanted = -(ends[1] - ends[0]) / (2 * h)
     assert slope == pytest.approx(wanted, rel=0.02, abs=0.05)
 
@@ -214,12 +214,12 @@ def test_linearisation_along_the_offset() -> None:
     }
     density = collapsed_density(sensor, parse_scene(free), both)
     z = density.parameters.standard(np.array([[0.101, 0.595]]))[0]
-    line = linearise(density, z, best_ranges(density, z[None])[0, :, 0])
+    line = linearise(density, z, density.best_ranges(z[None])[0, :, 0])
     slope = line.jacobian.reshape(-1, 2).T @ line.residual.reshape(-1)
     for j, h in ((0, 1e-4), (1, 1e-5)):
         step = h * np.eye(2)[j]
         ends = [
-            density.total(best_ranges(density, (z + s * step)[None])[:, :, 1])[0] for s in (-1, 1)
+            density.total(density.best_ranges((z + s * step)[None])[:, :, 1])[0] for s in (-1, 1)
         ]
         assert slope[j] == pytest.approx(-(ends[1] - ends[0]) / (2 * h), rel=0.02)
 

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
-from inference.density.profile import best_ranges, linearise
+from inference.density.profile import linearise
 from simulator.frames import Frames
 from simulator.readings import background_readings, covariance, object_readings
 from simulator.scene import parse_scene
@@ -53,7 +53,7 @@ def test_best_ranges_are_the_tops_of_a_dense_grid() -> None:
     for _ in range(30):
         case = random_case(rng, FEW_TERMS)
         density = collapsed_density(case.sensor, case.scene, case.frames)
-        u, top, sd = best_ranges(density, np.empty((1, 0)))[0, 0]
+        u, top, sd = density.best_ranges(np.empty((1, 0)))[0, 0]
         grid = np.linspace(math.log(case.low), math.log(case.high), 100_001)
         assert top >= log_density(case, grid).max() - 1e-3
         assert top == pytest.approx(float(log_density(case, np.array([u]))[0]), abs=1e-6, rel=1e-9)
@@ -75,7 +75,7 @@ def test_jacobian_is_that_of_residuals_at_their_best_ranges(
     ranges = np.log(np.geomspace(0.1, 2.0, len(simulated.frames)))
     frames = Frames(means(density, z, ranges))
     density = collapsed_density(sensor, parse_scene(free), frames)
-    best = best_ranges(density, z[None])[0, :, 0]
+    best = density.best_ranges(z[None])[0, :, 0]
     assert best == pytest.approx(ranges, abs=1e-4)
     line = linearise(density, z, ranges)
     h = 1e-4
@@ -83,7 +83,7 @@ def test_jacobian_is_that_of_residuals_at_their_best_ranges(
         ends = []
         for sign in (1, -1):
             moved = z + sign * h * np.eye(d)[j]
-            positions = best_ranges(density, moved[None])[0, :, 0]
+            positions = density.best_ranges(moved[None])[0, :, 0]
             ends.append((frames.readings - means(density, moved, positions)) / sensor.noise.read)
         slope = (ends[0] - ends[1]) / (2 * h)
         # best ranges are known to a thousandth of their sd, which moves residuals along the curve

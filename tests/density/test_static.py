@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
-from inference.density.profile import best_ranges, linearise
+from inference.density.profile import linearise
 from inference.density.static import with_common_range
 from inference.density.whitened import whitened
 from inference.frame.arguments import scene_of
@@ -99,7 +99,7 @@ def test_one_range_of_all_frames_is_integrated_out_as_by_quadrature(name: str) -
     for z in density.parameters.sample(rng, 4):
         wanted, u, values = by_quadrature(density, z)
         assert static.log_likelihood(z[None])[0] == pytest.approx(wanted, abs=1e-8 * abs(wanted))
-        top = best_ranges(static, z[None])[0]
+        top = static.best_ranges(z[None])[0]
         assert (top[:, 0] == top[0, 0]).all()
         # shot noise leaves kinks, at which the best of two neighbouring tops may be missed
         highest = float(values.max()) + 6 * log_top(static.instrument.read)
@@ -116,8 +116,6 @@ def test_a_single_frame_has_one_range_anyway(name: str) -> None:
     static = with_common_range(density)
     # the frame integral is good to 1e-4
     assert static.log_likelihood(z) == pytest.approx(density.log_likelihood(z), abs=2e-4)
-    readings = np.repeat(density.frames[None, :, :2], 20, axis=0)
-    assert static.paired_log_likelihood(z, readings) == pytest.approx(static.log_likelihood(z))
 
 
 def test_drawn_ranges_are_common_and_follow_the_joint_density() -> None:
@@ -139,7 +137,7 @@ def test_drawn_ranges_are_common_and_follow_the_joint_density() -> None:
 def test_the_linearisation_gives_way_to_one_range_alone() -> None:
     static = with_common_range(density_of("pulsed", 6))
     z = np.zeros(len(static.parameters))
-    positions = best_ranges(static, z[None])[0, :, 0]
+    positions = static.best_ranges(z[None])[0, :, 0]
     line = linearise(static, z, positions)
     # two readings a frame less one range: the residual's rows span more than with own ranges
     own = linearise(density_of("pulsed", 6), z, positions)

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from flint import arb, arb_series, ctx
-from numpy.typing import NDArray
 
 from inference.estimate import all_roots
 from simulator.frames import Frames
@@ -22,7 +21,6 @@ from tests.extreme.wave_scenes import LIGHT, Wave, frames_of, waves
 
 __all__ = ["WAVES", "certified_roots", "tally_waves", "wave_error"]
 
-Array = NDArray[np.float64]
 EPSILON = float(np.finfo(float).eps)
 # readings and frequencies this close to a fold, relative, may have the count of either side
 _EXCUSED = [k * EPSILON for k in (1, 4, 16)]

@@ -5,7 +5,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inference.estimate import estimate
 from inference.fits.answer.determined import LIMIT
@@ -18,8 +17,6 @@ from simulator.sensor import Sensor, parse_sensor
 from simulator.simulate import Simulation, simulate
 from simulator.trajectories import SampledTrajectory
 from tests.fits.scenes import values_of
-
-Array = NDArray[np.float64]
 
 CLASSES = ("object", "crosstalk", "known background", "free shadow", "everything")
 _NOISE = {"free shadow": (3.0, 5.0), "everything": (4.0, 6.0)}  # decades of SNR, else 2 to 4

@@ -5,7 +5,6 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from inference.frame.arguments import Instrument
 from inference.frame.noise import (
@@ -21,7 +20,6 @@ from inference.frame.noise import (
 
 EPS = float(np.finfo(float).eps)
 WAVES = [None, (0.42, 0.1)]
-Array = NDArray[np.float64]
 
 
 def parts(rng: np.random.Generator) -> NoiseParts:

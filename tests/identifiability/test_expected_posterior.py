@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from inference.density.collapsed import collapsed_density
 from inference.identifiability.before_data import identifiability
@@ -17,8 +16,6 @@ from simulator.frames import Frames
 from simulator.parameters import parameters_of
 from simulator.scene import parse_scene
 from tests.posterior.scenes import UNKNOWN_CROSSTALK, sensor_of
-
-Array = NDArray[np.float64]
 
 BACKGROUND = {
     "strength": {"prior": "lognormal", "median": 0.03, "sigma": 0.5},

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from inference.density.profile import best_ranges
 from inference.identifiability.before_data import identifiability
 from inference.posterior import fold
 from inference.posterior.calibrated import calibrated_scene
@@ -118,7 +117,7 @@ def test_a_model_that_is_not_exact_does_not_overrule_what_is_known() -> None:
     assert job.scene.model_error.integrated
     density = job.density()
     z = density.parameters.standard(np.array([[0.1, 0.004, 0.02]]))[0]
-    best = np.exp(best_ranges(density, climb(density, z)[0][None])[0, :, 0])
+    best = np.exp(density.best_ranges(climb(density, z)[0][None])[0, :, 0])
     assert np.abs(best / RANGES - 1).max() < 0.002
     plain = dataclasses.replace(given, known_range_m=None, known_range_sd_m=None)
     assert not fold.prepare(SENSOR, scene, plain, SETTINGS).scene.model_error.integrated

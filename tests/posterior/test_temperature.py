@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from inference.density.collapsed import collapsed_density
-from inference.density.profile import best_ranges
 from inference.frame.sensitivity import sensitivity
 from inference.identifiability.before_data import identifiability
 from inference.posterior.answer.replicate import replicate
@@ -69,8 +68,8 @@ def test_at_the_truth_a_density_is_that_of_frames_at_the_reference(kind: str) ->
     # of known drifts as well
     of = collapsed_density(known, scene, frames)
     assert of.log_likelihood(np.zeros((1, 0))) == pytest.approx(wanted)
-    found = best_ranges(of, np.zeros((1, 0)))
-    assert found == pytest.approx(best_ranges(there, np.zeros((1, 0))))
+    found = of.best_ranges(np.zeros((1, 0)))
+    assert found == pytest.approx(there.best_ranges(np.zeros((1, 0))))
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))

@@ -20,7 +20,6 @@ def body(scene: Body, frames: Body | None = None, sensor: Body | None = None) ->
     return {"sensor": SENSOR | (sensor or {}), "scene": scene, "frames": FRAMES | (frames or {})}
 
 
-PRIOR = {"prior": "normal", "mean": 0.0, "sd": 0.02}
 BROKEN: dict[str, tuple[Body, str]] = {
     "a prior that physics excludes": (
         body({"object": {"c2": {"prior": "uniform", "low": -2.0, "high": -1.0}}}),

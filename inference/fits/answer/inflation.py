@@ -10,7 +10,6 @@ import dataclasses
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inference.fits.likelihood.conditional_fit import conditional, unconditional
 from inference.fits.likelihood.maximum import Maximum, maximum_from
@@ -19,7 +18,6 @@ from inference.identifiability.information import Information
 
 __all__ = ["BETTER", "inflation", "loosely_told", "shift_of"]
 
-Array = NDArray[np.float64]
 
 _LINEAR = 0.02  # standard deviation of all coordinates below which curvature tells everything
 _DOUBLINGS = 7

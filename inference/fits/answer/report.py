@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from inference.fits.answer.model_checks import REASONS, Check
 from inference.fits.answer.ranges import WITHIN
@@ -27,7 +26,6 @@ __all__ = [
     "with_parts",
 ]
 
-Array = NDArray[np.float64]
 
 FALSE_ALARM = 1e-3
 _ONE = 1.0 - 1e-12  # for 1, whose logarithm of what is left is no number

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.density.discrepant import DiscrepantDensity, with_discrepancy
-from inference.density.profile import best_ranges
 from inference.density.static import StaticDensity
 from inference.density.whitened import Whitened, whitened
 from inference.frame.known_range import beside, free_of_range, rates_of
@@ -124,14 +123,14 @@ def fit_residuals(
     n, d = len(density.frames), z.size
     density = _with_flux_error(job, density)
     plain = _without_flux_error(density)
-    seen = best_ranges(plain, z[None])[0, :, 0]
+    seen = plain.best_ranges(z[None])[0, :, 0]
     many = np.broadcast_to(z, (replicates, d))
     anew = replicate_frames(density, many, np.broadcast_to(seen, (replicates, n)).copy(), rng)
     readings = np.concatenate([density.frames[None], anew])
     if isinstance(density, StaticDensity):
         return _of_one_range(density, z, seen, readings)
     stacked = _stacked(plain, readings)
-    best = best_ranges(stacked, z[None])[0, :, 0]
+    best = stacked.best_ranges(z[None])[0, :, 0]
     at = whitened(density.sensor, density.parameters, stacked.frames, z, best)
     sets = replicates + 1
     across = np.einsum("ni,ni->n", at.across, at.residual).reshape(sets, n)

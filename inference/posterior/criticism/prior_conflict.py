@@ -21,7 +21,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.density.profile import best_ranges, linearise
+from inference.density.profile import linearise
 from inference.density.static import StaticDensity
 from simulator.priors import Distribution, NormalDistribution, UniformDistribution
 from simulator.scene import Reference, Stroke
@@ -64,7 +64,7 @@ def prior_conflicts(
     names = density.parameters.names
 
     def linearised(x: Array) -> tuple[Array, Array]:
-        line = linearise(sampled, x, best_ranges(sampled, x[None])[0, :, 0])
+        line = linearise(sampled, x, sampled.best_ranges(x[None])[0, :, 0])
         return line.residual.ravel(), line.jacobian.reshape(-1, len(names))
 
     return (*parameter_conflicts(names, z, linearised), *range_conflicts(density, z, log_r))
@@ -225,7 +225,7 @@ def ranges_beyond(density: CollapsedDensity, z: Array) -> tuple[NDArray[np.bool_
     """
     law = _distribution(density.parameters.range_prior)
     wide = _without_ends(density, law)
-    best = np.exp(best_ranges(wide, z[None])[0, :, 0])
+    best = np.exp(wide.best_ranges(z[None])[0, :, 0])
     if isinstance(law, NormalDistribution):
         return np.zeros(best.size, dtype=bool), best
     gain = (_best_fit(wide, z[None]) - _best_fit(density, z[None]))[0]
@@ -272,7 +272,7 @@ def _best_fit(density: CollapsedDensity, z: Array) -> Array:
     A range that all frames have in common is one unknown: its prior counts once, and all frames
     together are what may gain.
     """
-    best = best_ranges(density, z)
+    best = density.best_ranges(z)
     a0, a1, a2, a3, a4, a5, _, _ = density.parameters.terms(z).ranges.T[:, :, None]
     u = best[:, :, 0]
     prior = a0 + (a1 + 1) * u - 0.5 * (((np.exp(u) - a2) * a3) ** 2 + ((u - a4) * a5) ** 2)

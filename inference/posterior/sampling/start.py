@@ -12,7 +12,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.density.profile import best_ranges, linearise
+from inference.density.profile import linearise
 
 __all__ = ["Optimum", "climb", "find_optima", "refine"]
 
@@ -59,7 +59,7 @@ class Optimum:
 
 def _profile(density: CollapsedDensity, z: Array) -> tuple[Array, Array]:
     """Log density at the best ranges, shape (n,), and those log ranges, shape (n, frames)."""
-    found = best_ranges(density, z)
+    found = density.best_ranges(z)
     value = density.total(found[:, :, 1]) + density.parameters.log_prior(z)
     return np.where(np.isnan(value), -np.inf, value), found[:, :, 0]
 
@@ -120,7 +120,7 @@ def climb(
 
 def _curvature_factor(density: CollapsedDensity, z: Array) -> Array:
     """Inverse square root of the Gauss-Newton information at z: a scale for differences."""
-    positions = best_ranges(density, z[None])[0, :, 0]
+    positions = density.best_ranges(z[None])[0, :, 0]
     line = linearise(density, z, positions)
     matrix = np.concatenate([line.jacobian.reshape(-1, z.size), np.eye(z.size)])
     r = scipy.linalg.qr(matrix, mode="economic")[1]

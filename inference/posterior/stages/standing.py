@@ -10,7 +10,6 @@ import dataclasses
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from inference.posterior.sampling.importance import WeightedDraws, smoothed
 from inference.posterior.sampling.population import Population
@@ -19,7 +18,6 @@ from inference.posterior.stages.stage import Drawing, Tempering, Walking, Weight
 
 __all__ = ["standing"]
 
-Array = NDArray[np.float64]
 
 _MOST_K_HAT = 0.7  # above it, not even the smoothed weights have a mean (Vehtari et al. 2024)
 _LEAST_ESS = 50.0  # below it, quantiles of 5 and 95 % are those of two or three draws

@@ -1,7 +1,6 @@
 """Derivatives with a known background in them: immune to both terms, two roots as a rule."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
 from inference.realtime.assemble import NOISE_BAND, Outcome, assemble, reasons_of
@@ -20,7 +19,6 @@ from simulator.sensor import PulsedSensor
 
 __all__ = ["BACKGROUND_CANCELLING_DIFFERENTIAL"]
 
-Array = NDArray[np.float64]
 
 _OWN = len(reasons_of())
 _REASONS = reasons_of(

@@ -208,7 +208,6 @@ def _figure_3_10(figure: Figure) -> None:
 
 # object of the crosstalk figures: W04H04R00T00 of Appendix B
 _C0, _C1, _C2 = 7.69e-2, -1.23e-1, 9.57e-2
-_R0 = 14.9896229  # T_p = 100 ns
 _RANGES: Array = np.linspace(0.02, 2.0, 200)
 
 

@@ -2,15 +2,12 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
 from simulator.scene import parse_scene
 from tests.posterior.scenes import OBJECT, data, sensor_of
-
-Array = NDArray[np.float64]
 
 SETTINGS = SamplerSettings(seed=1, method="importance")
 KNOWN = {"c0": OBJECT["c0"], "c1": OBJECT["c1"]}

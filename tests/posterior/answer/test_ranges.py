@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy import integrate, stats
 
 from inference.density.collapsed import collapsed_density
@@ -15,8 +14,6 @@ from simulator.readings import covariance
 from simulator.scene import parse_scene
 from tests.density.reference import Case, log_density, mean_readings
 from tests.posterior.scenes import KINDS, sensor_of
-
-Array = NDArray[np.float64]
 
 PLATE = (0.0769, -0.123, 0.0957)
 STEEP = (0.08, -1.97 * math.sqrt(0.08), 0.1)  # its intensity falls, rises and falls again

@@ -4,14 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy import signal
 
 from inference.posterior.answer.error_parts import ErrorParts
 from inference.posterior.answer.parameter_summary import summaries_of_chains, summaries_of_weights
 from inference.posterior.answer.quantiles import weighted_quantiles
-
-Array = NDArray[np.float64]
 
 NOISE_ALONE = ErrorParts(np.ones(1), np.zeros(1), np.zeros(1))
 

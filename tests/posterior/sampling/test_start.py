@@ -7,7 +7,6 @@ from scipy import stats
 
 from benchmarks.optima_found import missed
 from inference.density.collapsed import CollapsedDensity, collapsed_density
-from inference.density.profile import best_ranges
 from inference.posterior.sampling.start import climb, find_optima
 from tests.posterior.scenes import KINDS, example
 
@@ -17,7 +16,7 @@ Array = NDArray[np.float64]
 def joint(density: CollapsedDensity, z: Array) -> float:
     """Log density of parameters and best ranges together."""
     return float(
-        best_ranges(density, z[None])[0, :, 1].sum() + density.parameters.log_prior(z[None])[0]
+        density.best_ranges(z[None])[0, :, 1].sum() + density.parameters.log_prior(z[None])[0]
     )
 
 

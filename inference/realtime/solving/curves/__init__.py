@@ -23,8 +23,8 @@ A file holds the curve's kernels and, as a `Curve`, what is known of its shape:
 * ``guess(top, bottom, p)``: about where the value is top / bottom, from the limits of near and far;
 * ``residual(u, top, bottom, p)``: a number with the sign of value - top / bottom, up to a constant
   factor, smooth where the value has a pole;
-* ``power_law(u, p)``: (value, d log value / d log u), nan where the curve is no power law near both
-  ends, so that Newton's method in logarithms is not tried;
+* ``power_law(u, p)`` of curves that are near power laws at both ends, where Newton's method in
+  logarithms is tried: (value, d log value / d log u);
 * ``direction(u, p)`` of ratios and angles of derivatives: (denominator, numerator) up to a positive
   factor; and ``turning(u, p)`` of those whose turning points are searched for: a number with the
   sign of the slope, without poles.

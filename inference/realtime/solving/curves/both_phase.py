@@ -20,7 +20,6 @@ __all__ = [
     "KIND",
     "direction",
     "guess",
-    "power_law",
     "residual",
     "response",
     "slope",
@@ -100,12 +99,6 @@ def residual(u: float, top: float, bottom: float, p: CurveParameters) -> float:
     own = log_slope(u, p.c0, p.c1) * math.sin(turn) + p.wave * u * math.cos(turn)
     # the wall's angle is the same everywhere
     return own + background_rate(u, p) * math.sin(p.wave * p.distance - target)
-
-
-@compiled
-def power_law(u: float, p: CurveParameters) -> tuple[float, float]:  # noqa: ARG001
-    """Return nan: the background makes it anything but a power law."""
-    return math.nan, math.nan
 
 
 CURVE = Curve(name="both_phase", kind=KIND, turns=Search(), period=math.pi, winds=True)

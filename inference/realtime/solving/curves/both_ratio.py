@@ -22,7 +22,6 @@ __all__ = [
     "KIND",
     "direction",
     "guess",
-    "power_law",
     "residual",
     "response",
     "slope",
@@ -89,12 +88,6 @@ def residual(u: float, top: float, bottom: float, p: CurveParameters) -> float:
     own = u * (1.0 + b) * bottom - b * top
     # q = R to within rounding leaves the wall nothing
     return own + background_rate(u, p) * (p.distance * bottom - top)
-
-
-@compiled
-def power_law(u: float, p: CurveParameters) -> tuple[float, float]:  # noqa: ARG001
-    """Return nan: the background makes it anything but a power law."""
-    return math.nan, math.nan
 
 
 def _exact(u: float, p: CurveParameters) -> float:

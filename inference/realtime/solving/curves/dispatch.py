@@ -158,10 +158,6 @@ def power_law(kind: int, u: float, p: CurveParameters) -> tuple[float, float]:
         return cancelling_ratio.power_law(u, p)
     if kind == cancelling_quadrature.KIND:
         return cancelling_quadrature.power_law(u, p)
-    if kind == both_ratio.KIND:
-        return both_ratio.power_law(u, p)
-    if kind == both_phase.KIND:
-        return both_phase.power_law(u, p)
     return math.nan, math.nan
 
 
