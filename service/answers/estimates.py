@@ -94,8 +94,8 @@ class TechniqueFit(pydantic.BaseModel):
     degrees_of_freedom: int
     p_value: float
     misfit: bool
-    reasons: list[str]
-    checks: dict[str, float]
+    reasons: list[str] = []
+    checks: dict[str, float] = {}
     rank: int
     widening: float | None = None
     optima: list[FittedOptimum]
