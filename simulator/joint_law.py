@@ -62,7 +62,7 @@ class JointLaw:
         def to_normal(x: Array, values: Values) -> Array:
             return (of.to_normal(x, values) - mean) / sd
 
-        return Unknown(of.name, from_normal, to_normal)
+        return Unknown(of.name, from_normal, to_normal, law=of.law)
 
     def with_another(self) -> "JointLaw":
         """Return the law with one more unknown, independent of all others, as the last."""

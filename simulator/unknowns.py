@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from simulator.priors import HalfNormal, LogNormal
+from simulator.priors import Distribution, HalfNormal, LogNormal
 from simulator.scene import Quantity
 from simulator.scene_checks import largest
 
@@ -37,12 +37,15 @@ class Unknown:
         (values so far) -> log of the prior mass that a joint truncation leaves, shape (n,).
     to_normal : callable
         (value, values so far) -> z.
+    law : Distribution, optional
+        Its prior, where that is one law whatever the other unknowns are.
     """
 
     name: str
     from_normal: Callable[[Array, Values], Array]
     to_normal: Callable[[Array, Values], Array]
     log_correction: Callable[[Values], Array] | None = None
+    law: Distribution | None = None
 
 
 def add_quantity(
@@ -58,7 +61,9 @@ def add_quantity(
         known[name] = float(quantity)
         return
     law = quantity.distribution().truncated(low, high)
-    unknowns.append(Unknown(name, lambda z, _: law.from_normal(z), lambda x, _: law.to_normal(x)))
+    unknowns.append(
+        Unknown(name, lambda z, _: law.from_normal(z), lambda x, _: law.to_normal(x), law=law)
+    )
 
 
 def add_shape(

@@ -15,10 +15,11 @@ from inference.posterior.settings import SamplerSettings
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene, parse_scene
-from simulator.sensor import Sensor, parse_sensor
+from simulator.sensor import PulsedSensor, Sensor, parse_sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
 from tests.extreme.nested import Reference, reference_of
+from tests.extreme.wall_turns import reference_of_turns
 
 __all__ = ["PosteriorCase", "Verdict", "errors_of", "held", "quadrature_of", "random_case"]
 
@@ -111,6 +112,11 @@ def random_case(seed: int) -> PosteriorCase:
 def quadrature_of(case: PosteriorCase) -> Reference | None:
     """Integrate a posterior, without any sampler; None where two quadratures differ."""
     density = collapsed_density(case.sensor, case.scene, case.frames)
+    wall = case.scene.background
+    sine = not isinstance(case.sensor, PulsedSensor)
+    if wall is not None and sine and not isinstance(wall.distance_m, float | int):
+        law = wall.distance_m.distribution().truncated(low=0.0)
+        return reference_of_turns(density, case.sensor, law)
     return reference_of(density, density.parameters.natural, len(density.parameters.names))
 
 

@@ -1,6 +1,7 @@
 """One ensemble of walkers: its state, and the pure step that carries it on."""
 
 import dataclasses
+import functools
 import math
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
+from inference.posterior.sampling.aliases import Aliases
 from inference.posterior.sampling.proposal import Proposal
 
 __all__ = ["WALKERS", "Ensemble", "advance", "new_ensemble", "restart", "warm_walkers"]
@@ -17,6 +19,7 @@ Array = NDArray[np.float64]
 WALKERS = 32
 _FEW_WALKERS = 16  # that start from draws of the posterior and jump through a law that fits it
 _FEW_UNKNOWNS = 5  # at most: half of the walkers span what the others propose from
+_TURNING = 0.4  # of the steps that are no independent jumps, where a wall has aliases
 _SHORT = 0.1  # times the step that suits a normal posterior (ter Braak 2006)
 
 Stream = tuple[NDArray[np.uint32], int, int, float]
@@ -118,7 +121,7 @@ def restart(ensemble: Ensemble, old: Proposal, new: Proposal) -> Ensemble:
     )
 
 
-def _moves(proposal: Proposal) -> list[tuple[Any, float]]:
+def _moves(proposal: Proposal, aliases: Aliases | None) -> list[tuple[Any, float]]:
     """Independent jumps, and local moves that know nothing of the optima or the map's fit.
 
     Where the posterior is narrower than the ensemble is wide, as at the ends of a curved sheet, all
@@ -130,18 +133,38 @@ def _moves(proposal: Proposal) -> list[tuple[Any, float]]:
     """
     import emcee  # brings scipy.stats, see `inference.posterior.libraries`
 
-    rest = 1.0 - proposal.share
+    rest, turning = 1.0 - proposal.share, []
+    if aliases is not None:
+        move = emcee.moves.MHMove(functools.partial(_turn, proposal, aliases))
+        turning = [(move, _TURNING * rest)]
+        rest -= _TURNING * rest
     short = _SHORT * 2.38 / math.sqrt(2.0 * proposal.optima.centres.shape[1])
     return [
         (emcee.moves.MHMove(proposal.propose), proposal.share),
         (emcee.moves.DEMove(sigma=0.2), 0.4 * rest),
         (emcee.moves.DEMove(sigma=0.5, gamma0=short), 0.3 * rest),
         (emcee.moves.StretchMove(), 0.3 * rest),
+        *turning,
     ]
 
 
+def _turn(
+    proposal: Proposal, aliases: Aliases, coords: Array, random: np.random.RandomState
+) -> tuple[Array, Array]:
+    """Propose aliases of walkers' coordinates, for emcee's `MHMove`."""
+    z, old_det = proposal.bend(coords)
+    new, ratio = aliases.propose(z, random)
+    x, new_det = proposal.unbend(new)
+    moved = np.isfinite(ratio)
+    return np.where(moved[:, None], x, coords), ratio + old_det + new_det
+
+
 def advance(
-    density: CollapsedDensity, proposal: Proposal, ensemble: Ensemble, steps: int
+    density: CollapsedDensity,
+    proposal: Proposal,
+    ensemble: Ensemble,
+    steps: int,
+    aliases: Aliases | None = None,
 ) -> Ensemble:
     """Carry an ensemble on by some steps; the same whether in one call or in several.
 
@@ -155,6 +178,8 @@ def advance(
         Where it stands.
     steps : int
         Number of steps.
+    aliases : Aliases, optional
+        Of the target, where it has any: what walkers jump to.
 
     Returns
     -------
@@ -169,7 +194,9 @@ def advance(
         z, log_det = proposal.bend(x)
         return density(z) + log_det
 
-    sampler = emcee.EnsembleSampler(walkers, d, log_density, moves=_moves(proposal), vectorize=True)
+    sampler = emcee.EnsembleSampler(
+        walkers, d, log_density, moves=_moves(proposal, aliases), vectorize=True
+    )
     state = emcee.State(
         ensemble.coords.copy(),
         log_prob=ensemble.log_prob.copy(),

@@ -17,6 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
+from inference.posterior.sampling.aliases import Aliases, aliases_of
 from inference.posterior.sampling.effort import Effort, Move
 from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.transport import TriangularMap, fit_map, straight_map
@@ -150,13 +151,25 @@ def _sweep(
     others = transport.unbend(population.z[still])[0]
     new, ratio = move(x, others, rng)
     z, new_det = transport.bend(new)
+    return _accepted(density, population, moving, z, ratio + new_det + old_det, rng)
+
+
+def _accepted(
+    density: CollapsedDensity,
+    population: Population,
+    moving: slice,
+    z: Array,
+    ratio: Array,
+    rng: np.random.Generator,
+) -> tuple[Population, float]:
+    """Accept what is proposed to members, or not; return the share that moved."""
     log_prior = density.parameters.log_prior(z)
     likelihood = np.full(len(z), -np.inf)
     inside = np.isfinite(log_prior)
     likelihood[inside] = density.log_likelihood(z[inside])
     gain = log_prior - population.log_prior[moving]
     gain += population.power * (likelihood - population.log_likelihood[moving])
-    gain += ratio + new_det + old_det
+    gain += ratio
     accept = np.flatnonzero(np.log(rng.random(len(z))) < gain)
     place = moving.start + accept
     members, likelihoods, priors = (
@@ -224,7 +237,16 @@ def temper(
             moves += moved / len(parts)
         if moves > wanted:
             break
-    return population
+    aliases = aliases_of(density)
+    return population if aliases is None else _turned(density, aliases, population, rng)
+
+
+def _turned(
+    density: CollapsedDensity, aliases: Aliases, population: Population, rng: np.random.Generator
+) -> Population:
+    """Give every member an alias anew."""
+    new, ratio = aliases.propose(population.z, rng)
+    return _accepted(density, population, slice(0, len(new)), new, ratio, rng)[0]
 
 
 def carried(density: CollapsedDensity, rng: np.random.Generator, effort: Effort) -> Population:

@@ -9,6 +9,7 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.checks import check_best_fit, check_ranges
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
+from inference.posterior.sampling.aliases import aliases_of, with_aliases
 from inference.posterior.sampling.effort import scouts
 from inference.posterior.sampling.ensemble import WALKERS, Ensemble, warm_walkers
 from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
@@ -85,6 +86,9 @@ def begin(job: Job) -> Checkpoint:
             "no parameters within their priors explain the frames; widen the priors, or check the "
             "noise's `read` against the readings"
         )
+    aliases = aliases_of(density)
+    if aliases is not None:
+        optima = with_aliases(aliases, density, optima)
     check_ranges(whole, job.scene, optima[0].z)
     check_best_fit(whole, optima[0].z)
     stage, used = _first_stage(job, density, optima, scouted)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from inference.posterior.job import Job
+from inference.posterior.sampling.aliases import aliases_of
 from inference.posterior.sampling.diagnostics import (
     autocorrelation_time,
     effective_sample_size,
@@ -52,7 +53,9 @@ class WalkTask:
 
     def run(self) -> Ensemble:
         """Carry the ensemble on."""
-        return advance(self.job.density(), self.proposal, self.ensemble, self.steps)
+        density = self.job.density()
+        aliases = aliases_of(density)
+        return advance(density, self.proposal, self.ensemble, self.steps, aliases)
 
 
 def tasks(job: Job, stage: Walking) -> tuple[WalkTask, ...]:
