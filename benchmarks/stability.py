@@ -2,17 +2,20 @@
 
     python -m benchmarks.stability --scenes 1200 --seed 1     (`make stress`)
     python -m benchmarks.stability --only answers
+    python -m benchmarks.stability --only functions
 
 Sine waves are held to ball arithmetic. Prints a row a technique: frames, roots, frames that lie at
 a fold to within the rounding of their readings, wrong counts, and the worst root in units of its
 condition times rounding. Then derivatives of mean readings and log densities, held to power series
 of balls, in the same units. Then tracks, held to the truth and to a dense grid, and joint fits,
 held to an optimum in 50 digits, each with the number of its worst case, from which it is drawn
-again. The exit code is 1 where a count is wrong, something is off by more than a thousand, or an
-answer by more than its bar.
+again. Last a row for every public function that computes (`tests/extreme/functions/`), in units of
+its condition times rounding, with the date. The exit code is 1 where a count is wrong, something is
+off by more than a thousand, or an answer by more than its bar.
 """
 
 import argparse
+import datetime
 import itertools
 import sys
 from collections.abc import Mapping, Sequence
@@ -21,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from tests.extreme.certified import FAMILIES, tally
+from tests.extreme.functions import FUNCTIONS, table_row
 from tests.extreme.optima import CASES, SNRS, excess_of, fit_miss
 from tests.extreme.slopes import worst_slopes
 from tests.extreme.tally import Tally
@@ -30,6 +34,7 @@ from tests.extreme.waves import WAVES, tally_waves
 _BAR = 1e3
 _DERIVATIVES = "derivatives"
 _ANSWERS = "answers"
+_FUNCTIONS = "functions"
 _TRACK_BAR = 6.0  # standard deviations
 _GRID_BAR = 0.25  # of probability: a few Gaussians stand for what the grid keeps all of
 
@@ -43,6 +48,7 @@ def main() -> None:
     parser.add_argument("--tracks", type=int, default=2_000, help="streams, a fifth of them faint")
     parser.add_argument("--fits", type=int, default=3, help="data sets a scene, kind and noise")
     rows = [*FAMILIES, *(f"{technique}, sine wave" for technique in WAVES), _DERIVATIVES, _ANSWERS]
+    rows.append(_FUNCTIONS)
     parser.add_argument("--only", nargs="+", choices=rows, default=rows, metavar="ROW")
     options = parser.parse_args()
     failed = False
@@ -69,7 +75,23 @@ def main() -> None:
         failed |= _tracks(options.tracks)
         failed |= _faint_tracks(options.tracks // 5)
         failed |= _fits(options.fits)
+    if _FUNCTIONS in options.only:
+        failed |= _functions()
     sys.exit(1 if failed else 0)
+
+
+def _functions() -> bool:
+    """Print a row a public function; say whether any is off by more than the bar."""
+    today = datetime.datetime.now(datetime.UTC).date()
+    print(f"\n{today:%d %B %Y}\n")
+    print("| function | held to | cases | condition | worst error | case |")
+    print("|---|---|---|---|---|---|", flush=True)
+    failed = False
+    for held in FUNCTIONS:
+        row, worst = table_row(held, held.cases)
+        print(row, flush=True)
+        failed |= worst.decided == 0 or not worst.error <= _BAR
+    return failed
 
 
 def _answers(
