@@ -6,6 +6,7 @@ scene has a joint law of them, z are independent of one another under that law.
 """
 
 import dataclasses
+import functools
 import math
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.joint_law import JointLaw, joint_law
+from simulator.last_call import LastCall
 from simulator.priors import UniformDistribution
 from simulator.range_prior import RangePrior, range_prior, range_prior_rows, stroke_unknowns
 from simulator.scene import Reference, Scene, Stroke
@@ -71,7 +73,14 @@ class Parameters:
     def __len__(self) -> int:
         return len(self.unknowns)
 
+    @functools.cached_property
+    def _last(self) -> LastCall[Values]:
+        return LastCall()
+
     def _values(self, z: Array) -> Values:
+        return self._last.of(self._values_anew, z)
+
+    def _values_anew(self, z: Array) -> Values:
         values = {name: np.full(z.shape[0], value) for name, value in self.known.items()}
         z = self.marginal(z)
         # far out in z values overflow to inf or 0; log_prior and the likelihood judge them

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pydantic
@@ -54,6 +54,21 @@ class NormalDistribution(Distribution):
 
     loc: float
     scale: float
+
+    def from_normal(self, z: Any, low: Any = -math.inf, high: Any = math.inf) -> Array:
+        """As of every law; of a whole one nothing but its scale counts."""
+        if not self._cut_by(low, high):
+            with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+                position = self.loc + self.scale * np.asarray(z, dtype=float)
+                return np.asarray(np.exp(position) if self.log else position)
+        return Distribution.from_normal(self, z, low, high)
+
+    def _cut_by(self, low: Any, high: Any) -> bool:
+        """Tell whether anything is cut away; bounds of many laws at once count as a cut."""
+        end = 0.0 if self.log else -math.inf
+        if not (isinstance(low, float) and isinstance(high, float)):
+            return True
+        return max(low, self.low) > end or min(high, self.high) < math.inf
 
     def _standard(self, position: Array) -> Array:
         # far bounds are infinite
