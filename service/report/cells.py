@@ -132,7 +132,8 @@ def cells_of(scene: ReportScene, effort: Effort) -> Iterator[Cell]:
         yield Cell(scene, "tracker", "", effort.batch, value, tracks, seconds)
     wall = scene.free.background
     # these leave a posterior no shape that draws can be weighted to
-    hard = wall is not None and wall.shadow != "object" and wall.shadow.c0 is None
+    shadow = None if wall is None or wall.shadow == "object" else wall.shadow
+    hard = shadow is not None and not isinstance(shadow.c0, float | int)
     exact = scene.free.discrepancy == 0
     for name in FITS:
         for frames in effort.frames:

@@ -91,8 +91,12 @@ def _report(args: argparse.Namespace, drawing: bool) -> int:
 
         pictures = {name: svg(draw_scene(report, name)) for name in report.scenes}
         terms = svg(draw_terms(report.terms))
-        alike = [x for x in SCENES if x.name == "Bare object" or x.name.startswith("Signal")]
-        ratios = {x.name: x.snr for x in alike}
+        alike = [x for x in SCENES if x.name.startswith(("Bare", "Signal"))]
+        kinds = {"Pulse": "pulsed", "Sine wave": "sine_wave"}
+        ratios = {
+            title: {x.name: x.snr for x in alike if x.sensor.kind == kind}
+            for title, kind in kinds.items()
+        }
         drawn = draw_snr(report, ratios)
         snr = None if drawn is None else svg(drawn)
         draw_summary(report, args.out / "report.png")

@@ -2,7 +2,7 @@
 
 import io
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import matplotlib as mpl
@@ -199,34 +199,55 @@ def draw_summary(report: Report, path: Path) -> None:
     figure.savefig(path, pil_kwargs={"optimize": True})
 
 
-def draw_snr(report: Report, ratios: dict[str, float]) -> Figure | None:
-    """Draw error against the signal-to-noise ratio; None where fewer than two were measured."""
-    names = sorted((n for n in report.scenes if n in ratios), key=lambda n: ratios[n])
-    if len(names) < 2:
+def draw_snr(report: Report, ratios: Mapping[str, Mapping[str, float]]) -> Figure | None:
+    """Draw error against the signal-to-noise ratio, a panel a kind of sensor.
+
+    Parameters
+    ----------
+    report : Report
+        What was measured.
+    ratios : mapping of str to mapping of str to float
+        By title, the ratios of scenes that differ in nothing else.
+
+    Returns
+    -------
+    Figure or None
+        None where of no kind two were measured.
+    """
+    measured = {
+        title: sorted((n for n in report.scenes if n in those), key=lambda n: those[n])
+        for title, those in ratios.items()
+    }
+    measured = {title: names for title, names in measured.items() if len(names) > 1}
+    if not measured:
         return None
-    figure = Figure(figsize=(8.6, 4.6), layout="constrained")
-    axes = figure.subplots()
+    figure = Figure(figsize=(8.6, 4.6 * len(measured)), layout="constrained")
+    panels = figure.subplots(len(measured), squeeze=False)[:, 0]
+    for axes, (title, names) in zip(panels, measured.items(), strict=True):
+        axes.set_title(title, fontsize=11, loc="left")
+        axes.set(xlabel="signal-to-noise ratio at 1 m", ylabel="median relative error")
+        _snr_panel(axes, report, {name: ratios[title][name] for name in names})
+    return figure
+
+
+def _snr_panel(axes: Axes, report: Report, ratios: Mapping[str, float]) -> None:
+    """Draw the best of each method at each ratio, and the least error."""
     found: dict[tuple[str, str], dict[float, float]] = {}
-    for name in names:
+    for name, ratio in ratios.items():
         for (family, method, _), curve in _curves(report.of(name)).items():
             best = min(r.scores.median_error or np.inf for r in curve if r.scores)
-            found.setdefault((family, method), {})[ratios[name]] = best
+            found.setdefault((family, method), {})[ratio] = best
     labels, points = [], []
     for (family, method), values in found.items():
         x, y = list(values), list(values.values())
         axes.loglog(x, y, "-o", color=_COLOURS[family], ms=4, lw=1.2)
         labels.append((x[-1], y[-1], method, _COLOURS[family]))
         points += _along(x, y)
-    least = [report.least_errors.get(name) or np.nan for name in names]
-    axes.loglog([ratios[n] for n in names], least, "--", color=_GREY, lw=1)
-    axes.set(
-        xlabel="signal-to-noise ratio at 1 m",
-        ylabel="median relative error",
-        xlim=(None, max(ratios[n] for n in names) * 300),
-    )
+    least = [report.least_errors.get(name) or np.nan for name in ratios]
+    axes.loglog(list(ratios.values()), least, "--", color=_GREY, lw=1)
+    axes.set_xlim(None, max(ratios.values()) * 300)
     axes.grid(alpha=0.25)
     _place(axes, labels, points)
-    return figure
 
 
 def draw_terms(terms: Sequence[TermCost]) -> Figure:

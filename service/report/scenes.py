@@ -22,6 +22,11 @@ _WALL: Body = {
 }
 # the same wall behind the plate without tilt, whose shadow is not as the object's light is
 _REAL_WALL = _WALL | {"shadow": {"c0": 0.10204, "c1": -0.0285}}
+# what is told of that shadow where it is unknown: by the default prior c1' is never negative
+_REAL_SHADOW: Body = {
+    "c0": {"prior": "lognormal", "median": 0.06, "sigma": 0.5},
+    "c1": {"prior": "normal", "mean": 0.0, "sd": 0.03},
+}
 _SHADOWED = _WALL | {"shadow": "object"}
 _AT_1_M = 0.00771  # what the plate reads there
 _KINDS: dict[Kind, Body] = {
@@ -116,6 +121,8 @@ def _scene(
         free["background"] = {"strength": _STRENGTH, "distance_m": 3.0}
         if own_shadow:
             free["background"]["shadow"] = "object"
+        elif more.get("plate"):
+            free["background"]["shadow"] = _REAL_SHADOW
         told["background"] = told["background"] | {"strength": _STRENGTH}
     return ReportScene(
         name,
@@ -179,8 +186,20 @@ SCENES: tuple[ReportScene, ...] = (
     _scene("Signal-to-noise ratio 10,000", snr=1e4),
     _scene("Signal-to-noise ratio 100,000", snr=1e5),
     _scene("Signal-to-noise ratio 1,000,000", snr=1e6),
+    _scene("Signal-to-noise ratio 10, sine wave", "sine_wave", snr=10.0),
+    _scene("Signal-to-noise ratio 100, sine wave", "sine_wave", snr=100.0),
+    _scene("Signal-to-noise ratio 10,000, sine wave", "sine_wave", snr=1e4),
+    _scene("Signal-to-noise ratio 100,000, sine wave", "sine_wave", snr=1e5),
+    _scene("Signal-to-noise ratio 1,000,000, sine wave", "sine_wave", snr=1e6),
     _scene("Real plate", plate="W04H08R00T00", exact=False, quick=True),
     _scene("Real plate before a known wall", plate="W04H08R00T00", wall="known", exact=False),
+    _scene(
+        "Real plate before a wall of unknown strength and shadow, 5 empty frames",
+        plate="W04H08R00T00",
+        wall="unknown",
+        empty=5,
+        exact=False,
+    ),
     _scene("Real plate, sine wave", "sine_wave", plate="W04H08R00T00", exact=False),
     _scene("Real plate, told that the model is exact", plate="W04H08R00T00"),
     _scene("Real glossy plate, tilted", plate="W04H08R05T06", exact=False),

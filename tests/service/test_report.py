@@ -25,7 +25,7 @@ from service.report.light import light_rows
 from service.report.measure import measure
 from service.report.pace import Pace, Spent
 from service.report.page import markdown_page, page
-from service.report.picture import draw_scene, draw_summary, draw_terms, svg
+from service.report.picture import draw_scene, draw_snr, draw_summary, draw_terms, svg
 from service.report.readings import readings_of, told_of_object
 from service.report.row import Costs, Row, order_of, row_from
 from service.report.run import Report, machine
@@ -215,7 +215,11 @@ def test_catalogue_has_what_was_asked_for() -> None:
             "pulsed",
             "sine_wave",
         }
-    assert {s.snr for s in SCENES} == {10.0**k for k in range(1, 7)}
+    for kind in ("pulsed", "sine_wave"):
+        ratios = {s.snr for s in SCENES if s.sensor.kind == kind}
+        assert ratios == {10.0**k for k in range(1, 7)}
+    plates = [s.free.background for s in SCENES if s.plate and s.free.background]
+    assert any(not isinstance(wall.strength, float | int) for wall in plates)
     assert {s.empty for s in SCENES} == {0, 5}
 
 
@@ -394,6 +398,20 @@ def test_more_draws_of_a_posterior_are_a_curve_of_their_own() -> None:
     curves = [line for line in axes.lines if line.get_marker() == "o"]
     assert [np.size(curve.get_xdata()) for curve in curves] == [3, 2]
     assert {"posterior", "posterior, more draws"} <= {text.get_text() for text in axes.texts}
+
+
+def test_error_against_noise_has_a_panel_a_kind_of_sensor() -> None:
+    scores = Scores(1e-4, 1e-3, 0.9, 1e-4, 1.0, 0.0, 0.0, median_se=2e-4)
+    ratios = {"Pulse": {"a": 10.0, "b": 100.0}, "Sine wave": {"c": 10.0, "d": 1e3}, "None": {}}
+    names = [name for those in ratios.values() for name in those]
+    rows = [
+        Row(name, "brightness", "single frames", scores=scores, costs=Costs(1e-6)) for name in names
+    ]
+    report = Report(machine(), 1, tuple(rows), dict.fromkeys(names, 1e-5), 3e-10, (), Spent())
+    drawn = draw_snr(report, ratios)
+    assert drawn is not None
+    assert [axes.get_title(loc="left") for axes in drawn.axes] == ["Pulse", "Sine wave"]
+    assert draw_snr(report, {"Pulse": {"a": 10.0, "gone": 100.0}}) is None
 
 
 def scored(
