@@ -75,10 +75,10 @@ def _expected(scene: Scene, sensor: Sensor, empty: Frames) -> Array | None:
     if sensor.temperature is not None or not isinstance(delay, float | int | None):
         return None
     # only a scene with a wall asks for it
-    from inference.fits.linear.light import carrier, gains
+    from inference.fits.linear.light import carrier
 
     distance = known.get("background.distance_m")
     if isinstance(sensor, PulsedSensor) and delay is not None:
         distance += sensor.known_shift_m
-    light = known.get("background.strength") * gains(empty)
+    light = known.get("background.strength") * empty.gains
     return expected + light[:, None] * carrier(sensor, np.full(light.size, distance))

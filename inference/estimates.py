@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Estimates", "LeftOut", "SdParts", "Status", "TechniqueResult"]
+__all__ = ["Estimates", "LeftOut", "SdParts", "Status", "TechniqueResult", "status_of_counts"]
 
 Array = NDArray[np.float64]
 
@@ -20,6 +20,13 @@ class Status(enum.IntEnum):
     AMBIGUOUS = 1
     NONE = 2
     SATURATED = 3
+
+
+def status_of_counts(count: NDArray[np.intp]) -> NDArray[np.uint8]:
+    """Return the status of frames that have so many roots, shape (n,)."""
+    return np.where(
+        count == 1, Status.UNIQUE, np.where(count > 1, Status.AMBIGUOUS, Status.NONE)
+    ).astype(np.uint8)
 
 
 class SdParts(NamedTuple):

@@ -24,8 +24,8 @@ from service.routes import ROUTERS
 from service.service_settings import LOCAL, ServiceSettings
 from service.shared import Shared
 from service.store.database import default_url
+from service.store.job_store import JobStore
 from service.store.retention import Retention
-from service.store.sql_store import SqlJobStore
 from service.store.stream_store import StreamStore
 from service.streams.calibrations import Calibrations
 from service.streams.lines import WINDOW
@@ -63,7 +63,7 @@ def create_app(
     """
     settings = settings or ServiceSettings()
     retention = Retention(settings.max_jobs, settings.max_draws_bytes, settings.keep_days * 86_400)
-    store = SqlJobStore(settings.database or default_url(), retention)
+    store = JobStore(settings.database or default_url(), retention)
     local = settings.executor == LOCAL
     workers = ProcessPool(settings.workers) if local else Cluster(settings.executor)
     jobs = Jobs(fold, store, workers, running=settings.workers)

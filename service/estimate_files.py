@@ -41,10 +41,6 @@ def estimates_as(suffix: str, document: Mapping[str, Any]) -> str:
         nothing; ``.ndjson``: a line a frame of each technique; ``.json``: the whole document.
     document : mapping
         As ``POST /v1/estimates`` answers.
-
-    Returns
-    -------
-    str
     """
     return _WRITERS[suffix.lower()](document)
 

@@ -109,10 +109,6 @@ def table_of(
         `value_of_text` or `value_of_json`: gives the value of a cell, by its column's name, or
         None.
 
-    Returns
-    -------
-    FrameTable
-
     Raises
     ------
     InvalidInputError, MalformedError

@@ -122,9 +122,8 @@ def at_reference(
         gain = (1.0 + gain_drift * warm) * (1.0 if gain is None else gain)
     if delay_drift != 0.0:
         readings = readings_at_reference(sensor, readings, warm, delay_drift, crosstalk)
-        if sensor.full_scale is not None:
-            beyond = (np.abs(frames.readings) >= np.asarray(sensor.full_scale)).any(axis=1)
-            readings[beyond] = frames.readings[beyond]
+        beyond = frames.saturated(sensor)
+        readings[beyond] = frames.readings[beyond]
         if derivatives is not None:
             derivatives = delayed_light(sensor, derivatives, -delay_drift * warm)
     return cold, dataclasses.replace(

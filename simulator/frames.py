@@ -15,7 +15,7 @@ from simulator.sensor import Sensor
 from simulator.temperature import temperature_problems
 from simulator.validated import Validated
 
-__all__ = ["FrameColumns", "Frames", "check_frames", "frames_from_columns"]
+__all__ = ["FrameColumns", "Frames", "check_frames", "check_increasing", "frames_from_columns"]
 
 Array = NDArray[np.float64]
 # a bad column is answered by its first bad entry, not by one problem for each of a million
@@ -92,6 +92,17 @@ class Frames:
         if self.object_present is None:
             return np.ones(len(self), dtype=bool)
         return self.object_present
+
+    @property
+    def gains(self) -> Array:
+        """Factor of each frame on the sensor's gain, shape (n,)."""
+        return np.ones(len(self)) if self.gain is None else self.gain
+
+    def saturated(self, sensor: Sensor) -> NDArray[np.bool_]:
+        """Tell where a reading is at or beyond the sensor's full scale, shape (n,)."""
+        if sensor.full_scale is None:
+            return np.zeros(len(self), dtype=bool)
+        return np.asarray((np.abs(self.readings) >= np.asarray(sensor.full_scale)).any(axis=1))
 
     def select(self, index: Any) -> "Frames":
         """Return the frames that a numpy index of the first axis selects."""
@@ -209,6 +220,20 @@ def _columns_of(first: str, second: str) -> tuple[tuple[str, str], frozenset[str
     slopes = (f"d{first}_dt", f"d{second}_dt")
     more = ("time_s", "gain", "object_present", *MAY_BE_NULL)
     return slopes, frozenset({first, second, *slopes, *more})
+
+
+def check_increasing(time_s: Array) -> None:
+    """Refuse times that do not increase.
+
+    Raises
+    ------
+    InvalidInputError
+        At ``/frames/time_s``.
+    """
+    backward = np.flatnonzero(~(time_s[1:] > time_s[:-1]))
+    if backward.size:
+        message = f"must increase: entry {backward[0] + 1} does not"
+        raise InvalidInputError.at("/frames/time_s", message)
 
 
 def check_frames(sensor: Sensor, frames: Frames) -> None:

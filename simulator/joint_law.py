@@ -107,10 +107,6 @@ def joint_law(joint: Joint, names: tuple[str, ...]) -> JointLaw:
         The law; the scene's check has found its unknowns among ``names``.
     names : tuple of str
         All unknowns; those that the law does not name stay independent.
-
-    Returns
-    -------
-    JointLaw
     """
     d, index = len(names), [names.index(name) for name in joint.unknowns]
     within = np.ix_(index, index)

@@ -156,10 +156,6 @@ def with_discrepancy(density: CollapsedDensity, discrepancy: float) -> Discrepan
         The density without.
     discrepancy : float
         Standard deviation of the error.
-
-    Returns
-    -------
-    DiscrepantDensity
     """
     basis = discrepancy_basis(*density.parameters.reach_m)
     fields = {f.name: getattr(density, f.name) for f in dataclasses.fields(CollapsedDensity)}

@@ -43,10 +43,6 @@ def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearis
         Where.
     positions : ndarray, shape (frames,)
         log r of every frame; nan for a frame without object.
-
-    Returns
-    -------
-    Linearisation
     """
     basis = density.flux_basis(z, positions)
     error = None

@@ -100,10 +100,6 @@ def whitened(
         log r; nan for a frame without object.
     flux_error : (ndarray, ndarray), each of shape (n,), optional
         As for `inference.frame.sensitivity.sensitivity`.
-
-    Returns
-    -------
-    Whitened
     """
     terms, slopes = coordinate_slopes(parameters, z)
     at = sensitivity(sensor, terms, log_r, gains_of(frames), flux_error)

@@ -1,6 +1,8 @@
 """Coordinates without units of all that a frame's readings depend on, and how they move with z."""
 
+import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,13 +61,11 @@ _STEP = 1e-5
 
 def some_of(terms: Terms, k: slice) -> Terms:
     """Return some of the parameter vectors of terms."""
-    crosstalk = None if terms.crosstalk is None else terms.crosstalk[k]
-    background = None if terms.background is None else terms.background[k]
-    offset = None if terms.offset is None else terms.offset[k]
-    gain = None if terms.gain is None else terms.gain[k]
-    lag = None if terms.lag is None else terms.lag[k]
-    drift = None if terms.drift is None else terms.drift[k]
-    return Terms(terms.object[k], crosstalk, background, terms.ranges[k], offset, gain, lag, drift)
+    parts: dict[str, Any] = {
+        field.name: None if (part := getattr(terms, field.name)) is None else part[k]
+        for field in dataclasses.fields(terms)
+    }
+    return Terms(**parts)
 
 
 def term_changes(reference: Terms, plus: Terms, minus: Terms) -> Array:

@@ -40,10 +40,6 @@ def eliminate(
     beside : (ndarray, ndarray), shapes (n, 2) and (n, 2, d or d + k), optional
         Derivatives of what is known of range and displacement beside the readings, in units of its
         noise, along log r and along the unknowns, and the shared errors; 0 where nothing is.
-
-    Returns
-    -------
-    Information
     """
     n, _, d = jacobian.shape
     errors = np.empty((n, 2, 0)) if errors is None else errors

@@ -65,10 +65,6 @@ def with_rates(experiment: Experiment, rates: Array) -> Experiment:
     rates : ndarray, shape (n, 2)
         As of `Experiment`.
 
-    Returns
-    -------
-    Experiment
-
     Raises
     ------
     InvalidInputError

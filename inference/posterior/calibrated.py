@@ -86,10 +86,6 @@ def scene_of_draws(
         Of their posterior, moved by the errors of the model.
     findings : mapping
         Members of `simulator.joint.Calibration` that are not in the draws.
-
-    Returns
-    -------
-    Scene
     """
     prior = scene.model_copy(update={"joint": None, "calibration": None})
     parameters = parameters_of(sensor, prior)

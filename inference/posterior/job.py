@@ -67,10 +67,7 @@ class Job:
     @property
     def usable(self) -> NDArray[np.bool_]:
         """Frames that are not saturated, and of known temperature where it counts, shape (n,)."""
-        usable = np.ones(len(self.frames), dtype=bool)
-        if self.sensor.full_scale is not None:
-            limit = np.asarray(self.sensor.full_scale)
-            usable &= (np.abs(self.frames.readings) < limit).all(axis=1)
+        usable = ~self.frames.saturated(self.sensor)
         warm = warmth(self.sensor, self.frames)
         return np.asarray(usable if warm is None else usable & np.isfinite(warm))
 

@@ -54,14 +54,12 @@ def learnt_error(sensor: Sensor, terms: Terms, frames: Frames, unknowns: int) ->
         frames = at_reference(sensor_at(sensor, terms), frames.select(np.isfinite(warm)), static)[1]
     if frames.known_range_m is None or frames.known_range_sd_m is None:
         return None
-    used = np.isfinite(frames.known_range_m) & frames.present
-    if sensor.full_scale is not None:
-        used &= (np.abs(frames.readings) < np.asarray(sensor.full_scale)).all(axis=1)
+    used = np.isfinite(frames.known_range_m) & frames.present & ~frames.saturated(sensor)
     spare = int(used.sum()) - unknowns
     if spare < _SPARE:
         return None
     known, sd = frames.known_range_m[used], frames.known_range_sd_m[used]
-    factor = np.ones(known.size) if frames.gain is None else frames.gain[used]
+    factor = frames.gains[used]
     bare = dataclasses.replace(terms, crosstalk=None, background=None)
     light = factor[:, None] * mean_readings(sensor, bare, known)
 

@@ -72,10 +72,6 @@ def sample_of(density: CollapsedDensity, stage: Drawing, rng: np.random.Generato
         Where the job stands.
     rng : numpy.random.Generator
         For resampling by weight.
-
-    Returns
-    -------
-    Sample
     """
     match stage:
         case Walking() if stage.steps >= _LEAST_STEPS:

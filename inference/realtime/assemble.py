@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.estimates import SdParts, Status, TechniqueResult
+from inference.estimates import SdParts, Status, TechniqueResult, status_of_counts
 from inference.realtime.net import COMMON_REASONS, SATURATED
 
 __all__ = [
@@ -139,9 +139,7 @@ def assemble(
             roots, sd, noise, model = (
                 np.take_along_axis(columns, order, axis=1) for columns in (roots, sd, noise, model)
             )
-    status = np.where(
-        count == 1, Status.UNIQUE, np.where(count > 1, Status.AMBIGUOUS, Status.NONE)
-    ).astype(np.uint8)
+    status = status_of_counts(count)
     near = (candidates.near_frame | (keep & candidates.near).any(axis=1)) & (state == 0)
     # the most specific reason that holds: the technique's own, then what removed its solutions
     reason = np.zeros(state.size, dtype=np.uint8)

@@ -15,7 +15,7 @@ from inference.realtime.net import (
 from inference.realtime.smoothness import rough
 from inference.realtime.windows import Windows, differences
 from simulator.errors import InvalidInputError
-from simulator.frames import Frames
+from simulator.frames import Frames, check_increasing
 from simulator.sensor import Sensor
 
 __all__ = ["DERIVATIVE_REASONS", "LONELY", "UNEVEN_GAIN", "derivatives_of"]
@@ -71,11 +71,7 @@ def derivatives_of(
         return _measured(sensor, frames)
     if frames.time_s is None:
         raise InvalidInputError.at("/frames/time_s", "is missing: differences in time need it")
-    backward = np.flatnonzero(~(frames.time_s[1:] > frames.time_s[:-1]))
-    if backward.size:
-        raise InvalidInputError.at(
-            "/frames/time_s", f"must increase: entry {backward[0] + 1} does not"
-        )
+    check_increasing(frames.time_s)
     # the relative error is independent from frame to frame, so it does not cancel in a difference
     net = net_readings(sensor, crosstalk or (0.0, 0.0), frames, with_relative=True)
     usable = np.flatnonzero(net.state == 0)
@@ -116,7 +112,7 @@ def _measured(sensor: Sensor, frames: Frames) -> Net:
     sd1, sd2 = sensor.noise.derivative or (math.nan, math.nan)
     n = len(frames)
     with np.errstate(all="ignore"):
-        gain = np.ones(n) if frames.gain is None else frames.gain
+        gain = frames.gains
         first, second = frames.derivatives.T / gain
         var1, var2 = (sd1 / gain) ** 2, (sd2 / gain) ** 2
     state = rule_out(sensor, frames)

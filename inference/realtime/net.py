@@ -104,9 +104,7 @@ def rule_out(sensor: Sensor, frames: Frames) -> NDArray[np.uint8]:
     state = np.zeros(len(frames), dtype=np.uint8)
     if frames.object_present is not None:
         state[~frames.object_present] = ABSENT
-    if sensor.full_scale is not None:
-        beyond = np.abs(frames.readings) >= np.asarray(sensor.full_scale)
-        state[beyond.any(axis=1)] = SATURATED
+    state[frames.saturated(sensor)] = SATURATED
     return state
 
 
@@ -138,7 +136,7 @@ def net_readings(
     whole = noise._replace(
         shot=noise.shot or 0.0, relative=(noise.relative or 0.0) if with_relative else 0.0
     )
-    gain = np.ones(n) if frames.gain is None else frames.gain
+    gain = frames.gains
     net = Net(
         first=np.empty(n),
         second=np.empty(n),

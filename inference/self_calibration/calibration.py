@@ -118,10 +118,6 @@ def answer(sensor: Sensor, asked: Asked) -> Outcome:
     ----------
     sensor, asked : Sensor, Asked
         What is asked.
-
-    Returns
-    -------
-    Outcome
     """
     try:
         found = infer(sensor, asked.scene, asked.frames, sampler_of(asked))

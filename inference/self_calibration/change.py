@@ -174,7 +174,7 @@ def _residuals(
             along = np.einsum("ni,ni->n", slope, left) / np.square(speed)
         along = np.where(speed > 0, along, 0.0)
         u = np.clip(u + np.clip(along, -_FARTHEST, _FARTHEST), 0.0, (len(knots) - 1) * table.step)
-    gain = np.ones(len(frames)) if frames.gain is None else frames.gain
+    gain = frames.gains
     across = normal / (noise * gain)[:, None]
     return bright, Residuals(values[bright], changes[bright], across[bright])
 
@@ -213,7 +213,7 @@ def _curve(knots: Array, at: Array, count: int) -> tuple[Array, Array, Array]:
 
 def _noise(model: Tracker, frames: Frames, knots: Array, at: Array, normal: Array) -> Array:
     """Return the standard deviation of the noise across the curve, in units of the read noise."""
-    gain = np.ones(len(frames)) if frames.gain is None else frames.gain
+    gain = frames.gains
     if model.model.table.noise.plain:
         return 1.0 / gain
     i = np.rint(at).astype(np.int64)

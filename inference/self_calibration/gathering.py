@@ -146,8 +146,7 @@ def kinds_of(sensor: Sensor, frames: Frames, track: Track, trusts_empty: bool) -
         kind[(track.present < _SURELY_EMPTY) & ~track.misfit] = EMPTY
     if frames.object_present is not None:
         kind[~frames.object_present] = EMPTY
-    if sensor.full_scale is not None:
-        kind[(np.abs(frames.readings) >= np.asarray(sensor.full_scale)).any(axis=1)] = UNUSED
+    kind[frames.saturated(sensor)] = UNUSED
     return np.asarray(kind, dtype=np.int64)
 
 

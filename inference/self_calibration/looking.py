@@ -45,10 +45,6 @@ def look(plan: Plan, state: CalibrationState, sequence: int) -> CalibrationState
         The stream; its count is a multiple of `EVERY`.
     sequence : int
         Number of its last frame.
-
-    Returns
-    -------
-    CalibrationState
     """
     surprised = state.surprised + 1 if state.surprises > EVERY // 2 else 0
     new = state.recent.select(slice(-EVERY, None))

@@ -55,7 +55,7 @@ def surprise_of_empty(model: Tracker, frames: Frames) -> NDArray[np.float64]:
     """Return how much readings surprise the empty scene: a chi-square, shape (n,)."""
     table, empty = model.model.table, model.model.places.empty
     used = np.asarray(model.observed.used)
-    gain = np.ones(len(frames)) if frames.gain is None else frames.gain
+    gain = frames.gains
     mean = gain[:, None] * empty[:, 0] + np.array([table.crosstalk1, table.crosstalk2])
     off = np.where(used, frames.readings * model.observed.scale - mean, 0.0)
     root = gain[:, None, None] * (empty[:, 1:] * used[:, None])

@@ -44,10 +44,6 @@ def nuisance_of(
     learnt : tuple of str
         Unknowns that need no posterior.
 
-    Returns
-    -------
-    Nuisance
-
     Raises
     ------
     InvalidInputError

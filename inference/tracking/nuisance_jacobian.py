@@ -54,10 +54,6 @@ def nuisance_jacobian(
         From readings to units of the noise.
     with_crosstalk : bool
         Whether the crosstalk's own share is part of the change.
-
-    Returns
-    -------
-    NuisanceJacobian
     """
     along, empty = [], []
     for plus, minus in zip(known.plus, known.minus, strict=True):

@@ -33,7 +33,7 @@ from inference.tracking.state import TrackState, check_state
 from inference.tracking.tracker import Tracker, tracker
 from simulator.at_temperature import at_reference
 from simulator.errors import InvalidInputError
-from simulator.frames import Frames, check_frames
+from simulator.frames import Frames, check_frames, check_increasing
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
@@ -149,9 +149,8 @@ def step(
     check_frames(model.sensor, frames)
     times = _times(frames, float(state.hypotheses.numbers[TIME]))
     kinds = np.zeros(len(frames), dtype=np.uint8)
-    if model.sensor.full_scale is not None:
-        beyond = np.abs(frames.readings) >= np.asarray(model.sensor.full_scale)
-        kinds[beyond.any(axis=1)] = SATURATED
+    beyond = frames.saturated(model.sensor)
+    kinds[beyond] = SATURATED
     untold = None
     if model.sensor.temperature is not None and frames.temperature_k is not None:
         untold = np.isnan(frames.temperature_k)
@@ -159,13 +158,12 @@ def step(
         frames = at_reference(model.sensor, frames, model.crosstalk)[1]
     if frames.object_present is not None:
         kinds[~frames.object_present] = EMPTY
-        if model.sensor.full_scale is not None:
-            # crosstalk cannot be learnt from a reading that is cut
-            kinds[~frames.object_present & beyond.any(axis=1)] = EMPTY_SATURATED
+        # crosstalk cannot be learnt from a reading that is cut
+        kinds[~frames.object_present & beyond] = EMPTY_SATURATED
         if untold is not None:
             kinds[~frames.object_present & untold] = EMPTY_SATURATED
     values = _observations(model, frames)
-    gain = np.ones(len(frames)) if frames.gain is None else frames.gain
+    gain = frames.gains
     out = np.full((len(frames), REPORT_COLUMNS), np.nan)
     rows = np.full((len(frames), model.settings.hypotheses, HYPOTHESIS_COLUMNS), np.nan)
     hypotheses = copied(state.hypotheses)
@@ -211,11 +209,7 @@ def _times(frames: Frames, last: float) -> Array:
     if frames.time_s is None:
         raise InvalidInputError.at("/frames/time_s", "is missing: a tracker needs it")
     times = np.ascontiguousarray(frames.time_s, dtype=np.float64)
-    backward = np.flatnonzero(~(times[1:] > times[:-1]))
-    if backward.size:
-        raise InvalidInputError.at(
-            "/frames/time_s", f"must increase: entry {backward[0] + 1} does not"
-        )
+    check_increasing(times)
     if not np.isnan(last) and not times[0] > last:
         raise InvalidInputError.at(
             "/frames/time_s", f"entry 0 is not later than the last frame, {last:.9g} s"

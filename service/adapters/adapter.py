@@ -105,10 +105,6 @@ def converted(adapter: Adapter, raw: bytes, form: str, settings: Settings) -> Co
     settings : Settings
         What it does not say by itself.
 
-    Returns
-    -------
-    Converted
-
     Raises
     ------
     InvalidInputError

@@ -113,10 +113,6 @@ def recording_of(raw: bytes) -> Recording:
         JSON with ``bin_width_s`` and ``positions``, each with ``zone_histograms`` and, where it is
         known, ``distance_m``.
 
-    Returns
-    -------
-    Recording
-
     Raises
     ------
     InvalidInputError

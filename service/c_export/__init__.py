@@ -99,10 +99,6 @@ def export_c(technique: str, sensor: Sensor, scene: Scene, tolerance: float = 1e
     tolerance : float
         Largest error of a table, relative to the range.
 
-    Returns
-    -------
-    Exported
-
     Raises
     ------
     InvalidInputError

@@ -127,10 +127,6 @@ def read_table(path: Path) -> FrameTable:
     path : Path
         ``-`` is standard input, whose form shows from how it begins.
 
-    Returns
-    -------
-    FrameTable
-
     Raises
     ------
     InvalidInputError, MalformedError, OSError

@@ -167,11 +167,11 @@ async def _posterior(
     from inference.posterior import fold
     from service.jobs import Jobs
     from service.process_pool import ProcessPool
+    from service.store.job_store import JobStore
     from service.store.retention import Retention
-    from service.store.sql_store import SqlJobStore
 
     with TemporaryDirectory(prefix="hybridtof-") as folder:
-        store = SqlJobStore(f"sqlite:///{folder}/jobs.sqlite", Retention(jobs=1))
+        store = JobStore(f"sqlite:///{folder}/jobs.sqlite", Retention(jobs=1))
         jobs = Jobs(fold, store, ProcessPool(os.cpu_count() or 1), running=1)
         await jobs.start()
         try:

@@ -71,10 +71,6 @@ def describe_draws(job: Job, method: str, draws: Draws) -> DescribedDraws:
         How it was sampled.
     draws : Draws
         Its draws.
-
-    Returns
-    -------
-    DescribedDraws
     """
     frames = np.flatnonzero(job.usable)
     also = {

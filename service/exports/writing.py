@@ -33,10 +33,6 @@ def write_draws(
         Makes bytes of the job as it was sampled, the method and the draws.
     job, pieces : bytes, sequence of bytes
         As stored.
-
-    Returns
-    -------
-    bytes
     """
     at = checkpoint_from(*pieces)
     sampled, draws = draw(job_from(job), at)

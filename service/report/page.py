@@ -228,10 +228,6 @@ def page(report: Report, pictures: Mapping[str, str], terms: str, snr: str | Non
         SVG by scene; empty where nothing can be drawn.
     terms, snr : str or None
         SVG of what each term costs, and of error against the signal-to-noise ratio.
-
-    Returns
-    -------
-    str
     """
     parts = []
     for scene in report.scenes:

@@ -109,10 +109,6 @@ def readings_of(scene: ReportScene, frames: int, seed: int, empty: int = 0) -> R
         Number of frames with and without the object.
     seed : int
         Of the noise.
-
-    Returns
-    -------
-    Readings
     """
     if scene.plate:
         return _optical(scene, min(frames, _OPTICAL), seed, empty)
@@ -190,10 +186,6 @@ def err_together(sensor: Sensor, told: Scene) -> bool:
     told : Scene
         What a method that learns nothing from other frames is told: unknowns of their priors, or a
         model that may be wrong, are the same in all frames of all sets.
-
-    Returns
-    -------
-    bool
     """
     error = told.model_error
     return len(parameters_of(sensor, told)) > 0 or max(error.flux, error.range_m) > 0.0

@@ -63,10 +63,6 @@ def operations_of(action: Callable[[], object]) -> int:
     ----------
     action : callable
         What to count.
-
-    Returns
-    -------
-    int
     """
     counted = [0]
     places: dict[CodeType, set[int]] = {}

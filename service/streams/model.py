@@ -43,10 +43,6 @@ def model_of(raw: bytes) -> Follower:
     raw : bytes
         The request, as JSON.
 
-    Returns
-    -------
-    Follower
-
     Raises
     ------
     InvalidInputError, RefusedError

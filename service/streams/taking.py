@@ -61,10 +61,6 @@ def take(
         How to read them.
     earlier : Earlier
         What is answered to numbers that came before.
-
-    Returns
-    -------
-    Taken
     """
     try:
         return _Batch(follower, place, form, earlier, alone=False).take(lines)

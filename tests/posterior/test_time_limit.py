@@ -15,8 +15,8 @@ import service.job_runner
 from inference.posterior import fold
 from inference.posterior.settings import SamplerSettings
 from service.jobs import Jobs
+from service.store.job_store import JobStore
 from service.store.retention import Retention
-from service.store.sql_store import SqlJobStore
 from simulator.scene import parse_scene
 from tests.chunk_clock import timed
 from tests.posterior.scenes import OBJECT, UNKNOWN_CROSSTALK, data, example, sensor_of
@@ -47,7 +47,7 @@ class _Threads(ThreadPoolExecutor):
 
 
 async def _by_jobs(path: Path, request: Any, settings: SamplerSettings) -> dict[str, Any]:
-    store = SqlJobStore(f"sqlite:///{path}/jobs.sqlite", Retention(1))
+    store = JobStore(f"sqlite:///{path}/jobs.sqlite", Retention(1))
     jobs = Jobs(fold, store, _Threads(2), running=1)
     await jobs.start()
     try:

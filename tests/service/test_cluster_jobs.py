@@ -13,8 +13,8 @@ pytest.importorskip("distributed", reason="Dask is not installed: hybridtof[clus
 from benchmarks.cluster import Cluster as Machines
 from service.cluster import Cluster
 from service.jobs import Jobs
+from service.store.job_store import JobStore
 from service.store.retention import Retention
-from service.store.sql_store import SqlJobStore
 from tests.service import fake_fold
 from tests.service.test_jobs import (
     SETTINGS,
@@ -42,7 +42,7 @@ def machines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
 
 @asynccontextmanager
 async def on(machines: Machines, folder: Path) -> AsyncIterator[FakeJobs]:
-    store = SqlJobStore(f"sqlite:///{folder}/jobs.sqlite", Retention(100))
+    store = JobStore(f"sqlite:///{folder}/jobs.sqlite", Retention(100))
     cluster = Cluster(machines.settings["HYBRIDTOF_EXECUTOR"])
     jobs = Jobs(fake_fold, store, cluster, running=2, look_s=0.05)
     await jobs.start()

@@ -14,9 +14,9 @@ from inference.posterior.settings import SamplerSettings
 from service.errors import BusyError, IdempotencyError, NotFoundError, StoreError
 from service.jobs import Jobs
 from service.process_pool import ProcessPool
+from service.store.job_store import JobStore
 from service.store.record import QUEUED, JobRecord
 from service.store.retention import Retention
-from service.store.sql_store import SqlJobStore
 from simulator.frames import Frames, frames_from_columns
 from simulator.scene import Scene
 from simulator.sensor import Sensor, parse_sensor
@@ -35,7 +35,7 @@ def system() -> tuple[Sensor, Scene, Frames]:
 
 @asynccontextmanager
 async def running(
-    store: SqlJobStore, workers: int = 2, running: int = 2
+    store: JobStore, workers: int = 2, running: int = 2
 ) -> AsyncIterator[tuple[FakeJobs, ProcessPool]]:
     pool = ProcessPool(workers, stall_s=1.0)
     jobs = Jobs(fake_fold, store, pool, running, look_s=0.05)
@@ -47,8 +47,8 @@ async def running(
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> SqlJobStore:
-    return SqlJobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(100))
+def store(tmp_path: Path) -> JobStore:
+    return JobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(100))
 
 
 async def ended(jobs: FakeJobs, job_id: str) -> JobRecord:
@@ -77,7 +77,7 @@ async def until(jobs: FakeJobs, job_id: str, steps: int) -> None:
             return
 
 
-async def test_done(store: SqlJobStore) -> None:
+async def test_done(store: JobStore) -> None:
     fake_fold.order()
     async with running(store) as (jobs, _):
         record = await jobs.submit(*system(), SETTINGS)
@@ -97,7 +97,7 @@ async def test_done(store: SqlJobStore) -> None:
     assert record.result["verdict"] == {"converged": True, "reasons": []}
 
 
-async def test_death_changes_nothing(tmp_path: Path, store: SqlJobStore) -> None:
+async def test_death_changes_nothing(tmp_path: Path, store: JobStore) -> None:
     expected = undisturbed()
     fake_fold.order(die=str(tmp_path / "mark"), deaths=1)
     async with running(store) as (jobs, _):
@@ -107,7 +107,7 @@ async def test_death_changes_nothing(tmp_path: Path, store: SqlJobStore) -> None
     assert mean_of(record) == expected
 
 
-async def test_killed_from_outside_changes_nothing(tmp_path: Path, store: SqlJobStore) -> None:
+async def test_killed_from_outside_changes_nothing(tmp_path: Path, store: JobStore) -> None:
     expected = undisturbed()
     fake_fold.order(hold=str(tmp_path / "mark"))
     async with running(store) as (jobs, pool):
@@ -119,7 +119,7 @@ async def test_killed_from_outside_changes_nothing(tmp_path: Path, store: SqlJob
         assert mean_of(await ended(jobs, job_id)) == expected
 
 
-async def test_chunk_that_always_kills_fails_alone(tmp_path: Path, store: SqlJobStore) -> None:
+async def test_chunk_that_always_kills_fails_alone(tmp_path: Path, store: JobStore) -> None:
     fake_fold.order(die=str(tmp_path / "mark"), deaths=100, signal=int(signal.SIGSEGV))
     async with running(store) as (jobs, _):
         bad = await jobs.submit(*system(), SETTINGS)
@@ -136,7 +136,7 @@ async def test_chunk_that_always_kills_fails_alone(tmp_path: Path, store: SqlJob
     assert (tmp_path / "mark").read_text() == "xxx"
 
 
-async def test_failure_is_told(caplog: pytest.LogCaptureFixture, store: SqlJobStore) -> None:
+async def test_failure_is_told(caplog: pytest.LogCaptureFixture, store: JobStore) -> None:
     fake_fold.order(fail="no luck")
     async with running(store) as (jobs, _):
         record = await ended(jobs, (await jobs.submit(*system(), SETTINGS)).id)
@@ -147,7 +147,7 @@ async def test_failure_is_told(caplog: pytest.LogCaptureFixture, store: SqlJobSt
     assert "no luck" in caplog.text
 
 
-async def test_cancel_keeps_what_there_is(tmp_path: Path, store: SqlJobStore) -> None:
+async def test_cancel_keeps_what_there_is(tmp_path: Path, store: JobStore) -> None:
     fake_fold.order(hold=str(tmp_path / "mark"))
     async with running(store) as (jobs, _):
         job_id = (await jobs.submit(*system(), SETTINGS)).id
@@ -163,7 +163,7 @@ async def test_cancel_keeps_what_there_is(tmp_path: Path, store: SqlJobStore) ->
         assert await jobs.cancel(job_id) == record
 
 
-async def test_cancel_while_waiting_is_at_once(tmp_path: Path, store: SqlJobStore) -> None:
+async def test_cancel_while_waiting_is_at_once(tmp_path: Path, store: JobStore) -> None:
     fake_fold.order(hold=str(tmp_path / "mark"))
     async with running(store, running=1) as (jobs, _):
         first = await jobs.submit(*system(), SETTINGS)
@@ -175,7 +175,7 @@ async def test_cancel_while_waiting_is_at_once(tmp_path: Path, store: SqlJobStor
     assert (record.status, record.result, record.progress) == ("cancelled", None, QUEUED)
 
 
-async def test_time_limit(store: SqlJobStore) -> None:
+async def test_time_limit(store: JobStore) -> None:
     """It is the processor time of the chunks: two pieces, each of 0.1 s."""
     fake_fold.order(burn=0.1)
     async with running(store) as (jobs, _):
@@ -189,7 +189,7 @@ async def test_time_limit(store: SqlJobStore) -> None:
     assert record.progress["steps"] == 10
 
 
-async def test_turns_go_round_clients(store: SqlJobStore) -> None:
+async def test_turns_go_round_clients(store: JobStore) -> None:
     """A client with one job among three greedy ones does not wait for theirs to end."""
     expected = undisturbed()
     fake_fold.order()
@@ -213,7 +213,7 @@ async def test_turns_go_round_clients(store: SqlJobStore) -> None:
         await jobs.close()
 
 
-async def test_deleted_while_running(tmp_path: Path, store: SqlJobStore) -> None:
+async def test_deleted_while_running(tmp_path: Path, store: JobStore) -> None:
     fake_fold.order(hold=str(tmp_path / "mark"))
     async with running(store) as (jobs, _):
         job_id = (await jobs.submit(*system(), SETTINGS)).id
@@ -227,7 +227,7 @@ async def test_deleted_while_running(tmp_path: Path, store: SqlJobStore) -> None
             await jobs.cancel(job_id)
 
 
-async def test_end_is_quick_and_another_takes_up(tmp_path: Path, store: SqlJobStore) -> None:
+async def test_end_is_quick_and_another_takes_up(tmp_path: Path, store: JobStore) -> None:
     """What one instance leaves behind, another finishes to the same last bit."""
     expected = undisturbed()
     fake_fold.order(hold=str(tmp_path / "mark"))
@@ -248,7 +248,7 @@ async def test_end_is_quick_and_another_takes_up(tmp_path: Path, store: SqlJobSt
             assert mean_of(record) == expected
 
 
-async def test_idempotency(store: SqlJobStore) -> None:
+async def test_idempotency(store: JobStore) -> None:
     fake_fold.order()
     async with running(store) as (jobs, _):
         one = await jobs.submit(*system(), SETTINGS, key="k", digest="d")
@@ -263,7 +263,7 @@ async def test_idempotency(store: SqlJobStore) -> None:
 
 async def test_no_room(tmp_path: Path) -> None:
     fake_fold.order(hold=str(tmp_path / "mark"))
-    small = SqlJobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(2))
+    small = JobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(2))
     async with running(small) as (jobs, _):
         first = await jobs.submit(*system(), SETTINGS)
         await jobs.submit(*system(), SETTINGS)
@@ -278,7 +278,7 @@ async def test_no_room(tmp_path: Path) -> None:
         await jobs.submit(*system(), SETTINGS)
 
 
-async def test_stopped_worker_is_replaced(tmp_path: Path, store: SqlJobStore) -> None:
+async def test_stopped_worker_is_replaced(tmp_path: Path, store: JobStore) -> None:
     """It takes no processor time: another process computes its chunk."""
     expected = undisturbed()
     fake_fold.order(hold=str(tmp_path / "mark"))
@@ -291,7 +291,7 @@ async def test_stopped_worker_is_replaced(tmp_path: Path, store: SqlJobStore) ->
         assert mean_of(await ended(jobs, job_id)) == expected
 
 
-async def test_cancel_while_a_worker_is_stopped(tmp_path: Path, store: SqlJobStore) -> None:
+async def test_cancel_while_a_worker_is_stopped(tmp_path: Path, store: JobStore) -> None:
     fake_fold.order(hold=str(tmp_path / "mark"))
     async with running(store) as (jobs, pool):
         job_id = (await jobs.submit(*system(), SETTINGS)).id
@@ -305,11 +305,11 @@ async def test_cancel_while_a_worker_is_stopped(tmp_path: Path, store: SqlJobSto
     assert record.result is not None
 
 
-async def test_two_processes_share_a_store(tmp_path: Path, store: SqlJobStore) -> None:
+async def test_two_processes_share_a_store(tmp_path: Path, store: JobStore) -> None:
     """Jobs are shared out; each sees what the other has done, and what it has cancelled."""
     expected = undisturbed()
     fake_fold.order(hold=str(tmp_path / "mark"))
-    other = SqlJobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(100))
+    other = JobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(100))
     async with running(store, 1, 1) as (here, _), running(other, 1, 1) as (there, _):
         ids = [(await here.submit(*system(), SETTINGS)).id for _ in range(3)]
         for job_id in ids[:2]:  # both run although each process runs one at a time
@@ -321,7 +321,7 @@ async def test_two_processes_share_a_store(tmp_path: Path, store: SqlJobStore) -
             assert mean_of(await ended(there, job_id)) == expected
 
 
-async def test_of_another_version_is_computed_anew(tmp_path: Path, store: SqlJobStore) -> None:
+async def test_of_another_version_is_computed_anew(tmp_path: Path, store: JobStore) -> None:
     expected = undisturbed()
     fake_fold.order(hold=str(tmp_path / "mark"))
     async with running(store) as (jobs, _):
@@ -342,7 +342,7 @@ async def test_store_that_is_locked_for_a_while(
     """Nothing is accepted that would not be kept, and what was accepted goes on afterwards."""
     expected = undisturbed()
     fake_fold.order(hold=str(tmp_path / "mark"))
-    store = SqlJobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(100), busy_s=0.01)
+    store = JobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(100), busy_s=0.01)
     async with running(store) as (jobs, _):
         job_id = (await jobs.submit(*system(), SETTINGS)).id
         await until(jobs, job_id, 10)

@@ -21,8 +21,8 @@ from service.jobs import Jobs
 from service.process_pool import ProcessPool
 from service.requests import PosteriorRequest, SimulationRequest
 from service.service_settings import ServiceSettings
+from service.store.job_store import JobStore
 from service.store.retention import Retention
-from service.store.sql_store import SqlJobStore
 from simulator.frames import frames_from_columns
 from simulator.validated import parse
 from tests.service.conftest import SENSOR
@@ -112,7 +112,7 @@ async def test_killed_workers_change_nothing(tmp_path: Path) -> None:
     frames = frames_from_columns(request.sensor, request.frames)
     settings = SamplerSettings(seed=2, ensembles=2, target_ess=2_000, max_seconds=86_400)
     pool = ProcessPool(2)
-    store = SqlJobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(1))
+    store = JobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(1))
     jobs = Jobs(fold, store, pool, running=1)
     await jobs.start()
     try:

@@ -12,9 +12,9 @@ import sqlalchemy as sa
 
 from service.errors import BusyError, StoreError
 from service.store.holder import has_ended, holder_name
+from service.store.job_store import JobStore
 from service.store.record import JobRecord, NewJob
 from service.store.retention import Retention
-from service.store.sql_store import SqlJobStore
 from service.store.tables import METADATA
 from simulator.errors import InvalidInputError
 
@@ -31,12 +31,12 @@ def clock() -> Clock:
     return Clock()
 
 
-_opened: list[SqlJobStore] = []
+_opened: list[JobStore] = []
 
 
-def store_at(path: Path, clock: Clock | None = None, **limits: Any) -> SqlJobStore:
+def store_at(path: Path, clock: Clock | None = None, **limits: Any) -> JobStore:
     retention = Retention(**{"jobs": 100} | limits)
-    store = SqlJobStore(f"sqlite:///{path}/jobs.sqlite", retention, 0.05, clock or Clock())
+    store = JobStore(f"sqlite:///{path}/jobs.sqlite", retention, 0.05, clock or Clock())
     _opened.append(store)
     return store
 
@@ -53,7 +53,7 @@ def new(name: str, **fields: Any) -> NewJob:
     return NewJob(name, b"job", "v", "emcee", 1, **fields)
 
 
-def begun(store: SqlJobStore, name: str) -> JobRecord:
+def begun(store: JobStore, name: str) -> JobRecord:
     store.add(new(name))
     claimed = store.claim(holder_name())
     assert claimed is not None
@@ -61,7 +61,7 @@ def begun(store: SqlJobStore, name: str) -> JobRecord:
     return claimed.record
 
 
-def advanced(store: SqlJobStore, record: JobRecord, data: bytes, whole: bool) -> JobRecord | None:
+def advanced(store: JobStore, record: JobRecord, data: bytes, whole: bool) -> JobRecord | None:
     return store.advance(record, data, whole, {"phase": "sampling"}, 1.0, 2.0)
 
 
@@ -280,7 +280,7 @@ def test_migrations_make_the_tables_as_they_are_described(tmp_path: Path) -> Non
 )
 def test_refused_at_the_start(url: str, said: str) -> None:
     with pytest.raises(InvalidInputError, match=said) as caught:
-        SqlJobStore(url, Retention(1), busy_s=0.1)
+        JobStore(url, Retention(1), busy_s=0.1)
     (problem,) = caught.value.problems
     assert problem.pointer == "/HYBRIDTOF_DATABASE"
     assert "secret" not in str(caught.value)

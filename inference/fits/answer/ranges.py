@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.estimates import SdParts, Status, TechniqueResult
+from inference.estimates import SdParts, Status, TechniqueResult, status_of_counts
 from inference.fits.likelihood.erring import Erring
 from inference.fits.likelihood.erring_point import moved_by_errors
 from inference.fits.likelihood.frame_modes import MOST, frame_modes
@@ -267,9 +267,7 @@ def frame_ranges(
             scene[frame, place] = roots[frame, place] * shared[row, index]
             model[frame, place] = roots[frame, place] * modes.model[row, index]
     roots_sd[~np.isfinite(roots_sd)] = np.nan
-    status = np.where(
-        count == 1, Status.UNIQUE, np.where(count > 1, Status.AMBIGUOUS, Status.NONE)
-    ).astype(np.uint8)
+    status = status_of_counts(count)
     status[state == SATURATED] = Status.SATURATED
     reason[state == ABSENT] = ABSENT
     return TechniqueResult(

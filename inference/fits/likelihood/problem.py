@@ -240,10 +240,6 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames, *, exact: bool = F
     exact : bool
         Whether the model is taken as exact, whatever the scene says of its error.
 
-    Returns
-    -------
-    FitProblem
-
     Raises
     ------
     InvalidInputError
@@ -259,7 +255,7 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames, *, exact: bool = F
     varies = noise.shot > 0 or noise.relative > 0
     near, far = parameters.range_prior.low, min(parameters.range_prior.high, sensor.max_range_m)
     near = max(near, far * 1e-6)
-    gain = np.ones(len(frames)) if frames.gain is None else frames.gain
+    gain = frames.gains
     with np.errstate(over="ignore"):
         scaled = frames.readings / unit
     if not (np.abs(scaled) < _LOUDEST).all():

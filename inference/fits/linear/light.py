@@ -12,16 +12,11 @@ from simulator.sensor import PulsedSensor, Sensor
 if TYPE_CHECKING:
     from inference.frame.sensitivity import Sensitivity
 
-__all__ = ["background_light", "carrier", "component", "gains", "object_light"]
+__all__ = ["background_light", "carrier", "component", "object_light"]
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 Quad = tuple[float, float, float, float]
-
-
-def gains(frames: Frames) -> Array:
-    """Return the gain factor of every frame, shape (n,)."""
-    return np.ones(len(frames)) if frames.gain is None else frames.gain
 
 
 def carrier(sensor: Sensor, r: Array) -> Array:
@@ -68,7 +63,7 @@ def object_light(sensor: Sensor, shape: Triple, r: Array, frames: Frames) -> tup
     (ndarray, ndarray), each of shape (n, 2)
         nan where the range is.
     """
-    seen = _light(sensor, shape, None, r, gains(frames))
+    seen = _light(sensor, shape, None, r, frames.gains)
     unknown = np.isnan(r)[:, None]
     return np.where(unknown, np.nan, seen.signal), np.where(unknown, np.nan, seen.by_range)
 
@@ -93,5 +88,5 @@ def background_light(sensor: Sensor, background: Quad, r: Array, frames: Frames)
         nan where the range is.
     """
     dark = (1.0, 0.0, 0.0)
-    seen = _light(sensor, dark, background, r, gains(frames))
+    seen = _light(sensor, dark, background, r, frames.gains)
     return np.where(np.isnan(r)[:, None], np.nan, seen.mean)

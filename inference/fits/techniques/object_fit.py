@@ -19,7 +19,7 @@ from inference.fits.likelihood.unknowns import unknowns_of
 from inference.fits.linear.at_rest import refuse_at_rest
 from inference.fits.linear.equations import Equations, Observed, fit_equations, without_warnings
 from inference.fits.linear.least_squares import LinearFit
-from inference.fits.linear.light import background_light, carrier, component, gains
+from inference.fits.linear.light import background_light, carrier, component
 from inference.known import Known
 from inference.realtime.techniques.background_intensity import BACKGROUND_INTENSITY
 from inference.realtime.techniques.conventional import CONVENTIONAL
@@ -53,12 +53,12 @@ def _flux(task: Task, r: Array, frames: Frames) -> Array:
     if task.scene.background is not None:
         strength, distance, c0, c1 = (task.known.get(path) for path in _BACKGROUND)
         net = net - background_light(sensor, (strength, distance, c0, c1), r, frames)
-    return np.asarray(component(sensor, net, r) / gains(frames) / sensor.known_gain)
+    return np.asarray(component(sensor, net, r) / frames.gains / sensor.known_gain)
 
 
 def _signal(task: Task, r: Array, frames: Frames) -> Array:
     """Return the object's part of the readings as its flux has it, shape (n, 2)."""
-    size = task.sensor.known_gain * gains(frames) * _flux(task, r, frames)
+    size = task.sensor.known_gain * frames.gains * _flux(task, r, frames)
     return np.asarray(size[:, None] * carrier(task.sensor, r))
 
 

@@ -16,7 +16,7 @@ from inference.fits.answer.counts import linear_obstacle, too_few
 from inference.fits.likelihood.unknowns import unknowns_of
 from inference.fits.linear.at_rest import refuse_at_rest
 from inference.fits.linear.equations import Equations, Observed, fit_equations, without_warnings
-from inference.fits.linear.light import background_light, component, gains, object_light
+from inference.fits.linear.light import background_light, component, object_light
 from inference.known import Known
 from inference.realtime.net import SATURATED, rule_out
 from inference.realtime.techniques.background_cancelling import BACKGROUND_CANCELLING
@@ -44,7 +44,7 @@ def _signal(task: Task, r: Array, frames: Frames) -> Array:
 def _from_background(task: Task, readings: Array, frames: Frames) -> Array:
     """Return the size of the background's light in readings, over the gain factor, shape (n,)."""
     distance = np.full(len(frames), task.known.get("background.distance_m"))
-    return np.asarray(component(task.sensor, readings, distance) / gains(frames))
+    return np.asarray(component(task.sensor, readings, distance) / frames.gains)
 
 
 def _visible(task: Task, signal: Array, frames: Frames) -> Array:

@@ -106,10 +106,6 @@ def draws_of(
         Source of randomness.
     parts : int
         How many jobs the frames were dealt out to, of which this is one: what all cost counts.
-
-    Returns
-    -------
-    Draws
     """
     ensembles, walkers, steps = sample.log_density.shape
     d, frames = sample.z.shape[-1], len(job.frames)

@@ -168,10 +168,6 @@ def error_budget(
         the last of the errors.
     rng : numpy.random.Generator
         Source of randomness.
-
-    Returns
-    -------
-    ErrorBudget
     """
     error = job.scene.model_error
     count = int(np.clip(_FRAMES // max(log_r.shape[1], 1), _FEWEST, _REFERENCES))

@@ -37,10 +37,6 @@ def range_summary(
         With importance sampling: its effective sample size.
     shares : ErrorParts of ndarray, shape (frames,)
         Of the standard deviations.
-
-    Returns
-    -------
-    RangeSummary
     """
     n = draws.range_m.shape[-1]
     columns = {name: np.full(n, np.nan) for name in RANGE_COLUMNS}

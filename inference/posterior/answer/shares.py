@@ -83,9 +83,5 @@ def resampled_share_error(share: float, count: int, ess: float) -> float:
         Number of draws.
     ess : float
         Importance sample size of the draws that they were resampled from.
-
-    Returns
-    -------
-    float
     """
     return math.sqrt(share * (1.0 - share) * (1.0 / count + 1.0 / ess))

@@ -98,10 +98,6 @@ def with_model_error(
         That of which they are draws: of all frames, where the job is a part of a larger one.
     bias : ndarray, shape (d,), or None
         By what the parameters are moved because there are many frames.
-
-    Returns
-    -------
-    Whole
     """
     rng, d = job.stream(Stream.MODEL_ERROR), sample.z.shape[-1]
     thinned = sample.z[:, :, draws.thinned]

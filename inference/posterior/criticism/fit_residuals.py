@@ -115,10 +115,6 @@ def fit_residuals(
         How many.
     rng : numpy.random.Generator
         Source of randomness.
-
-    Returns
-    -------
-    FitResiduals
     """
     n, d = len(density.frames), z.size
     density = _with_flux_error(job, density)

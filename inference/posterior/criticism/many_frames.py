@@ -69,10 +69,6 @@ def following(bias: Array, z: Array, log_r: Array) -> PriorSensitivity:
         Draws.
     log_r : ndarray, shape (n, frames)
         Their ranges; nan for a frame without object.
-
-    Returns
-    -------
-    PriorSensitivity
     """
     present = np.isfinite(log_r[0])
     ranges = np.where(present, log_r, 0.0)

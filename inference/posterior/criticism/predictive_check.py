@@ -114,10 +114,6 @@ def predictive_check(
     others : sequence of Job
         The other parts of a job whose frames were dealt out. Each is fitted on its own, and what
         is looked at is that of all together.
-
-    Returns
-    -------
-    Fit
     """
     chosen = np.linspace(0, len(z) - 1, min(_DRAWS, len(z))).astype(np.intp)
     replicates = max(_REPLICATES // (1 + len(others)), _FEWEST)

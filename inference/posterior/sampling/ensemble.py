@@ -89,10 +89,6 @@ def new_ensemble(
         Their log density, finite.
     seed : numpy.random.SeedSequence
         One of its own, spawned.
-
-    Returns
-    -------
-    Ensemble
     """
     walkers, d = z.shape
     state: Any = np.random.RandomState(np.random.MT19937(seed)).get_state(legacy=True)

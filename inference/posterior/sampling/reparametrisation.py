@@ -81,10 +81,6 @@ def reparametrisation_of(density: CollapsedDensity) -> Reparametrisation | None:
     ----------
     density : CollapsedDensity
         Its unknowns, and the sensor.
-
-    Returns
-    -------
-    Reparametrisation or None
     """
     parameters = density.parameters
     names = list(parameters.names)

@@ -85,10 +85,6 @@ def warm_start(
         Source of randomness.
     n : int
         Draws of each round.
-
-    Returns
-    -------
-    Warm
     """
     at_others = density(others) if len(others) else np.empty(0)
     calls = len(others)

@@ -78,10 +78,6 @@ def compare(larger: Candidate, smaller: Candidate) -> Comparison:
     ----------
     larger, smaller : Candidate
         With more and with fewer terms.
-
-    Returns
-    -------
-    Comparison
     """
     if not math.isfinite(smaller.log_evidence):
         # without the term no parameters explain the frames; without both nothing is demanded

@@ -105,10 +105,6 @@ def assess(
         Source of randomness.
     fitted : sequence of Optimum
         Maxima of the density that are known beforehand.
-
-    Returns
-    -------
-    Candidate
     """
     weighed = weigh(density, rng, fitted)
     predicted, calls = cross_validate(density, weighed, rng)
