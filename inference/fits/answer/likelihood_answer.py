@@ -26,6 +26,7 @@ from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.law_mode import law_modes
 from inference.fits.likelihood.maximum import TOP, Maximum, maximum_from
 from inference.fits.likelihood.multistart import find_maxima, find_starts
+from inference.fits.likelihood.places import places_of
 from inference.fits.likelihood.problem import FitProblem, fit_problem
 from inference.fits.likelihood.told import known_ranges
 from inference.realtime.net import SATURATED, rule_out
@@ -72,7 +73,8 @@ def likelihood_answer(
     if not task.exact:
         law = problem.parameters.law is not None
         known = known_ranges(frames, problem.support)
-        problem = dataclasses.replace(problem, law=law, known=known)
+        places = places_of(problem.frames, problem.present, problem.instrument)
+        problem = dataclasses.replace(problem, law=law, known=known, places=places)
     found = _found(problem) if values is None else _found_from(problem, values)
     optima = [optimum for optimum in found if np.isfinite(optimum.deviance)]
     if not optima:

@@ -31,7 +31,7 @@ from inference.fits.likelihood.erring_point import (
     whitened_of,
 )
 from inference.fits.likelihood.maximum import Maximum
-from inference.fits.likelihood.other_starts import larger, of_law
+from inference.fits.likelihood.other_starts import half_dark, larger, of_law
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import Told, contradictions, eliminated, improbable, told_at
 from inference.identifiability.elimination import eliminate
@@ -182,8 +182,23 @@ def erring_maxima(problem: FitProblem, starts: Iterable[Maximum]) -> list[Erring
     list of Erring
         Ends of the best climbs, the best first.
     """
+    first = _first_climbs(problem, (*starts, *of_law(problem)))[:_KEPT]
+    first += _first_climbs(problem, half_dark(problem, _softened(problem, _OF_LIGHT[0])))[:1]
+    ends: list[tuple[Point, float]] = []
+    for at in first:
+        if not any(_same(at, end) for end, _ in ends):
+            ends.append(climbed(problem, at, _STEPS))
+    ends.sort(key=lambda end: end[0].deviance)
+    if ends:
+        ends += [climbed(problem, at, _STEPS) for at in larger(problem, ends[0][0])]
+        ends.sort(key=lambda end: end[0].deviance)
+    return [end_of(problem, at, remaining) for at, remaining in ends]
+
+
+def _first_climbs(problem: FitProblem, starts: Iterable[Maximum]) -> list[Point]:
+    """Climb a little from starts and from each held within the priors; the best first."""
     first = []
-    for start in (*starts, *of_law(problem)):
+    for start in starts:
         if not (np.isfinite(start.x).all() and np.isfinite(start.deviance)):
             continue
         inward = held_within_priors(problem, start.x)
@@ -192,16 +207,7 @@ def erring_maxima(problem: FitProblem, starts: Iterable[Maximum]) -> list[Erring
             at, _ = climbed(problem, begun(problem, x, start.positions), FEW)
             if math.isfinite(at.deviance):
                 first.append(with_other_ranges(problem, at, x, start.positions))
-    first.sort(key=lambda at: at.deviance)
-    ends: list[tuple[Point, float]] = []
-    for at in first[:_KEPT]:
-        if not any(_same(at, end) for end, _ in ends):
-            ends.append(climbed(problem, at, _STEPS))
-    ends.sort(key=lambda end: end[0].deviance)
-    if ends:
-        ends += [climbed(problem, at, _STEPS) for at in larger(problem, ends[0][0])]
-        ends.sort(key=lambda end: end[0].deviance)
-    return [end_of(problem, at, remaining) for at, remaining in ends]
+    return sorted(first, key=lambda at: at.deviance)
 
 
 def contradicting(top: Erring, problem: FitProblem) -> list[int]:

@@ -15,7 +15,7 @@ from inference.fits.likelihood.erring_point import (
     standard,
 )
 from inference.fits.likelihood.frame_modes import frame_modes
-from inference.fits.likelihood.model_error import errors_of_readings
+from inference.fits.likelihood.model_error import errors_of_readings, left_at_places
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import eliminated, with_column
 from inference.identifiability.information import Information
@@ -84,8 +84,9 @@ def begun(problem: FitProblem, x: Array, positions: Array) -> Point:
     if problem.known is not None:
         value = np.clip(problem.known.values[:, 0], *problem.support)
         u = np.where(problem.known.rates[:, 0] > 0, np.log(value), u)
-    errors = errors_of_readings(problem, np.ones((u.size, 2)), u)
-    k = with_column(problem.known, errors).shape[2]
+    light = np.ones((u.size, 2))
+    errors = errors_of_readings(problem, light, u), left_at_places(problem, light, u)
+    k = with_column(problem.known, np.concatenate(errors, axis=2)).shape[2]
     return _settled(problem, _settled(problem, point_at(problem, x, u, np.zeros(k))))
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from inference.fits.likelihood.arguments import CROSSTALK, SLOTS
 from inference.fits.likelihood.linearisation import whitened_slopes
-from inference.fits.likelihood.model_error import errors_of_readings, share_left
+from inference.fits.likelihood.model_error import errors_of_readings, left_at_places, own_share_left
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import Told, told_at, with_column
 from inference.frame.delayed import delayed
@@ -135,10 +135,12 @@ def linearised(
     whitener = by_value[:, :, list(CROSSTALK)]
     signal = by_value[:, :, Value.C2] * values[Value.C2]
     light = np.linalg.solve(whitener, signal[:, :, None])[:, :, 0]
-    errors = whitener @ errors_of_readings(problem, light, u)
+    errors = errors_of_readings(problem, light, u)
+    smooth = errors.shape[2]
+    errors = whitener @ np.concatenate([errors, left_at_places(problem, light, u)], axis=2)
     errors = np.where(np.isnan(errors), 0.0, errors)
     if a is not None:
-        erring = _Erring(problem, u, a[: errors.shape[2]], whitener)
+        erring = _Erring(problem, u, a[:smooth], whitener)
         for column in (Value.C0, Value.C1, Value.C2):
             bare = np.linalg.solve(whitener, by_value[:, :, column, None])
             by_value[:, :, column] += erring.change(np.asarray(bare[:, :, 0], np.float64))
@@ -183,7 +185,7 @@ def whitened_of(problem: FitProblem, u: Array, errors: Array, parts: Array) -> A
 def _root_of_covariance(problem: FitProblem, u: Array, errors: Array) -> Array:
     """Return the Cholesky factor of noise and what is left of errors, in units of the noise."""
     with np.errstate(over="ignore", invalid="ignore"):
-        left = share_left(problem, u) * np.einsum("nik,njk->nij", errors, errors)
+        left = np.einsum("n,nik,njk->nij", own_share_left(problem, u), errors, errors)
     left = np.where(np.isfinite(left).all(axis=(1, 2), keepdims=True), left, 0.0)
     # beside errors of 1e8 the noise's own 1 would be lost
     own = 1.0 + 1e-12 * np.trace(left, axis1=1, axis2=2)
@@ -207,7 +209,7 @@ def left_of_frames(
     def across(part: Array) -> Array:
         return np.asarray(np.square(np.einsum("ni,nik->nk", normal, part)).sum(axis=1))
 
-    spread = 1.0 + share_left(problem, u) * across(errors) + across(more)
+    spread = 1.0 + own_share_left(problem, u) * across(errors) + across(more)
     return np.asarray(across(residual[:, :, None]) / spread)
 
 
@@ -223,6 +225,21 @@ def _volume(root: Array, along: Array, white: Array) -> float:
     return whole + float((np.log(divided[free]) - np.log(bare[free])).sum())
 
 
+def _shared_volume(problem: FitProblem, along: Array, errors: Array) -> float:
+    """Return that of what frames at one place share."""
+    if problem.places is None:
+        return 0.0
+    last = errors.shape[2] - (problem.known is not None and problem.known.offset_sd > 0.0)
+    shared = errors[:, :, last - 2 * problem.places.number : last]
+    length = np.linalg.norm(along, axis=1)
+    free = (length > 0.0) & np.isfinite(length)
+    normal = np.column_stack([-along[free, 1], along[free, 0]]) / length[free, None]
+    flux, ranges = np.split(np.einsum("ni,nik->nk", normal, shared[free]), 2, axis=1)
+    own = np.square(flux).sum(axis=0), np.square(ranges).sum(axis=0)
+    both = np.square((flux * ranges).sum(axis=0))
+    return float(np.log1p(own[0] + own[1] + np.maximum(own[0] * own[1] - both, 0.0)).sum())
+
+
 def point_at(problem: FitProblem, x: Array, u: Array, a: Array, z: Array | None = None) -> Point:
     """Linearise in units of the noise and of what is left of errors; ``z`` is `standard` of x."""
     residual, jacobian, along, errors, _ = linearised(problem, x, u, a)
@@ -230,7 +247,7 @@ def point_at(problem: FitProblem, x: Array, u: Array, a: Array, z: Array | None 
     root = _root_of_covariance(problem, u, errors)
     white = np.asarray(np.linalg.solve(root, np.concatenate(parts, axis=2)), np.float64)
     d = x.size
-    volume = _volume(root, along, white[:, :, d + 1])
+    volume = _volume(root, along, white[:, :, d + 1]) + _shared_volume(problem, along, errors)
     residual, z = white[:, :, 0], standard(problem, x[None])[0] if z is None else z
     at = white[:, :, 1 : d + 1], white[:, :, d + 1], white[:, :, d + 2 :]
     told = told_at(problem.known, u, a)

@@ -8,7 +8,7 @@ from inference.fits.likelihood.problem import FitProblem
 from inference.frame.delayed import delayed
 from simulator.discrepancy import NEGLECTED, discrepancy_basis
 
-__all__ = ["errors_of_readings", "share_left", "unexplained"]
+__all__ = ["errors_of_readings", "left_at_places", "own_share_left", "share_left", "unexplained"]
 
 Array = NDArray[np.float64]
 
@@ -85,3 +85,31 @@ def share_left(problem: FitProblem, positions: Array) -> float:
     """
     nearest = float(np.exp(np.nanmin(positions)))
     return float(problem.error.flux**2 + (problem.error.range_m / nearest) ** 2 + NEGLECTED)
+
+
+def own_share_left(problem: FitProblem, positions: Array) -> Array:
+    """Return the same of every frame, (n,): 0 where it is `left_at_places`, not a frame's own."""
+    share = share_left(problem, positions)
+    if problem.places is None:
+        return np.full(positions.size, share)
+    return np.where(problem.places.of_frame < 0, share, 0.0)
+
+
+def left_at_places(problem: FitProblem, light: Array, positions: Array) -> Array:
+    """Return what errors leave that frames at one place share, by place.
+
+    Parameters
+    ----------
+    problem, light, positions
+        As for `errors_of_readings`.
+
+    Returns
+    -------
+    ndarray, shape (n, 2, 2 places)
+        Along independent standard normal errors, of the flux at all places and then of the range.
+    """
+    if problem.places is None:
+        return np.empty((positions.size, 2, 0))
+    here = problem.places.of_frame[:, None] == np.arange(problem.places.number)
+    here &= np.isfinite(positions)[:, None]
+    return _moved(problem, light, positions, np.sqrt(share_left(problem, positions)) * here)

@@ -4,17 +4,20 @@ import math
 
 import numpy as np
 
+from inference.fits.likelihood.arguments import CROSSTALK
+from inference.fits.likelihood.conditional_fit import conditional, unconditional
 from inference.fits.likelihood.erring_climb import begun
 from inference.fits.likelihood.erring_point import Point, columns_of
 from inference.fits.likelihood.frame_modes import frame_modes
-from inference.fits.likelihood.maximum import Maximum
+from inference.fits.likelihood.maximum import Maximum, approach
 from inference.fits.likelihood.problem import FitProblem
 
-__all__ = ["larger", "of_law"]
+__all__ = ["half_dark", "larger", "of_law"]
 
 _AT_EDGE = 1e-6  # of log r
 _SQUARES = ("object.c0", "object.c2", "background.shadow.c0")  # of lengths; their logs are unknowns
 _LARGER = 4.0
+_STEPS = 30  # of a climb with crosstalk held
 
 
 def of_law(problem: FitProblem) -> list[Maximum]:
@@ -38,6 +41,40 @@ def of_law(problem: FitProblem) -> list[Maximum]:
     natural = problem.parameters.natural(z)[:, columns_of(problem)]
     x = problem.coordinates(natural)[0]
     return [Maximum(x, 0.0, math.inf, frame_modes(problem, x)[0][:, 0])]
+
+
+def half_dark(problem: FitProblem, softer: FitProblem) -> list[Maximum]:
+    """Return a start whose crosstalk is half of what the darkest frame reads.
+
+    A fainter object behind more crosstalk explains frames as well, until the darkest frame is
+    crosstalk alone; noise that is in proportion to light pulls starts of softened problems there.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem, whose model errs.
+    softer : FitProblem
+        The same with more noise.
+
+    Returns
+    -------
+    list of Maximum
+        One, or none where crosstalk is not all that is unknown besides the object.
+    """
+    sides = np.flatnonzero(np.isin(problem.slots, CROSSTALK)).tolist()
+    if problem.background is not None or len(sides) < len(CROSSTALK) or len(problem) == len(sides):
+        return []
+    light = problem.frames[problem.present, :2]
+    dark = 0.5 * light[np.argmin(np.hypot(light[:, 0], light[:, 1]))]
+    middle = problem.parameters.natural(np.zeros((1, len(problem.parameters))))
+    x = problem.coordinates(middle[:, columns_of(problem)])[0]
+    x[sides] = dark
+    # the last first: the places of the others stay
+    first, rest = conditional(softer, sides[1], np.clip(x, *problem.bounds(x)))
+    second, rest = conditional(first, sides[0], rest)
+    found = approach(second, rest, _STEPS)
+    x = unconditional(problem, first, unconditional(first, second, found.x))
+    return [Maximum(x, found.deviance, math.inf, found.positions)]
 
 
 def larger(problem: FitProblem, at: Point) -> list[Point]:

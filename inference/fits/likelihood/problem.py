@@ -7,17 +7,16 @@ from numpy.typing import NDArray
 
 from inference.fits.likelihood.arguments import CROSSTALK, SLOTS, Bounds, Fit, Layout, Place, Static
 from inference.fits.likelihood.coordinates import (
-    KNOWN,
-    SAME,
     SHAPES,
     bounds_of,
     chain,
     physical,
 )
+from inference.fits.likelihood.known_values import IN_READINGS, known_and_unknown
 from inference.fits.likelihood.law_mode import LawMode
+from inference.fits.likelihood.places import Places
 from inference.fits.likelihood.supports import supports_of, with_support_alone
 from inference.fits.likelihood.told import KnownRanges
-from inference.fits.likelihood.unknowns import paths_of
 from inference.frame.arguments import Instrument, ReferencePrior, Rows
 from inference.frame.blocks import own_blocks
 from inference.frame.sensitivity import Value
@@ -33,9 +32,7 @@ __all__ = ["FitProblem", "fit_problem"]
 Array = NDArray[np.float64]
 
 _LOUDEST = 1e100  # times the noise: squares of readings, and bounds made from them, are numbers
-_IN_READINGS = (*CROSSTALK, Value.STRENGTH)
 _OBJECT = ("object.c0", "object.c1", "object.c2")
-_SHADOW = slice(Value.SHADOW_C0, Value.SHADOW_C1 + 1)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -75,6 +72,8 @@ class FitProblem:
         Whether the scene's joint law counts as what is known of the unknowns.
     mode : LawMode or None
         That of its modes which is taken; None where it has but one.
+    places : Places or None
+        Where frames share what following errors of the model leaves; None: nowhere.
     """
 
     names: tuple[str, ...]
@@ -92,6 +91,7 @@ class FitProblem:
     known: KnownRanges | None = None
     law: bool = False
     mode: LawMode | None = None
+    places: Places | None = None
 
     def __len__(self) -> int:
         return len(self.names)
@@ -150,7 +150,7 @@ class FitProblem:
     @property
     def units(self) -> Array:
         """Size of one unit of each unknown's value in SI or reading units, shape (d,)."""
-        return np.where(np.isin(self.slots, _IN_READINGS), self.unit, 1.0)
+        return np.where(np.isin(self.slots, IN_READINGS), self.unit, 1.0)
 
     def natural(self, x: Array) -> Array:
         """Return the unknowns in SI or reading units, shape (d,)."""
@@ -169,7 +169,7 @@ class FitProblem:
                     c0 = columns.get(slot - 1, self.layout.known[slot - 1])
                     x[:, j] = np.log1p(value / (2 * np.sqrt(c0)))
                 else:
-                    x[:, j] = np.log(value / (self.unit if slot in _IN_READINGS else 1.0))
+                    x[:, j] = np.log(value / (self.unit if slot in IN_READINGS else 1.0))
         return x
 
     def _bare(self, columns: dict[int, Array], side: int) -> Array | float:
@@ -195,24 +195,8 @@ class FitProblem:
             frames=np.ascontiguousarray(self.frames[index]),
             present=np.ascontiguousarray(self.present[index]),
             known=None if self.known is None else self.known.select(index),
+            places=None if self.places is None else self.places.select(index),
         )
-
-
-def _known_and_unknown(
-    sensor: Sensor, parameters: Parameters, unit: float
-) -> tuple[tuple[str, ...], NDArray[np.int64], Array]:
-    """Return names of the coordinates, the coordinate of each value, and the known values."""
-    index, known = np.full(SLOTS, KNOWN, dtype=np.int64), np.zeros(SLOTS)
-    paths = paths_of(sensor)
-    names = tuple(path for path in paths if path in parameters.names)
-    for k, path in enumerate(paths):
-        if path in names:
-            index[k] = names.index(path)
-        elif path in parameters.known:
-            known[k] = parameters.known[path] / (unit if k in _IN_READINGS else 1.0)
-    if parameters.shadow_is_object:
-        index[_SHADOW] = SAME
-    return names, index, known
 
 
 def _static(sensor: Sensor, parameters: Parameters, low: Array, high: Array, gain: Array) -> Static:
@@ -268,9 +252,9 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames, *, exact: bool = F
     with np.errstate(over="ignore"):
         light = float(loudest.max() / gain.max()), float((loudest / gain).max())
     low, high = supports_of(sensor, scene, (near, far), light)
-    for k in _IN_READINGS:
+    for k in IN_READINGS:
         low[k], high[k] = low[k] / unit, high[k] / unit
-    names, index, known = _known_and_unknown(sensor, parameters, unit)
+    names, index, known = known_and_unknown(sensor, parameters, unit)
     error = scene.model_error
     if not set(_OBJECT) & set(names):
         error = error.beside_numbers()
