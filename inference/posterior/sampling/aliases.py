@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.posterior.sampling.start import Optimum
+from inference.posterior.sampling.start import Optimum, refine
 from simulator.parameters import Parameters
 from simulator.priors import Distribution
 
@@ -129,9 +129,27 @@ class Aliases:
         Returns
         -------
         list of Optimum
-            As wide in metres as the optimum itself; those of less than a hundred thousandth of the
-            likeliest one's prior density are left out.
+            Those of less than a hundred thousandth of the likeliest one's prior density are left
+            out.
         """
+        found = self._copies(density, optimum)
+        if not found:
+            return []
+        # an optimum at an end of the prior, or before ranges, is narrower than its aliases
+        best = max(found, key=lambda alias: alias.log_mass)
+        climbed = refine(density, best.z)
+        if climbed is None or self._apart(climbed, best) > self.turn_m / 2:
+            return found
+        copies = self._copies(density, climbed)
+        others = [copy for copy in copies if self._apart(copy, optimum) > self.turn_m / 2]
+        return [climbed, *others]
+
+    def _apart(self, one: Optimum, other: Optimum) -> float:
+        """Return how far the walls of two optima are apart [m]."""
+        return float(abs(np.diff(self.distances(np.array([one.z, other.z])))[0]))
+
+    def _copies(self, density: CollapsedDensity, optimum: Optimum) -> list[Optimum]:
+        """Return an optimum in all other turns, as wide in metres as it is."""
         here = float(self.distances(optimum.z[None])[0])
         low, high = (float(x) for x in self.law.from_normal(np.array([-_REACH, _REACH])))
         first = max(math.ceil((low - here) / self.turn_m), -_TURNS)
