@@ -5,7 +5,7 @@ import signal
 import sys
 from pathlib import Path
 
-__all__ = ["ended_by_itself", "processor_time"]
+__all__ = ["ended_by_itself", "processor_time", "status_fields"]
 
 # what a process does to itself; any other signal is somebody else's doing
 _OWN = frozenset(
@@ -13,6 +13,20 @@ _OWN = frozenset(
     for name in ("SIGABRT", "SIGBUS", "SIGFPE", "SIGILL", "SIGSEGV", "SIGSYS", "SIGTRAP")
     if hasattr(signal, name)
 )
+
+
+def status_fields(pid: int) -> list[str] | None:
+    """Return the fields of /proc/PID/stat from the third on, its state; None where there are none.
+
+    Parameters
+    ----------
+    pid : int
+        Of a process of this machine.
+    """
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    except (OSError, IndexError):
+        return None
 
 
 def processor_time(pid: int) -> float | None:
@@ -23,11 +37,7 @@ def processor_time(pid: int) -> float | None:
     pid : int
         Of a process that has not been waited for.
     """
-    if sys.platform != "linux":
-        return None
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    except (OSError, IndexError):
+    if sys.platform != "linux" or (fields := status_fields(pid)) is None:
         return None
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 

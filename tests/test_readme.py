@@ -28,11 +28,6 @@ DOCUMENTS = [
 ]
 
 
-@pytest.fixture
-def anyio_backend() -> str:
-    return "asyncio"
-
-
 def block(mark: str) -> str:
     """The code block below a mark."""
     found = re.search(rf"<!-- {mark} -->\n```\w*\n(.*?)\n```", README, re.DOTALL)

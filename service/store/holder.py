@@ -8,6 +8,8 @@ import sys
 import uuid
 from pathlib import Path
 
+from service.process_watch import status_fields
+
 __all__ = ["has_ended", "holder_name"]
 
 
@@ -24,11 +26,8 @@ def _machine() -> str | None:
 
 def _started(pid: int) -> str | None:
     """Return when a process started, in ticks since the boot; None where there is none."""
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    except (OSError, IndexError):
-        return None
-    return None if fields[0] in "ZX" else fields[19]
+    fields = status_fields(pid)
+    return None if fields is None or fields[0] in "ZX" else fields[19]
 
 
 def holder_name() -> str:

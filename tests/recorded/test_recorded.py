@@ -29,11 +29,6 @@ def recording() -> Recording:
     return near_recording()
 
 
-@pytest.fixture
-def anyio_backend() -> str:
-    return "asyncio"
-
-
 @pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
 def test_conventional_range_is_within_a_millimetre(recording: Recording, kind: str) -> None:
     residual = conventional_residual_m(recording, kind)

@@ -27,11 +27,6 @@ FRAMES: dict[str, Any] = {"time_s": [0.0, 0.1], "w1": [0.01, 0.02], "w2": [1.5, 
 
 
 @pytest.fixture
-def anyio_backend() -> str:
-    return "asyncio"
-
-
-@pytest.fixture
 def request_body() -> dict[str, Any]:
     return copy.deepcopy({"sensor": SENSOR, "scene": SCENE, "frames": FRAMES})
 

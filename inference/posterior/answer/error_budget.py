@@ -153,10 +153,8 @@ def error_budget(
 
     Parameters
     ----------
-    job : Job
-        The job.
-    density : CollapsedDensity
-        Its density.
+    job, density : Job, CollapsedDensity
+        The job, and its density.
     z : ndarray, shape (n, d)
         Draws of equal weight.
     log_r : ndarray, shape (n, frames)

@@ -37,10 +37,8 @@ def near_fold(job: Job, density: CollapsedDensity, z: Array, log_r: Array) -> ND
 
     Parameters
     ----------
-    job : Job
-        The job.
-    density : CollapsedDensity
-        Its density.
+    job, density : Job, CollapsedDensity
+        The job, and its density.
     z : ndarray, shape (m, d)
         Draws of the parameters.
     log_r : ndarray, shape (m, usable frames)

@@ -86,10 +86,8 @@ def with_model_error(
 
     Parameters
     ----------
-    job : Job
-        The job.
-    density : CollapsedDensity
-        Its density.
+    job, density : Job, CollapsedDensity
+        The job, and its density.
     sample : Sample
         What it has drawn.
     draws : Draws

@@ -105,10 +105,8 @@ def fit_residuals(
 
     Parameters
     ----------
-    job : Job
-        The job.
-    density : CollapsedDensity
-        Its density.
+    job, density : Job, CollapsedDensity
+        The job, and its density.
     z : ndarray, shape (d,)
         A draw of the parameters.
     replicates : int

@@ -103,10 +103,8 @@ def predictive_check(
 
     Parameters
     ----------
-    job : Job
-        The job.
-    density : CollapsedDensity
-        Its density.
+    job, density : Job, CollapsedDensity
+        The job, and its density.
     z : ndarray, shape (m, d)
         Draws of the parameters.
     rng : numpy.random.Generator

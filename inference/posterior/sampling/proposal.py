@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from inference.posterior.sampling.start import Optimum
 from inference.posterior.sampling.transport import TriangularMap
 
-__all__ = ["Mixture", "Proposal", "log_student", "mixture_of", "student"]
+__all__ = ["Local", "Mixture", "Proposal", "log_student", "mixture_of", "student"]
 
 Array = NDArray[np.float64]
 
@@ -112,6 +112,23 @@ def log_student(x: Array) -> Array:
     constant -= 0.5 * d * math.log(_MAP_DEGREES * math.pi)
     tail = np.log1p(np.einsum("ni,ni->n", x, x) / _MAP_DEGREES)
     return np.asarray(constant - 0.5 * (_MAP_DEGREES + d) * tail)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Local:
+    """A Student-t law in the coordinates of a map."""
+
+    transport: TriangularMap
+    law: Mixture
+
+    def log_density(self, z: Array) -> Array:
+        """Return the log density at z of shape (n, d), shape (n,)."""
+        x, log_det = self.transport.unbend(z)
+        return self.law.log_density(x) + log_det
+
+    def draw(self, rng: np.random.Generator, n: int) -> Array:
+        """Draw n points, shape (n, d)."""
+        return self.transport.bend(self.law.draw(rng, n))[0]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

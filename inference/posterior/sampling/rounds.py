@@ -26,11 +26,11 @@ from inference.posterior.sampling.importance import (
     draw_weighted,
     pareto_k_hat,
 )
-from inference.posterior.sampling.proposal import Mixture, Proposal
+from inference.posterior.sampling.proposal import Local, Mixture, Proposal
 from inference.posterior.sampling.reparametrisation import reparametrisation_of
-from inference.posterior.sampling.transport import TriangularMap, fit_map
+from inference.posterior.sampling.transport import fit_map
 
-__all__ = ["Blend", "Local", "Rounds", "in_rounds"]
+__all__ = ["Blend", "Rounds", "in_rounds"]
 
 Array = NDArray[np.float64]
 
@@ -74,23 +74,6 @@ class Blend(NamedTuple):
         ends = np.cumsum((0, *self.counts)) * n // sum(self.counts)
         parts = zip(self.laws, np.diff(ends).tolist(), strict=True)
         return np.concatenate([law.draw(rng, count) for law, count in parts if count])
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Local:
-    """A Student-t law in the coordinates of a map."""
-
-    transport: TriangularMap
-    law: Mixture
-
-    def log_density(self, z: Array) -> Array:
-        """Return the log density at z of shape (n, d), shape (n,)."""
-        x, log_det = self.transport.unbend(z)
-        return self.law.log_density(x) + log_det
-
-    def draw(self, rng: np.random.Generator, n: int) -> Array:
-        """Draw n points, shape (n, d)."""
-        return self.transport.bend(self.law.draw(rng, n))[0]
 
 
 class _Pool(NamedTuple):

@@ -8,7 +8,7 @@ from scipy import integrate
 
 from inference.posterior.sampling import rounds
 from inference.posterior.sampling.importance import MAX_K_HAT
-from inference.posterior.sampling.proposal import Mixture, Proposal
+from inference.posterior.sampling.proposal import Local, Mixture, Proposal
 from inference.posterior.sampling.rounds import Blend, Rounds, in_rounds
 
 D = 2
@@ -72,7 +72,7 @@ def test_the_planted_fault_of_maps_alone_is_not_trusted(monkeypatch: pytest.Monk
     """Without a law around what is missed no round follows the second mode."""
     nothing = rounds._around
 
-    def elsewhere(proposal: Proposal, z: np.ndarray, values: np.ndarray) -> rounds.Local:
+    def elsewhere(proposal: Proposal, z: np.ndarray, values: np.ndarray) -> Local:
         return nothing(proposal, z, np.where(np.linalg.norm(z - SECOND, axis=1) < 1, -90, values))
 
     monkeypatch.setattr(rounds, "_around", elsewhere)
