@@ -21,7 +21,7 @@ from inference.tracking.outliers import expected_readings, log_outlier
 from inference.tracking.readings_table import ReadingsTable
 from simulator.compiled import compiled
 
-__all__ = ["add_unread", "learn_unread"]
+__all__ = ["add_unread", "learn_unread", "odd_weight"]
 
 _ODD = math.log(1e-2)  # log weight from which on a frame may have been an outlier
 
@@ -101,6 +101,31 @@ def add_unread(
         log_weight = log_of(of.numbers[PENDING]) + log_odd + (0.0 if saturated else empty)
         found, best = _add_new(to, found, log_weight, best, frame, table)
     return found, best
+
+
+@borrowed
+@compiled
+def odd_weight(
+    best: float, frame: TrackedFrame, of: Hypotheses, table: ReadingsTable, rules: Rules
+) -> float:
+    """Return the weight of the hypotheses of which a frame may be an outlier.
+
+    Parameters
+    ----------
+    best : float
+        Greatest log mass of what explains the frame otherwise.
+    frame, of, table, rules
+        As for `add_unread`.
+    """
+    weight = 0.0
+    for h in range(1, int(of.numbers[COUNT]) + 1):
+        log_mass = log_of(of.weight[h]) + math.log(rules.outlier)
+        if log_mass - math.log(rules.breadth) < best + _ODD:
+            continue
+        mean1, mean2 = expected_readings(of, h, frame.gain, table)
+        if log_mass + log_outlier(frame, mean1, mean2, table, rules) > best + _ODD:
+            weight += of.weight[h]
+    return weight
 
 
 @borrowed

@@ -42,7 +42,7 @@ from inference.tracking.motion import Rules
 from inference.tracking.places import Places, mass_bound
 from inference.tracking.prediction import born_prior, prior_of
 from inference.tracking.readings_table import ReadingsTable
-from inference.tracking.unread import add_unread, learn_unread
+from inference.tracking.unread import add_unread, learn_unread, odd_weight
 from simulator.compiled import compiled
 
 __all__ = ["Model", "Room", "room_for", "weigh_frame", "weigh_known"]
@@ -72,9 +72,8 @@ class Kept(NamedTuple):
     """What was kept of the candidates."""
 
     hypotheses: int  # how many
-    # mass of the empty scene, and of it and all hypotheses
-    empty: float
-    total: float
+    empty: float  # mass of the empty scene
+    total: float  # of it and all hypotheses
     outlying: float  # mass of outliers
     surprise: float  # normalised innovation squared under the heaviest explanation
 
@@ -113,11 +112,12 @@ def _of_followed(frame: TrackedFrame, of: Hypotheses, model: Model, room: Room) 
 
 
 @compiled
-def _of_new(frame: TrackedFrame, of: Hypotheses, model: Model, room: Room, found: int) -> int:
+def _of_new(
+    frame: TrackedFrame, of: Hypotheses, model: Model, room: Room, found: int, log_came: float
+) -> int:
     """List the modes of an object that has just come; the new length of the list."""
     table, rules = model.table, model.rules
-    log_weight = log_of(of.numbers[PENDING]) + math.log1p(-rules.outlier)
-    prior = born_prior(of, log_weight, rules.rate_sd, table)
+    prior = born_prior(of, log_came + math.log1p(-rules.outlier), rules.rate_sd, table)
     return find_candidates(
         room.candidates, found, NEW, frame, prior, table, model.places.scan, room.scanned
     )
@@ -214,6 +214,20 @@ def _settle(
     return total
 
 
+@compiled
+def _came(frame: TrackedFrame, of: Hypotheses, model: Model, best: float) -> float:
+    """Return the log probability that an object is where none was followed: come, or jumped.
+
+    Of jumps only where the frame may be an outlier, as likely as that; not where crosstalk is
+    learnt, since what is known of it is the hypothesis's own.
+    """
+    rules = model.rules
+    jumped = 0.0
+    if rules.rate_sd > 0.0 and not learns_crosstalk(of):
+        jumped = rules.outlier * odd_weight(best, frame, of, model.table, rules)
+    return log_of(of.numbers[PENDING] + jumped)
+
+
 @borrowed
 @compiled
 def weigh_frame(
@@ -247,11 +261,12 @@ def weigh_frame(
     best = log_mass_of(candidates, 0, found, best)
     # what is too light to be looked for is kept at an upper bound of its weight until it is not
     bound = mass_bound(frame, of.X.shape[1], model.table, model.places)
-    log_bound = log_of(of.numbers[PENDING]) + math.log(bound)
+    log_came = _came(frame, of, model, best)
+    log_bound = log_came + math.log(bound)
     pending = math.exp(min(log_bound - best, 0.0)) + math.exp(empty.odd_born - best)
     if full or log_bound > best + rules.log_negligible:
         old = found
-        found = _of_new(frame, of, model, room, found)
+        found = _of_new(frame, of, model, room, found, log_came)
         best = log_mass_of(candidates, old, found, best)
         pending = math.exp(empty.odd_born - best)
     before = best
@@ -271,10 +286,7 @@ def weigh_frame(
 def weigh_known(frame: TrackedFrame, of: Hypotheses, model: Model, room: Room) -> None:
     """Weigh every hypothesis by the known range of a frame whose readings are saturated.
 
-    Parameters
-    ----------
-    frame, of, model, room
-        As for `weigh_frame`.
+    Parameters are those of `weigh_frame`.
     """
     empty = Empty(NEVER, NEVER, NEVER, 0.0, 0.0)
     found, best = add_unread(

@@ -294,6 +294,24 @@ def test_a_sine_wave_beyond_its_wrap_keeps_the_true_one() -> None:
     assert (cold.hypotheses_weight[0] > 0).sum() >= 2
 
 
+def test_a_jump_beside_its_path_is_not_taken_for_an_outlier_alone() -> None:
+    """A step of 5 % in 0.02 s, and on from there.
+
+    The frame was an outlier with a probability of 0.99, and the range that was said to be the only
+    one, nine standard deviations off, was where the object had been.
+    """
+    sensor, scene = sensor_of(1e-3), scene_of(PLATE)
+    way = np.r_[np.linspace(0.50, 0.503, 10), np.linspace(0.525, 0.528, 10)]
+    frames = frames_of(read(sensor, scene, way, np.random.default_rng(0)))
+    found = track(sensor, scene, frames)
+    one = found.status == Status.UNIQUE
+    assert (np.abs(found.best_m - way)[one] < 5 * found.best_sd_m[one]).all()
+    assert one[:10].all()
+    assert one[12:].all()
+    assert found.status[10] == Status.AMBIGUOUS
+    assert np.nanmin(np.abs(found.hypotheses_m[10] / way[10] - 1.0)) < 0.01
+
+
 def test_an_outlier_is_passed_over() -> None:
     sensor, scene = sensor_of(SNR_100 / 10), scene_of(PLATE)
     readings = read(sensor, scene, np.full(40, 0.7), np.random.default_rng(10))
