@@ -14,8 +14,7 @@ from inference.identifiability.expected_posterior import (
 )
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.information import Information
-from inference.identifiability.known_beside import planned_rates, with_rates
-from inference.identifiability.planned_circuit import planned_circuit
+from inference.identifiability.known_beside import planned_circuit, planned_rates, with_rates
 from inference.identifiability.reasons import Diagnosis
 from inference.identifiability.remedies import Offer
 from inference.identifiability.status import Identifiability

@@ -1,4 +1,4 @@
-"""An experiment of which something is known beside the readings: a ruler's ranges, odometry."""
+"""What is known of planned frames beside their readings: circuit, ruler's ranges, odometry."""
 
 import dataclasses
 import math
@@ -10,12 +10,51 @@ from numpy.typing import NDArray
 from inference.identifiability.experiment import Experiment
 from simulator.errors import InvalidInputError
 from simulator.parameters import OFFSET, with_offset
+from simulator.sensor import Sensor
+from simulator.temperature import temperature_problems
 
-__all__ = ["planned_rates", "with_rates"]
+__all__ = ["planned_circuit", "planned_rates", "with_rates"]
 
 Array = NDArray[np.float64]
 
 _WITHIN = 1.0  # standard deviations; at an end of its prior an offset has no slope, and seems known
+
+
+def planned_circuit(
+    sensor: Sensor, n: int, gain: Sequence[float] | None, temperature_k: Sequence[float] | None
+) -> Array | None:
+    """Return the gains of frames, and where it follows its temperature the sensor's warmth.
+
+    Parameters
+    ----------
+    sensor, gain, temperature_k
+        As of `inference.identifiability.before_data.identifiability`.
+    n : int
+        Number of frames.
+
+    Returns
+    -------
+    ndarray, shape (n,) or (n, 2), or None
+        As `inference.identifiability.experiment.Experiment.gain`.
+
+    Raises
+    ------
+    InvalidInputError
+        At "/temperature_k".
+    """
+    gains = None if gain is None else np.asarray(gain, dtype=float)
+    if temperature_k is None:
+        return gains
+    temperature, pointer = np.asarray(temperature_k, dtype=float), "/temperature_k"
+    if sensor.temperature is None:
+        raise InvalidInputError.at(pointer, "is given, and the sensor has no coefficients")
+    if temperature.size != n:
+        message = f"has {temperature.size} entries where ranges_m has {n}"
+        raise InvalidInputError.at(pointer, message)
+    if problems := temperature_problems(sensor.temperature, temperature):
+        raise InvalidInputError(*problems)
+    warm = temperature - sensor.temperature.reference_k
+    return np.column_stack([np.ones(n) if gains is None else gains, warm])
 
 
 def planned_rates(
