@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from inference.empty_frames import contradiction
 from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK, taken_for_crosstalk
 from simulator.frames import Frames
 from simulator.scene import Scene
@@ -41,11 +40,8 @@ def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, .
     supposed = (_OWN_SHADOW,) if scene.shadow_is_object else ()
     if sensor.temperature is None and frames.temperature_k is not None:
         supposed = (*supposed, _TEMPERATURE)
-    if frames.object_present is not None:
-        if taken_for_crosstalk(scene, frames):
-            supposed = (*supposed, TAKEN_FOR_CROSSTALK)
-        elif contradicted := contradiction(scene, sensor, frames):
-            supposed = (*supposed, contradicted)
+    if taken_for_crosstalk(scene, frames):
+        supposed = (*supposed, TAKEN_FOR_CROSSTALK)
     if doubt := doubtful_unit(sensor):
         supposed = (*supposed, doubt)
     return supposed

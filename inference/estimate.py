@@ -4,6 +4,7 @@ import time
 from collections.abc import Sequence
 
 from inference.assumptions import assumptions_of
+from inference.empty_frames import Contradiction, contradiction
 from inference.estimates import Estimates, LeftOut, TechniqueResult
 from inference.known import known_of
 from inference.plan import Plan, cheapest, obstacle, plan
@@ -11,6 +12,7 @@ from inference.realtime.registry import TECHNIQUES
 from inference.shared_error import with_shared_error
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from inference.temperature import solved_where_told, task_of
+from inference.withheld import without_moved
 from simulator.errors import InvalidInputError, Problem, RefusedError
 from simulator.frames import Frames
 from simulator.joint_scene import around, centre
@@ -84,10 +86,13 @@ def estimate_planned(
         As of `estimate`.
     """
     supposed = assumptions_of(scene, sensor, frames)
+    against = contradiction(scene, sensor, frames)
+    if against is not None:
+        supposed = (*supposed, against.said)
     if techniques is None:
         if choice.chosen is None:
             return Estimates(None, (), choice.left_out, supposed)
-        result = _run(sensor, scene, frames, choice.chosen)
+        result = _run(sensor, scene, frames, choice.chosen, against)
         if isinstance(result, LeftOut):
             return Estimates(None, (), (result, *choice.left_out), supposed)
         return Estimates(choice.chosen, (result,), choice.left_out, supposed)
@@ -108,7 +113,7 @@ def estimate_planned(
             # a fit over many frames asks the frames alone
             of, stated = centre(sensor, scene) if name in TECHNIQUES else (sensor, scene)
             reason = obstacle(ALL_TECHNIQUES[name], of, stated, known_of(stated, of), frames)
-        found = LeftOut(name, reason) if reason else _run(sensor, scene, frames, name)
+        found = LeftOut(name, reason) if reason else _run(sensor, scene, frames, name, against)
         if isinstance(found, LeftOut):
             left_out[name] = found
         else:
@@ -117,13 +122,43 @@ def estimate_planned(
     return Estimates(chosen, tuple(served), tuple(left_out.values()), supposed)
 
 
-def _run(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> TechniqueResult | LeftOut:
+def _run(
+    sensor: Sensor, scene: Scene, frames: Frames, name: str, against: Contradiction | None
+) -> TechniqueResult | LeftOut:
     start = time.perf_counter()
     try:
         result = solved_where_told(sensor, frames, lambda used: _solved(sensor, scene, used, name))
     except RefusedError as error:
         return LeftOut(name, str(error))
+    if against is not None and _rests_on_numbers(name, scene):
+        result = without_moved(result, _beside(sensor, scene, frames, name, against))
     return _taken(result, time.perf_counter() - start)
+
+
+def _rests_on_numbers(name: str, scene: Scene) -> bool:
+    """Tell whether a technique takes for granted what empty frames should read."""
+    technique = ALL_TECHNIQUES[name]
+    if "crosstalk" not in technique.immune_to:
+        return True
+    if scene.background is None:
+        return False
+    of_wall = any(path.startswith("background.") for path in technique.needs)
+    return of_wall or "background" not in technique.immune_to
+
+
+def _beside(
+    sensor: Sensor, scene: Scene, frames: Frames, name: str, against: Contradiction
+) -> TechniqueResult | None:
+    """Solve with the light that empty frames show as crosstalk; None where that is refused."""
+    of, stated = centre(sensor, scene) if name in TECHNIQUES else (sensor, scene)
+    crosstalk = known_of(stated, of).crosstalk
+    assert crosstalk is not None  # noqa: S101  # nothing contradicts what is unknown
+    light = tuple(a + b for a, b in zip(crosstalk, against.light, strict=True))
+    lit = stated.model_copy(update={"crosstalk": light})
+    try:
+        return solved_where_told(of, frames, lambda used: _solved(of, lit, used, name))
+    except RefusedError:
+        return None
 
 
 def _taken(result: TechniqueResult, seconds: float) -> TechniqueResult:

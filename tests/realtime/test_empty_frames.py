@@ -1,5 +1,6 @@
 """What frames without the object say against a scene, and doubts of units, in `assumptions`."""
 
+import dataclasses
 import math
 from typing import Any
 
@@ -8,6 +9,7 @@ import pytest
 
 from inference.estimate import estimate
 from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK
+from inference.withheld import CONTRADICTED
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import Sensor, parse_sensor
@@ -46,6 +48,7 @@ def light_of_the_wall(kind: str) -> np.ndarray[Any, Any]:
 @pytest.mark.parametrize("scene", [{}, {"crosstalk": [0.004, 0.02]}, {"background": WALL}])
 def test_empty_frames_that_contradict_the_scene(kind: str, scene: dict[str, Any]) -> None:
     """Their mean has a standard error of the noise over sqrt(5); a limit of 5 of these."""
+    scene = scene | {"discrepancy": 0}
     sensor = sensor_of(kind)
     honest = np.array(scene.get("crosstalk", [0.0, 0.0]))
     if "background" in scene:
@@ -81,7 +84,8 @@ def test_what_a_scene_leaves_open_is_not_contradicted() -> None:
     bright = np.full((EMPTY, 2), 0.5)
     sensor = sensor_of("pulsed")
     wall = WALL | {"strength": {"prior": "lognormal", "median": 0.5, "sigma": 1.0}}
-    assert said(sensor, {"background": wall}, bright) == ()
+    bare = np.tile(1.7 * light_of_the_wall("pulsed"), (EMPTY, 1))
+    assert said(sensor, {"background": wall}, bare) == ()
     assert said(sensor, {"crosstalk": [PRIOR, PRIOR], "background": WALL}, bright) == ()
     assert said(sensor, {"crosstalk": [PRIOR, 0.2]}, bright) == (TAKEN_FOR_CROSSTALK,)
     with_gain = Frames(
@@ -90,6 +94,74 @@ def test_what_a_scene_leaves_open_is_not_contradicted() -> None:
         gain=np.array([2.0, 1.0]),
     )
     assert estimate(sensor, parse_scene({"background": WALL}), with_gain).assumptions == ()
+
+
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+def test_the_direction_of_a_wall_of_unknown_strength(kind: str) -> None:
+    """The error of the effective distance is granted; then 200 means: false alarm 1.2e-4."""
+    rng = np.random.default_rng(6)
+    sensor = parse_sensor({**KINDS[kind], "noise": {"read": [2e-5, 2e-5]}})
+    wall = WALL | {"strength": {"prior": "lognormal", "median": 0.5, "sigma": 1.0}}
+    light = light_of_the_wall(kind)
+    for scale in (0.1, 1.0):
+        for _ in range(100):
+            bare = scale * light + 2e-5 * rng.standard_normal((EMPTY, 2))
+            assert said(sensor, {"background": wall}, bare) == ()
+    for metres, told in ((3.003, 0), (3.2, 1)):
+        wrong = said(sensor, {"background": wall | {"distance_m": metres}}, bare)
+        assert len(wrong) == told, wrong
+    assert "no strength of a wall at the stated distance" in wrong[0]
+    exact = {"background": wall | {"distance_m": 3.003}, "discrepancy": 0}
+    assert len(said(sensor, exact, bare)) == 1
+
+
+def test_what_a_joint_law_leaves_open_is_no_contradiction() -> None:
+    sensor = sensor_of("pulsed")
+    for sd, told in ((1e-3, 0), (1e-4, 1)):
+        prior = {"prior": "normal", "mean": 0.02, "sd": sd}
+        mode = {"weight": 1.0, "mean": [0.0], "covariance": [[1.0]]}
+        joint = {"unknowns": ["crosstalk.w2"], "modes": [mode]}
+        scene = {"crosstalk": [0.004, prior], "joint": joint}
+        found = said(sensor, scene, np.array([[0.004, 0.0235]] * EMPTY))
+        assert len([text for text in found if "contradict" in text]) == told, found
+
+
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+def test_ranges_that_contradicted_numbers_move_are_not_given(kind: str) -> None:
+    """A reference beside it: the same frames with what empty frames read as the crosstalk."""
+    sensor = parse_sensor({**KINDS[kind], "noise": {"read": [1e-4, 1e-4]}})
+    r = np.array([0.2, 0.5, 1.0, 1.5])
+    flux = np.array([1000.0, 0.2, 0.1, 0.05])
+    phase = 4 * math.pi * 2e7 / 299792458.0 * r + 0.3
+    shape = [r / 14.9896229, np.ones(4)] if kind == "pulsed" else [np.cos(phase), np.sin(phase)]
+    light = flux[:, None] * np.stack(shape, axis=1)
+    shown = np.array([0.01, 0.02])
+    readings = np.vstack([np.tile(shown, (EMPTY, 1)), light + shown])
+    frames = Frames(readings, object_present=np.arange(EMPTY + 4) >= EMPTY)
+    honest = estimate(sensor, parse_scene({"crosstalk": shown.tolist()}), frames).results[0]
+    answer = estimate(sensor, parse_scene({"crosstalk": [0.009, 0.018]}), frames)
+    result = answer.results[0]
+    wrong = estimate(
+        sensor,
+        parse_scene({"crosstalk": [0.009, 0.018]}),
+        frames.select(np.arange(EMPTY, EMPTY + 4)),
+    ).results[0]
+    moved = np.abs(wrong.range_m - honest.range_m[EMPTY:]) > wrong.sd_m
+    assert not moved[0]
+    assert moved[[1, 3]].all()
+    assert np.array_equal(np.isnan(result.range_m[EMPTY:]), moved)
+    assert {result.reasons[i] for i in result.reason[EMPTY:][moved]} == {CONTRADICTED}
+    assert len(answer.assumptions) == 1
+    assert np.isnan(result.roots_sd_m[EMPTY:][moved]).all()
+    fitted = estimate(sensor, parse_scene({"crosstalk": [0.009, 0.018]}), frames, ["object_fit"])
+    for found in fitted.results:
+        assert found.parameters is not None
+        assert {entry["status"] for entry in found.parameters.values()} == {"not_identified"}
+    # what does not rest on the numbers stands
+    free = parse_scene({"crosstalk": [0.009, 0.018], "object": {"c0": 0.08, "c1": 0.05}})
+    timed = dataclasses.replace(frames, time_s=np.arange(EMPTY + 4) * 0.1)
+    left = estimate(sensor, free, timed, ["differential"]).results[0]
+    assert CONTRADICTED not in {left.reasons[i] for i in left.reason}
 
 
 @pytest.mark.parametrize(

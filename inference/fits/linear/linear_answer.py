@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
 from inference.fits.answer.model_checks import REASONS
-from inference.fits.answer.ranges import Answer, frame_ranges
+from inference.fits.answer.ranges import MISFIT, Answer, frame_ranges
 from inference.fits.answer.report import FALSE_ALARM, entries, spoiled, with_parts
-from inference.fits.answer.withheld import without_ranges
 from inference.fits.likelihood.model_error import unexplained
 from inference.fits.likelihood.problem import fit_problem
 from inference.fits.linear.follow import Follow
 from inference.fits.linear.least_squares import LinearFit
 from inference.realtime.net import SATURATED, rule_out
 from inference.technique import Task
+from inference.withheld import without_ranges
 from simulator.errors import RefusedError
 from simulator.parameters import parameters_of
 
@@ -102,7 +102,7 @@ def linear_answer(
     if report["misfit"]:
         parameters = spoiled(parameters, report)
     if missing:
-        stands = without_ranges(single) if report["misfit"] else single
+        stands = without_ranges(single, MISFIT) if report["misfit"] else single
         return dataclasses.replace(stands, technique=name, parameters=parameters, fit=report)
     report["optima"] = [
         {
