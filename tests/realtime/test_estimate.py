@@ -155,7 +155,7 @@ def test_known_crosstalk_and_gain_are_taken_off_first() -> None:
 def test_statuses_of_a_pulse() -> None:
     sensor = sensor_of("pulsed", full_scale=[10.0, 10.0])
     r0 = 14.9896229
-    readings = [[0.5, 1.0], [0.5, 0.0], [0.5, -1.0], [-1e-9, 1.0], [1.1, 1.0], [1.0, 10.0], [1, 2]]
+    readings = [[0.5, 1.0], [0.5, 0.0], [0.5, -1.0], [-1e-9, 1.0], [1.1, 1.0], [1.0, 10.0], [0, 0]]
     present = np.array([True] * 6 + [False])
     result = estimate(
         sensor, parse_scene({}), Frames(np.array(readings), object_present=present)
@@ -221,9 +221,11 @@ def test_the_end_of_a_pulse_is_a_fold() -> None:
     (result,) = estimate(PULSED, parse_scene({}), dark).results
     assert result.range_m == pytest.approx([0.75 * r0, 0.25 * r0])
     assert result.near_fold.tolist() == [True, False]
-    empty = Frames(np.ones((2, 2)), object_present=np.array([True, False]))
+    # empty frames that read nothing on average, as the scene says
+    ones = np.array([[1.0], [1.0], [-1.0]]) * np.ones(2)
+    empty = Frames(ones, object_present=np.array([True, False, False]))
     (result,) = estimate(PULSED, parse_scene({}), empty).results
-    assert result.near_fold.tolist() == [True, False]
+    assert result.near_fold.tolist() == [True, False, False]
 
 
 def test_only_a_stated_support_limits_the_roots() -> None:

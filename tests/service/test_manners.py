@@ -111,7 +111,7 @@ def test_hints(
 def test_whether_an_object_is_there_in_digits(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path
 ) -> None:
-    rows = "0.02,1.7,{}\n0.03,1.6,{}\n"
+    rows = "0.02,1.7,{}\n0.00,0.0,{}\n"
     answers = []
     for words in (("1", "0"), ("true", "False")):
         path = written(tmp_path / "f.csv", "w1,w2,object_present\n" + rows.format(*words))
