@@ -159,7 +159,7 @@ def test_ranges_that_contradicted_numbers_move_are_not_given(kind: str) -> None:
         assert {entry["status"] for entry in found.parameters.values()} == {"not_identified"}
     # what does not rest on the numbers stands
     free = parse_scene({"crosstalk": [0.009, 0.018], "object": {"c0": 0.08, "c1": 0.05}})
-    timed = dataclasses.replace(frames, time_s=np.arange(EMPTY + 4) * 0.1)
+    timed = dataclasses.replace(frames, time_s=0.1 * np.arange(EMPTY + 4, dtype=np.float64))
     left = estimate(sensor, free, timed, ["differential"]).results[0]
     assert CONTRADICTED not in {left.reasons[i] for i in left.reason}
 
