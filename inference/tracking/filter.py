@@ -14,7 +14,17 @@ from inference.tracking.empty_scene import learn_empty
 from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import COUNT, PENDING, ROUGHNESS, RUNNING, TIME, Hypotheses
 from inference.tracking.prediction import predict
-from inference.tracking.report import OUTLIER, STATUS, SURPRISE, report
+from inference.tracking.report import (
+    BEST,
+    OUTLIER,
+    POSITION,
+    PRESENT,
+    STATUS,
+    SURPRISE,
+    UNSTEADY_MEAN,
+    report,
+)
+from inference.tracking.unsteady import UNSTEADY, take_unsteady
 from inference.tracking.weighing import Model, room_for, weigh_frame, weigh_known
 from simulator.compiled import compiled
 
@@ -90,5 +100,10 @@ def run_filter(
             numbers[ROUGHNESS] += (min(own, 1.0) - numbers[ROUGHNESS]) / _LATE
         report(out, rows, i, of, rules)
         out[i, OUTLIER], out[i, SURPRISE] = outlier, numbers[RUNNING]
+        if numbers.size > UNSTEADY:
+            if kinds[i] == USABLE and outlier < 0.5 and out[i, PRESENT] > 0.5:
+                u = out[i, BEST + POSITION]
+                take_unsteady(of, 1, u, frame, times[i], model.table, rules)
+            out[i, UNSTEADY_MEAN] = numbers[UNSTEADY]
         if kinds[i] == SATURATED or kinds[i] == EMPTY_SATURATED:
             out[i, STATUS] = _SATURATED

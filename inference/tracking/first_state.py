@@ -10,6 +10,7 @@ from inference.tracking.evenness import ROUGH
 from inference.tracking.hypotheses import ANCHOR, CROSSTALK1, Hypotheses
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
+from inference.tracking.unsteady import first_unsteady
 from simulator.scene import Scene
 
 __all__ = ["first_state"]
@@ -25,6 +26,7 @@ def first_state(
     crosstalk_root: Array,
     scale: Array,
     untold: tuple[bool, bool],
+    steady: bool,
 ) -> TrackState:
     """Return the state before any frame.
 
@@ -43,6 +45,8 @@ def first_state(
         From readings to units of the read noise.
     untold : (bool, bool)
         Of which of the two readings nothing but the scene's prior tells the crosstalk.
+    steady : bool
+        Whether changes from frame to frame are held to the noise.
     """
     rows, n = settings.hypotheses + 1, 2 if crosstalk is None else 4
     x, X = np.zeros((rows, n)), np.zeros((rows, n, n + directions))
@@ -63,7 +67,10 @@ def first_state(
     weight = np.zeros(rows)
     there = settings.visit_s / (settings.visit_s + settings.absence_s)
     weight[0] = 1.0 - there
-    return TrackState(Hypotheses(x, X, weight, np.array([math.nan, there, 1.0, 0.0, 0.0, ROUGH])))
+    numbers = [math.nan, there, 1.0, 0.0, 0.0, ROUGH]
+    if steady:
+        numbers += first_unsteady(directions)
+    return TrackState(Hypotheses(x, X, weight, np.array(numbers)))
 
 
 def _moments(from_normal: Any) -> tuple[float, float]:

@@ -56,9 +56,10 @@ class Hypotheses(NamedTuple):
     x: Array
     X: Array  # (rows, n, n + p): roots of the covariances
     weight: Array  # (rows,): probabilities
-    # (6,): time of the last frame [s] (nan: none yet), probability of an object of which nothing is
-    # known yet, running surprise, number of hypotheses, whether an object that was there may be
-    # anywhere by now, and the surprise of the last frames, each cut at 1
+    # (6,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
+    # the last frame [s] (nan: none yet), probability of an object of which nothing is known yet,
+    # running surprise, number of hypotheses, whether an object that was there may be anywhere by
+    # now, and the surprise of the last frames, each cut at 1
     numbers: Array
 
 

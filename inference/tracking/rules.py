@@ -10,7 +10,7 @@ from inference.tracking.nuisance_jacobian import NuisanceJacobian
 from inference.tracking.observed import Observed
 from inference.tracking.settings import TrackingSettings
 
-__all__ = ["rules_of", "surprise_limit"]
+__all__ = ["is_felt", "rules_of", "surprise_limit", "unsteady_limit"]
 
 _BREADTH = 10.0  # of an outlier's law, in units of the noise: wider than what noise explains
 _SAME = 0.05  # nats per weight: two hypotheses merge long before any of their intervals shows it
@@ -36,7 +36,7 @@ def rules_of(
     """
     scale1, scale2 = observed.scale.tolist()
     tail = _SURPRISE_TAIL
-    if _is_felt(shared):
+    if is_felt(shared):
         tail = min(tail, 0.1 * settings.false_alarm)
     drift1, drift2 = settings.crosstalk_drift or (0.0, 0.0)
     return Rules(
@@ -57,7 +57,8 @@ def rules_of(
     )
 
 
-def _is_felt(shared: NuisanceJacobian) -> bool:
+def is_felt(shared: NuisanceJacobian) -> bool:
+    """Tell whether errors that frames share are felt beside the noise."""
     return bool(np.abs(shared.along).max(initial=0.0) > _SHARED)
 
 
@@ -81,7 +82,22 @@ def surprise_limit(
     shared : NuisanceJacobian
         What all frames err in common.
     """
-    if _is_felt(shared):
+    if is_felt(shared):
         return float(scipy.stats.chi2.isf(settings.false_alarm, channels)) / channels
     freedom = 0.5 * channels * (1.0 + rules.memory) / (1.0 - rules.memory)
+    return float(scipy.stats.gamma.isf(settings.false_alarm, freedom, scale=1.0 / freedom))
+
+
+def unsteady_limit(settings: TrackingSettings, rules: Rules) -> float:
+    """Return the running mean of changes across the curve above which noise is not as stated.
+
+    As `surprise_limit`; but neighbours share a frame, so that their squares are correlated by 1/4,
+    and the mean is as wide as that of two thirds as many.
+
+    Parameters
+    ----------
+    settings, rules : TrackingSettings, Rules
+        As for `surprise_limit`.
+    """
+    freedom = 0.5 * (1.0 + rules.memory) / (1.0 - rules.memory) / (1.0 + 0.5 * rules.memory)
     return float(scipy.stats.gamma.isf(settings.false_alarm, freedom, scale=1.0 / freedom))

@@ -26,6 +26,7 @@ from inference.tracking.report import (
     SD,
     STATUS,
     SURPRISE,
+    UNSTEADY_MEAN,
     WEIGHT,
 )
 from inference.tracking.settings import TrackingSettings
@@ -264,6 +265,7 @@ def _track(model: Tracker, out: Array, rows: Array) -> Track:
     range_m, ranges = np.exp(out[:, BEST + POSITION]), np.exp(rows[:, :, POSITION])
     sd, scene, error = (out[:, BEST + column] for column in (SD, SCENE_SD, MODEL_SD))
     added = model.added(out[:, BEST + POSITION])
+    most, unsteady = model.limits
     return Track(
         status=out[:, STATUS].astype(np.uint8),
         present=out[:, PRESENT].copy(),
@@ -279,7 +281,7 @@ def _track(model: Tracker, out: Array, rows: Array) -> Track:
         weight=out[:, BEST + WEIGHT].copy(),
         outlier=out[:, OUTLIER].copy(),
         surprise=out[:, SURPRISE].copy(),
-        misfit=out[:, SURPRISE] > model.limit,
+        misfit=(out[:, SURPRISE] > most) | (out[:, UNSTEADY_MEAN] > unsteady),
         hypotheses_m=ranges,
         hypotheses_sd_m=ranges * np.hypot(rows[:, :, SD], model.added(rows[:, :, POSITION])),
         hypotheses_weight=rows[:, :, WEIGHT].copy(),

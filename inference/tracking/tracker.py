@@ -20,10 +20,11 @@ from inference.tracking.nuisance_jacobian import crosstalk_root, nuisance_jacobi
 from inference.tracking.observed import Observed, observed_of
 from inference.tracking.places import Places
 from inference.tracking.readings_table import ReadingsTable
-from inference.tracking.rules import rules_of, surprise_limit
+from inference.tracking.rules import is_felt, rules_of, surprise_limit, unsteady_limit
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
 from inference.tracking.tabulate import empty_readings, knots_of, places_of, table_of
+from inference.tracking.unsteady import UNSTEADY
 from inference.tracking.weighing import Model
 from simulator.errors import InvalidInputError, Problem, RefusedError, listed
 from simulator.model_error import ModelError
@@ -54,8 +55,9 @@ class Tracker:
         What is read of every frame.
     model : Model
         What the kernels take.
-    limit : float
-        Running surprise above which the model does not fit.
+    limits : (float, float)
+        Running surprise, and running mean of changes across the curve, above which the model does
+        not fit.
     first : TrackState
         The state before any frame.
     added_sd : ndarray, shape (knots,), optional
@@ -70,7 +72,7 @@ class Tracker:
     settings: TrackingSettings
     observed: Observed
     model: Model
-    limit: float
+    limits: tuple[float, float]
     first: TrackState
     added_sd: Array | None = None
     crosstalk: tuple[float, float] = (0.0, 0.0)
@@ -187,6 +189,7 @@ def tracker(
         crosstalk_root(known, observed.scale),
         observed.scale,
         by_prior,
+        is_felt(jacobian) and observed.channels == 2 and not observed.by_rate,
     )
     first = dataclasses.replace(first, signature=_signature(table, places, rules, first.hypotheses))
     model = Model(table, places, rules)
@@ -194,7 +197,8 @@ def tracker(
     by_table = sd_by_table(knots, observed.by_rate)
     if by_table is not None:
         added = by_table if added is None else np.hypot(added, by_table)
-    return Tracker(sensor, settings, observed, model, limit, first, added, static)
+    limits = limit, unsteady_limit(settings, rules)
+    return Tracker(sensor, settings, observed, model, limits, first, added, static)
 
 
 def _check(sensor: Sensor, scene: Scene, settings: TrackingSettings) -> None:
@@ -249,6 +253,8 @@ def _signature(table: ReadingsTable, places: Places, rules: Rules, hypotheses: H
     """Return a digest of everything that gives a state its meaning."""
     digest = hashlib.sha256()
     shapes = np.array([*hypotheses.x.shape, *hypotheses.X.shape])
+    if hypotheses.numbers.size > UNSTEADY:
+        shapes = np.append(shapes, hypotheses.numbers.size)
     for value in _leaves((table, places, rules, shapes)):
         array = np.asarray(value)
         digest.update(str((array.shape, array.dtype.str)).encode())

@@ -1,0 +1,105 @@
+"""Whether readings jump from frame to frame by more than their noise, whatever the model errs by.
+
+An error that all frames share may be far off for as long as an object stays where it is, so that a
+surprise tells little of it. But it is smooth along the range, and what is left of the readings
+across the curve hardly changes with it from one frame to the next: that changes by noise. Noise
+that is stated too small shows at once, beside any error of the model or of the scene.
+
+docs/model.md, unsteady, has the statistic.
+"""
+
+import math
+
+from inference.tracking.borrowed import borrowed
+from inference.tracking.frame_density import TrackedFrame
+from inference.tracking.hypotheses import CROSSTALK1, CROSSTALK2, Hypotheses, learns_crosstalk
+from inference.tracking.motion import Rules
+from inference.tracking.readings_table import (
+    ReadingsTable,
+    cell_of,
+    mean_at,
+    noise_root,
+    nuisance_at,
+    nuisance_count,
+    object_at,
+)
+from inference.tracking.roots import UNIT
+from simulator.compiled import compiled
+
+__all__ = ["UNSTEADY", "first_unsteady", "take_unsteady"]
+
+# places in `Hypotheses.numbers` behind its own, only where errors that frames share are felt: the
+# running mean, and of the last frame its time, what is left of its two readings, the direction
+# across the curve (nan: there was none), and what every nuisance parameter does along that
+UNSTEADY, _TIME, _LEFT1, _LEFT2, _ACROSS1, _ACROSS2, _SHARED = range(6, 13)
+# standard deviations that an error which frames share may be off by: beyond it one in a million is
+_ALLOWED = 5.0
+_MOST = 15.1  # squared change at which a single frame is cut: noise exceeds it once in 10,000
+
+
+def first_unsteady(nuisance: int) -> list[float]:
+    """Return these numbers before any frame, of so many nuisance parameters."""
+    return [1.0] + [math.nan] * (_SHARED - _TIME + nuisance)
+
+
+@borrowed
+@compiled
+def take_unsteady(
+    of: Hypotheses,
+    row: int,
+    u: float,
+    frame: TrackedFrame,
+    time: float,
+    table: ReadingsTable,
+    rules: Rules,
+) -> None:
+    """Take a frame into the running mean of changes across the curve.
+
+    Parameters
+    ----------
+    of, row : Hypotheses, int
+        The state, and the hypothesis whose crosstalk is taken; the numbers are changed in place.
+    u : float
+        log r of the frame.
+    frame, time : TrackedFrame, float
+        The frame and when it was [s].
+    table, rules : ReadingsTable, Rules
+        Scene, sensor and rules.
+    """
+    numbers, gain = of.numbers, frame.gain
+    value1, value2, slope1, slope2 = mean_at(u, table)
+    left1, left2 = frame.first - gain * value1, frame.second - gain * value2
+    known1, known2 = table.crosstalk1, table.crosstalk2
+    if learns_crosstalk(of):
+        known1, known2 = known1 + of.x[row, CROSSTALK1], known2 + of.x[row, CROSSTALK2]
+    noise = UNIT
+    if not table.noise.plain:
+        o1, o2 = object_at(u, table)
+        m1, m2 = gain * value1 + known1, gain * value2 + known2
+        noise = noise_root(m1, m2, gain * o1, gain * o2, table.noise)
+    # across the curve, in units of the noise there
+    along, beside = noise.r21 * slope1 - noise.r11 * slope2, noise.r22 * slope1
+    size = math.sqrt(along * along + beside * beside)
+    if not size > 0.0:
+        return
+    across1, across2 = -slope2 / size, slope1 / size
+    i, part = cell_of(u, table)
+    turn1, turn2 = across1 - numbers[_ACROSS1], across2 - numbers[_ACROSS2]
+    shared = 0.0
+    for j in range(nuisance_count(table)):
+        g1, g2 = nuisance_at(i, part, j, table)
+        new = gain * (across1 * g1 + across2 * g2)
+        shared += (new - numbers[_SHARED + j]) ** 2
+        numbers[_SHARED + j] = new
+    seconds = time - numbers[_TIME]
+    drift1, drift2 = rules.drift1 * across1, rules.drift2 * across2
+    variance = 2.0 + _ALLOWED * _ALLOWED * shared + seconds * (drift1 * drift1 + drift2 * drift2)
+    change = across1 * left1 + across2 * left2
+    change -= numbers[_ACROSS1] * numbers[_LEFT1] + numbers[_ACROSS2] * numbers[_LEFT2]
+    # the crosstalk that is taken from both is the same
+    change -= turn1 * known1 + turn2 * known2
+    if not math.isnan(change):
+        own = min(change * change / variance, _MOST)
+        numbers[UNSTEADY] += (1.0 - rules.memory) * (own - numbers[UNSTEADY])
+    numbers[_TIME], numbers[_LEFT1], numbers[_LEFT2] = time, left1, left2
+    numbers[_ACROSS1], numbers[_ACROSS2] = across1, across2

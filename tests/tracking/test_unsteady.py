@@ -1,0 +1,82 @@
+"""Noise that is stated too small is said, whatever the model may err by."""
+
+import numpy as np
+import pytest
+import scipy
+from numpy.typing import NDArray
+
+from inference.tracking.hypotheses import WITHOUT_CROSSTALK
+from inference.tracking.track import Track, step, track
+from inference.tracking.tracker import tracker
+from inference.tracking.unsteady import UNSTEADY
+from simulator.parameters import parameters_of
+from simulator.scene import parse_scene
+from simulator.simulate import mean_readings
+from tests.posterior.scenes import KINDS
+from tests.tracking.scenes import PLATE, frames_of, sensor_of
+
+Array = NDArray[np.float64]
+
+FRAMES, STEP_S, NOISE = 240, 1 / 30, 8e-4
+
+
+def readings_of(kind: str, more: float, seed: int) -> tuple[Array, Array]:
+    """Return readings of a plate that swings, with so many times the noise, and their ranges."""
+    sensor, scene = sensor_of(NOISE, kind), parse_scene({**PLATE, "discrepancy": 0})
+    ranges = 0.5 * np.exp(0.5 * np.sin(STEP_S * np.arange(FRAMES)))
+    terms = parameters_of(sensor, scene).terms(np.zeros((1, 0)))
+    noise = more * NOISE * np.random.default_rng(seed).standard_normal((FRAMES, 2))
+    return mean_readings(sensor, terms, ranges) + noise, ranges
+
+
+def tracked(kind: str, more: float, seed: int = 1) -> Track:
+    readings, _ = readings_of(kind, more, seed)
+    return track(sensor_of(NOISE, kind), parse_scene(PLATE), frames_of(readings, STEP_S))
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_noise_that_is_stated_three_times_too_small_is_said_within_three_seconds(kind: str) -> None:
+    said = tracked(kind, 3.0).misfit
+    assert said.any()
+    assert np.argmax(said) * STEP_S < 3.0
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_noise_that_is_as_stated_is_no_misfit(kind: str) -> None:
+    # one frame in a million: 2 x 240 frames, 5e-4 at most
+    assert not tracked(kind, 1.0).misfit.any()
+
+
+def test_the_running_mean_is_at_most_one_and_as_wide_as_its_law() -> None:
+    # the sum of 240 squared differences of neighbours: variance 2 (1 + 2/4) a square
+    model = tracker(sensor_of(NOISE), parse_scene(PLATE))
+    assert model.first.hypotheses.numbers.size > UNSTEADY
+    memory = model.model.rules.memory
+    state, means = model.first, []
+    frames = frames_of(readings_of("pulsed", 1.0, 5)[0], STEP_S)
+    for i in range(FRAMES):
+        state, _ = step(model, state, frames.select(slice(i, i + 1)))
+        means.append(state.hypotheses.numbers[UNSTEADY])
+    squares = (np.diff([1.0, *means]) / (1.0 - memory) + [1.0, *means[:-1]])[1:]
+    sd = np.sqrt(3.0 / len(squares))
+    # 1 in 10,000 seeds of a mean of 1; what a shared error may add makes it less
+    assert 1.0 - 0.3 - 3.7 * sd < squares.mean() < 1.0 + 3.7 * sd
+    limit = model.limits[1]
+    freedom = 1.0 / (2.0 * 1.5 * (1.0 - memory) / (1.0 + memory))
+    assert limit == pytest.approx(scipy.stats.gamma.isf(1e-6, freedom, scale=1 / freedom), rel=0.02)
+
+
+def test_an_exact_model_remembers_nothing_of_it() -> None:
+    model = tracker(sensor_of(NOISE), parse_scene({**PLATE, "discrepancy": 0}))
+    assert model.first.hypotheses.numbers.size == UNSTEADY
+    assert model.first.hypotheses.X.shape[1:] == (WITHOUT_CROSSTALK, WITHOUT_CROSSTALK)
+
+
+def test_a_stream_may_be_cut_anywhere() -> None:
+    readings, _ = readings_of("pulsed", 3.0, 2)
+    model = tracker(sensor_of(NOISE), parse_scene(PLATE))
+    frames = frames_of(readings[:60], STEP_S)
+    _, whole = step(model, model.first, frames)
+    state, first = step(model, model.first, frames.select(slice(0, 23)))
+    _, second = step(model, state, frames.select(slice(23, 60)))
+    np.testing.assert_array_equal(whole.misfit, [*first.misfit, *second.misfit])
