@@ -22,7 +22,7 @@ class Effort:
     alone : int
         Frames that come one by one, for the quantiles of their time.
     sets : int
-        Data sets of a fit over many frames.
+        Data sets of a fit over many frames, two at least: of the last the memory is measured.
     steps : tuple of int
         Frames of a sweep whose derivatives are formed; of short ones many are measured.
     frames : tuple of int

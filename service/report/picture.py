@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from service.report.labels import SIZE, Labels, place_all
 from service.report.light import LIGHT
 from service.report.row import Row
 from service.report.run import Report
@@ -27,13 +28,7 @@ _COLOURS = {
     "light": "#333333",
 }
 _GREY = "#777777"
-_SIZE = 8.0  # of labels, in points
-# where a label may stand about its point, in points: tried one after the other
-_PLACES = [
-    (x, y)
-    for y in (0, 9, -9, 18, -18, 27, -27, 36, -36, 48, -48)
-    for x in ((7, "left"), (-7, "right"))
-]
+_SVG_DPI = 72  # that of a picture that is placed at another is laid out twice
 _SUMMARY = ("Bare object", "Unknown crosstalk", "Known wall behind", "Through the fold")
 
 
@@ -66,7 +61,8 @@ def _along(x: Sequence[float], y: Sequence[float]) -> list[tuple[float, float]]:
     return found
 
 
-def _panel(axes: Axes, rows: Sequence[Row], least: float | None, division: float) -> None:
+def _panel(axes: Axes, rows: Sequence[Row], least: float | None, division: float) -> Labels:
+    """Draw a scene; its labels are placed when all panels of the figure are there."""
     labels: list[tuple[float, float, str, str]] = []
     points: list[tuple[float, float]] = []
     for (family, method, told), curve in _curves(rows).items():
@@ -96,7 +92,7 @@ def _panel(axes: Axes, rows: Sequence[Row], least: float | None, division: float
             (4, -10),
             textcoords="offset points",
             color=_GREY,
-            fontsize=_SIZE,
+            fontsize=SIZE,
         )
     axes.axvline(division, color=_GREY, lw=1, ls="--")
     axes.annotate(
@@ -107,70 +103,17 @@ def _panel(axes: Axes, rows: Sequence[Row], least: float | None, division: float
         va="top",
         rotation=90,
         color=_GREY,
-        fontsize=_SIZE,
+        fontsize=SIZE,
     )
     axes.grid(alpha=0.25)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
-    _place(axes, labels, points, least)
-
-
-def _place(
-    axes: Axes,
-    labels: list[tuple[float, float, str, str]],
-    points: list[tuple[float, float]],
-    line: float | None = None,
-) -> None:
-    """Put every label beside its point where it covers neither a point, label nor the line."""
-    figure = axes.get_figure()
-    if figure is None:
-        return
-    figure.draw_without_rendering()  # type: ignore[union-attr]
-    per_point = figure.dpi / 72.0
-    transform = axes.transData.transform
-    taken = [(x - 4, y - 4, x + 4, y + 4) for x, y in map(transform, points)]
-    frame = axes.get_window_extent()
-    if line:
-        height = transform((1.0, line))[1]
-        taken.append((frame.x0, height - 1, frame.x1, height + 1))
-    for x, y, text, colour in sorted(labels, key=lambda label: label[1]):
-        px, py = transform((x, y))
-        width, height = 0.56 * _SIZE * len(text) * per_point, 1.15 * _SIZE * per_point
-        best = None
-        for (dx, side), dy in _PLACES:
-            left = px + dx * per_point - (width if side == "right" else 0)
-            low = py + dy * per_point - height / 2
-            box = (left, low, left + width, low + height)
-            inside = box[0] > frame.x0 + 14 and box[2] < frame.x1 + 30 * per_point
-            hit = sum(
-                box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in taken
-            )
-            cost = (0 if inside else 5) + hit
-            if best is None or cost < best[0]:
-                best = (cost, dx, dy, side, box)
-            if cost == 0:
-                break
-        if best is None:
-            continue
-        _, dx, dy, side, box = best
-        taken.append(box)
-        axes.annotate(
-            text,
-            (x, y),
-            (dx, dy),
-            textcoords="offset points",
-            ha=side,
-            va="center",
-            color=colour,
-            fontsize=_SIZE,
-            bbox={"facecolor": "white", "alpha": 0.7, "lw": 0, "pad": 0.3},
-            arrowprops={"arrowstyle": "-", "color": colour, "lw": 0.5} if abs(dy) > 10 else None,
-        )
+    return Labels(axes, labels, points, least)
 
 
 def draw_scene(report: Report, scene: str) -> Figure:
     """Draw error against time a frame of one scene, each method a curve over its own knob."""
-    figure = Figure(figsize=(8.6, 4.6), layout="constrained")
+    figure = Figure(figsize=(8.6, 4.6), layout="constrained", dpi=_SVG_DPI)
     axes = figure.subplots()
     axes.set(
         xlabel="processor time a frame [s]",
@@ -180,7 +123,8 @@ def draw_scene(report: Report, scene: str) -> Figure:
         axes.set(
             xlabel="processor time a distance [s]", ylabel="median error of the light, relative"
         )
-    _panel(axes, report.of(scene), report.least_errors.get(scene), report.division_s)
+    panel = _panel(axes, report.of(scene), report.least_errors.get(scene), report.division_s)
+    place_all(figure, [panel])
     return figure
 
 
@@ -194,8 +138,11 @@ def draw_summary(report: Report, path: Path) -> None:
     for axes, name in zip(panels, names, strict=False):
         axes.set_title(name, fontsize=11, loc="left")
         axes.set(xlabel="processor time a frame [s]", ylabel="median relative error")
-    for axes, name in zip(panels, names, strict=False):
+    drawn = [
         _panel(axes, report.of(name), report.least_errors.get(name), report.division_s)
+        for axes, name in zip(panels, names, strict=False)
+    ]
+    place_all(figure, drawn)
     figure.savefig(path, pil_kwargs={"optimize": True})
 
 
@@ -221,16 +168,18 @@ def draw_snr(report: Report, ratios: Mapping[str, Mapping[str, float]]) -> Figur
     measured = {title: names for title, names in measured.items() if len(names) > 1}
     if not measured:
         return None
-    figure = Figure(figsize=(8.6, 4.6 * len(measured)), layout="constrained")
+    figure = Figure(figsize=(8.6, 4.6 * len(measured)), layout="constrained", dpi=_SVG_DPI)
     panels = figure.subplots(len(measured), squeeze=False)[:, 0]
+    drawn = []
     for axes, (title, names) in zip(panels, measured.items(), strict=True):
         axes.set_title(title, fontsize=11, loc="left")
         axes.set(xlabel="signal-to-noise ratio at 1 m", ylabel="median relative error")
-        _snr_panel(axes, report, {name: ratios[title][name] for name in names})
+        drawn.append(_snr_panel(axes, report, {name: ratios[title][name] for name in names}))
+    place_all(figure, drawn)
     return figure
 
 
-def _snr_panel(axes: Axes, report: Report, ratios: Mapping[str, float]) -> None:
+def _snr_panel(axes: Axes, report: Report, ratios: Mapping[str, float]) -> Labels:
     """Draw the best of each method at each ratio, and the least error."""
     found: dict[tuple[str, str], dict[float, float]] = {}
     for name, ratio in ratios.items():
@@ -247,12 +196,12 @@ def _snr_panel(axes: Axes, report: Report, ratios: Mapping[str, float]) -> None:
     axes.loglog(list(ratios.values()), least, "--", color=_GREY, lw=1)
     axes.set_xlim(None, max(ratios.values()) * 300)
     axes.grid(alpha=0.25)
-    _place(axes, labels, points)
+    return Labels(axes, labels, points)
 
 
 def draw_terms(terms: Sequence[TermCost]) -> Figure:
     """Draw what each term costs, beside the object alone."""
-    figure = Figure(figsize=(10, 3.6), layout="constrained")
+    figure = Figure(figsize=(10, 3.6), layout="constrained", dpi=_SVG_DPI)
     panels = figure.subplots(1, 3, sharey=True)
     names = [term.term for term in terms]
     columns = (
@@ -262,12 +211,12 @@ def draw_terms(terms: Sequence[TermCost]) -> Figure:
     )
     for axes, (title, values, form) in zip(panels, columns, strict=True):
         bars = axes.barh(names, values, color="#0072b2", alpha=0.8)
-        axes.bar_label(bars, [form.format(v) for v in values], padding=3, fontsize=_SIZE)
+        axes.bar_label(bars, [form.format(v) for v in values], padding=3, fontsize=SIZE)
         axes.axvline(values[0], color=_GREY, lw=1, ls="--")
         axes.set_xlim(0, 1.25 * max(values))
         axes.xaxis.set_major_locator(MaxNLocator(3))
         axes.set_title(title, fontsize=10, loc="left")
-        axes.tick_params(labelsize=_SIZE)
+        axes.tick_params(labelsize=SIZE)
         for side in ("top", "right"):
             axes.spines[side].set_visible(False)
     panels[0].invert_yaxis()  # of all, which share it
