@@ -4,24 +4,51 @@ A reading that does not move much is more likely where it hardly could, on the f
 curve. Of motion as rough as stated that is evidence, anew in every frame. Of smoother motion all
 branches predict every frame far better than they claim, and the same ratio of slopes would be
 counted a hundred times: the flatter branch would be sure, and wrong as often as not.
+
+So would an empty scene whose crosstalk is still to be learnt. Light that stays as it is may be
+crosstalk, or crosstalk and an object at rest. By the motion that is stated the latter is less
+likely with every frame, though none of them tells the two apart.
 """
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from inference.tracking.borrowed import borrowed
 from inference.tracking.candidates import TrackCandidates
 from inference.tracking.frame_density import Prior, TrackedFrame, log_density
+from inference.tracking.hypotheses import (
+    CROSSTALK1,
+    CROSSTALK2,
+    Hypotheses,
+    learns_crosstalk,
+    variance_of,
+)
 from inference.tracking.readings_table import ReadingsTable
 from inference.tracking.roots import UNIT, add_root
 from simulator.compiled import compiled
 
-__all__ = ["ROUGH", "counted_widths", "even_out", "log_total", "take_width"]
+__all__ = [
+    "ROUGH",
+    "counted_widths",
+    "even_out",
+    "hides",
+    "let_rest",
+    "log_at_rest",
+    "log_total",
+    "take_width",
+]
+Array = NDArray[np.float64]
 
 ROUGH = 0.15
 """Surprise of late from which on motion counts as rough as stated; no frame counts above 1.
 
 Of such motion the mean is 0.52, and over the last four frames below this in about one of a hundred.
 """
+
+_HIDDEN = 10.0  # variance of a reading by crosstalk, in that of the noise: light may be of either
+_LOG_RESTING = math.log(0.25)  # least weight of an object that may rest, against the empty scene's
 
 
 @compiled
@@ -41,6 +68,42 @@ def log_total(of: TrackCandidates, first: int, last: int) -> float:
     for j in range(first, last):
         total += math.exp(of.log_mass[j] - best)
     return best + math.log(total)
+
+
+@compiled
+def hides(of: Hypotheses, row: int) -> bool:
+    """Tell whether crosstalk is so little known that a hypothesis's light may be either's."""
+    if not learns_crosstalk(of):
+        return False
+    return max(variance_of(of, row, CROSSTALK1), variance_of(of, row, CROSSTALK2)) > _HIDDEN
+
+
+@borrowed
+@compiled
+def log_at_rest(
+    of: TrackCandidates,
+    first: int,
+    last: int,
+    frame: TrackedFrame,
+    prior: Prior,
+    table: ReadingsTable,
+) -> float:
+    """Return the log mass that the candidates of one hypothesis had, were there no motion.
+
+    Parameters
+    ----------
+    of, first, last : TrackCandidates, int, int
+        The list, and the hypothesis's part of it.
+    frame, prior, table
+        As for `log_density`.
+    """
+    top = -math.inf
+    for j in range(first, last):
+        top = max(top, log_density(of.mode[j], frame, prior, table))
+    flat = -0.5 * math.log(prior.position.precision) + 0.5 * math.log(2.0 * math.pi)
+    # what the crosstalk and nuisance parameters add is part of the prediction's width too
+    root = add_root(UNIT, prior.added.root)
+    return top + flat + math.log(root.r11 * root.r22)
 
 
 @borrowed
@@ -68,15 +131,10 @@ def take_width(
     frame, prior, table
         As for `log_density`.
     """
-    top = -math.inf
-    for j in range(first, last):
-        top = max(top, log_density(of.mode[j], frame, prior, table))
-    if top == -math.inf:
+    rest = log_at_rest(of, first, last, frame, prior, table)
+    if rest == -math.inf:
         return
-    flat = -0.5 * math.log(prior.position.precision) + 0.5 * math.log(2.0 * math.pi)
-    # what the crosstalk and nuisance parameters add is part of the prediction's width too
-    root = add_root(UNIT, prior.added.root)
-    width = log_total(of, first, last) - top - flat - math.log(root.r11 * root.r22)
+    width = log_total(of, first, last) - rest
     for j in range(first, last):
         of.log_mass[j] -= (1.0 - counted) * width
 
@@ -89,3 +147,41 @@ def even_out(of: TrackCandidates, last: int, log_before: float) -> None:
     if math.isfinite(change):
         for j in range(last):
             of.log_mass[j] += change
+
+
+@borrowed
+@compiled
+def let_rest(
+    of: TrackCandidates, last: int, at_rest: Array, highest: float, log_empty: float
+) -> None:
+    """Keep objects that may rest beside an empty scene that explains the frame no better.
+
+    Parameters
+    ----------
+    of, last : TrackCandidates, int
+        The list; masses of those that are kept grow.
+    at_rest : ndarray, shape (hypotheses + 1,)
+        For every hypothesis that the crosstalk hides its log mass, were there no motion and its
+        density at best 1.
+    highest : float
+        Log of what that density is at best.
+    log_empty : float
+        Log mass of the empty scene.
+    """
+    best, total = -math.inf, 0.0
+    for h in range(at_rest.size):
+        best = max(best, at_rest[h])
+    if best == -math.inf:
+        return
+    for h in range(at_rest.size):
+        total += math.exp(at_rest[h] - best)
+    log_rest = highest + best + math.log(total)
+    change = min(log_empty + _LOG_RESTING - log_rest, 0.0)
+    # the heaviest candidate of a hypothesis takes what all of it would have
+    for h in range(at_rest.size):
+        top = -1
+        for j in range(last):
+            if of.parent[j] == h and (top < 0 or of.log_mass[j] > of.log_mass[top]):
+                top = j
+        if top >= 0:
+            of.log_mass[top] = max(of.log_mass[top], highest + at_rest[h] + change)

@@ -8,6 +8,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inference.tracking.borrowed import borrowed
 from inference.tracking.candidates import (
@@ -22,7 +23,15 @@ from inference.tracking.candidates import (
     take,
 )
 from inference.tracking.empty_scene import NEVER, Empty, learn_empty, weigh_empty
-from inference.tracking.evenness import counted_widths, even_out, log_total, take_width
+from inference.tracking.evenness import (
+    counted_widths,
+    even_out,
+    hides,
+    let_rest,
+    log_at_rest,
+    log_total,
+    take_width,
+)
 from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import (
     COUNT,
@@ -48,6 +57,8 @@ from simulator.compiled import compiled
 __all__ = ["Model", "Room", "room_for", "weigh_frame", "weigh_known"]
 
 
+Array = NDArray[np.float64]
+
 _SPARE = 5  # times as many hypotheses may be made by a frame as are kept after it
 
 
@@ -66,6 +77,7 @@ class Room(NamedTuple):
     candidates: TrackCandidates  # modes that were found
     scanned: Scanned  # where they were looked for
     scratch: Scratch  # for learning
+    at_rest: Array  # log masses of hypotheses, were there no motion
 
 
 class Kept(NamedTuple):
@@ -89,25 +101,36 @@ def room_for(of: Hypotheses, places: Places) -> Room:
         np.zeros(of.numbers.size),
     )
     candidates = candidates_for(2 * _SPARE * capacity)
-    return Room(after, candidates, scanned_for(places.scan), scratch_for(of))
+    return Room(after, candidates, scanned_for(places.scan), scratch_for(of), np.zeros(capacity))
 
 
 @compiled
-def _of_followed(frame: TrackedFrame, of: Hypotheses, model: Model, room: Room) -> int:
+def _of_followed(
+    frame: TrackedFrame, of: Hypotheses, model: Model, room: Room, empty: Empty
+) -> int:
     """List the modes of the frame under every hypothesis; their number."""
     log_usual = math.log1p(-model.rules.outlier)
     table, scan = model.table, model.places.scan
     candidates, followed = room.candidates, int(of.numbers[COUNT])
     counted = counted_widths(of.numbers[ROUGHNESS])
     found, log_before = 0, -math.inf
+    at_rest = room.at_rest
+    for h in range(at_rest.size):
+        at_rest[h] = -math.inf
     for h in range(1, followed + 1):
         old, log_weight = found, log_of(of.weight[h])
         prior = prior_of(of, h, frame.gain, log_weight + log_usual, table)
         found = find_candidates(candidates, found, h, frame, prior, table, scan, room.scanned)
+        if hides(of, h) and found > old:
+            at_rest[h] = log_at_rest(candidates, old, found, frame, prior, table)
         if followed > 1 and counted < 1.0 and found > old:
             log_before = np.logaddexp(log_before, log_total(candidates, old, found))
             take_width(candidates, old, found, counted, frame, prior, table)
     even_out(candidates, found, log_before)
+    if learns_crosstalk(of) and not frame.known_rate > 0.0:
+        # a density is as high at best as that of the empty scene, whose readings these would be
+        highest = empty.usual + 0.5 * empty.surprise - log_of(of.weight[0]) - log_usual
+        let_rest(candidates, found, at_rest, highest, empty.usual)
     return found
 
 
@@ -255,8 +278,8 @@ def weigh_frame(
         squared under the heaviest explanation.
     """
     rules, candidates = model.rules, room.candidates
-    found = _of_followed(frame, of, model, room)
     empty = weigh_empty(frame, of, model.table, model.places.empty, rules, room.scratch)
+    found = _of_followed(frame, of, model, room, empty)
     best = max(empty.usual, empty.odd, empty.odd_born)
     best = log_mass_of(candidates, 0, found, best)
     # what is too light to be looked for is kept at an upper bound of its weight until it is not

@@ -132,6 +132,30 @@ def test_an_object_far_slower_than_stated_is_followed_by_few_hypotheses_as_by_ma
         assert np.ptp(best) < 0.1
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_an_object_at_rest_from_the_first_frame_is_not_taken_for_crosstalk(seed: int) -> None:
+    """Nothing tells them apart until it moves; then its ranges are right.
+
+    The least of 4 x 200 errors beyond 4.9 standard deviations has a chance of 1e-3.
+    """
+    rng = np.random.default_rng(seed)
+    path = 0.8 * np.exp(0.5 * np.sin(0.8 * np.maximum(STEP * np.arange(350) - 3.0, 0.0)))
+    truth = np.array([0.05, 0.1])
+    scene = parse_scene(scene_of(0.5))
+    moves = TrackingSettings(rate_sd=1.0)
+    answer = track(SENSOR, scene, frames_at(path, truth, rng), moves)
+    assert 0.1 < answer.present[149] < 0.9
+    assert answer.crosstalk is not None
+    assert answer.crosstalk_sd is not None
+    for frame in (50, 149):
+        off = (answer.crosstalk[frame] - truth) / answer.crosstalk_sd[frame]
+        assert np.abs(off).max() < 10.0  # a mixture of the two, far from normal
+    z = (answer.range_m - path)[150:] / answer.sd_m[150:]
+    assert np.isfinite(z).mean() > 0.8
+    assert np.nanmax(np.abs(z)) < 4.9
+    assert not answer.misfit.any()
+
+
 @pytest.mark.parametrize("motion", ["static", "radial"])
 def test_frames_of_an_object_at_rest_do_not_tell_range_from_crosstalk(motion: str) -> None:
     """The exact posterior of the one range, on a grid, does not get narrower than a percent."""
