@@ -1,6 +1,7 @@
 """What an answer supposes without a check, and what looks like a mistake in what is stated."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK, taken_for_crosstalk
 from simulator.frames import Frames
@@ -21,6 +22,12 @@ _TEMPERATURE = (
 # unambiguous ranges that a sensor of this kind may have [m]: it ends neither where scenes begin by
 # default nor beyond a horizon
 _SHORTEST, _LONGEST = 2e-2, 1e5
+# temperatures at which no sensor is run [K]
+_COLDEST_K, _HOTTEST_K = 200.0, 500.0
+_TIMES = (
+    "time_s does not increase from frame to frame: frames may be out of order, or of two logs; "
+    "what asks for derivatives refuses them"
+)
 
 
 def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, ...]:
@@ -40,11 +47,26 @@ def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, .
     supposed = (_OWN_SHADOW,) if scene.shadow_is_object else ()
     if sensor.temperature is None and frames.temperature_k is not None:
         supposed = (*supposed, _TEMPERATURE)
+    if frames.temperature_k is not None and (doubt := _doubtful_temperature(frames.temperature_k)):
+        supposed = (*supposed, doubt)
+    if frames.time_s is not None and bool((np.diff(frames.time_s) <= 0).any()):
+        supposed = (*supposed, _TIMES)
     if taken_for_crosstalk(scene, frames):
         supposed = (*supposed, TAKEN_FOR_CROSSTALK)
     if doubt := doubtful_unit(sensor):
         supposed = (*supposed, doubt)
     return supposed
+
+
+def _doubtful_temperature(temperature_k: NDArray[np.float64]) -> str | None:
+    """Return the doubt whether temperatures are in kelvin, None without one."""
+    odd = np.flatnonzero((temperature_k < _COLDEST_K) | (temperature_k > _HOTTEST_K))
+    if not odd.size:
+        return None
+    return (
+        f"temperature_k is {temperature_k[odd[0]]:g} in frame {int(odd[0])}: is it in kelvin? "
+        "25 degrees Celsius are 298.15"
+    )
 
 
 def doubtful_unit(sensor: Sensor) -> str | None:

@@ -179,7 +179,8 @@ def _refuse_mixed(header: Sequence[str], rows: Sequence[Row]) -> None:
         return
     at = header.index("object_present")
     said = {row.cells[at].strip().lower() for row in rows if not row.reason}
-    if said & {"1", "0"} and said & {"true", "false"}:
+    # a word that is neither is named in its row
+    if said <= {"1", "0", "true", "false"} and said & {"1", "0"} and said & {"true", "false"}:
         raise InvalidInputError.at(
             "/object_present", "mixes 1 and 0 with true and false: write all rows in one form"
         )

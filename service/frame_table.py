@@ -146,13 +146,25 @@ def _take(
         if value is None:
             must = _TRUE_OR_FALSE if name == "object_present" else "a finite number"
             said = cell.strip() if isinstance(cell, str) else cell
-            return BadRow(index, row.line, name, f"must be {must}, is {repr(said)[:42]}")
+            hint = _comma(said)
+            return BadRow(index, row.line, name, f"must be {must}, is {repr(said)[:42]}{hint}")
         if name == "gain" and value <= 0:
             return BadRow(index, row.line, name, f"must be above 0, is {value:g}")
         values.append(None if math.isnan(value) else value)
     for (_, name), value in zip(wanted, values, strict=True):
         columns[name].append(value)
     return None
+
+
+def _comma(said: object) -> str:
+    """Return what to do about a decimal comma; nothing of any other cell."""
+    if not isinstance(said, str) or said.count(",") != 1:
+        return ""
+    try:
+        float(said.replace(",", "."))
+    except ValueError:
+        return ""
+    return ": write a point for the decimal comma"
 
 
 def value_of_json(name: str, value: Any) -> float | bool | None:

@@ -19,9 +19,9 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
         _run,
         brief="serve over HTTP until SIGTERM",
         description="Serve over HTTP. Posteriors are kept in an SQLite file in the user's state "
-        "folder, or where HYBRIDTOF_DATABASE says. Beyond loopback it needs HYBRIDTOF_API_KEYS, a "
-        "file that hybridtof keys makes, and HYBRIDTOF_ALLOWED_HOSTS, its names there. Other "
-        "environment variables are optional: "
+        "folder, or where HYBRIDTOF_DATABASE says (sqlite:////srv/jobs.sqlite). "
+        "Beyond loopback it needs HYBRIDTOF_API_KEYS, a file that hybridtof keys makes, and "
+        "HYBRIDTOF_ALLOWED_HOSTS, its names there. Other environment variables are optional: "
         "HYBRIDTOF_EXECUTOR, HYBRIDTOF_WORKERS, HYBRIDTOF_THREADS, HYBRIDTOF_MAX_BODY_BYTES, "
         "HYBRIDTOF_MAX_JOBS, HYBRIDTOF_MAX_DRAWS_BYTES, HYBRIDTOF_KEEP_DAYS, "
         "HYBRIDTOF_WARM, HYBRIDTOF_SHUTDOWN_S.",

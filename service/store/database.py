@@ -45,7 +45,9 @@ def _checked(text: str) -> sa.URL:
         url = sa.make_url(text)
     except ArgumentError:
         raise InvalidInputError.at(
-            _POINTER, "is no address of a database, such as sqlite:////srv/jobs.sqlite"
+            _POINTER,
+            "is no address of a database: write sqlite:////srv/jobs.sqlite (sqlite:/// and the "
+            "path of the file) or postgresql://...",
         ) from None
     kind = url.get_backend_name()
     if kind == "sqlite":

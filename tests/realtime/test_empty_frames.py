@@ -180,3 +180,25 @@ def test_units_that_cannot_be_meant_are_doubted(sensor: dict[str, Any], words: s
     found = estimate(parsed, parse_scene({}), Frames(np.array([[0.1, 0.4]]))).assumptions
     assert len(found) == (words is not None)
     assert all(words is not None and text.startswith(words) for text in found)
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [
+        ({"temperature_k": [25.0, 298.15]}, "temperature_k is 25 in frame 0: is it in kelvin"),
+        ({"temperature_k": [200.0, 500.0]}, None),
+        ({"time_s": [0.1, 0.1]}, "time_s does not increase"),
+        ({"time_s": [0.1, 0.2]}, None),
+    ],
+)
+def test_columns_that_cannot_be_meant_are_doubted(
+    columns: dict[str, list[float]], words: str | None
+) -> None:
+    sensor = {**KINDS["pulsed"], "noise": {"read": list(READ)}}
+    parsed = parse_sensor(sensor | {"temperature": {"gain_drift_per_k": 0.0}})
+    frames = Frames(
+        np.array([[0.1, 0.4]] * 2), **{name: np.array(cells) for name, cells in columns.items()}
+    )
+    found = estimate(parsed, parse_scene({}), frames).assumptions
+    assert [text for text in found if words and text.startswith(words)] == list(found)
+    assert bool(found) == (words is not None)

@@ -123,6 +123,13 @@ def test_whether_an_object_is_there_in_digits(
     said = Said(capsys, "estimate", path, "--scene", scene)
     assert said.code == 2
     assert "#/object_present: mixes 1 and 0 with true and false" in said.err
+    rows += "0.02,1.7,0\n"
+    path = written(tmp_path / "f.csv", "w1,w2,object_present\n" + rows.format("yes", "TRUE"))
+    said = Said(capsys, "infer", path, "--scene", scene)
+    assert "object_present must be true or false (in a CSV also 1 or 0), is 'yes'" in said.err
+    comma = written(tmp_path / "c.csv", 'w1,w2\n"0,02",1.7\n')
+    said = Said(capsys, "infer", comma, "--scene", scene)
+    assert "write a point for the decimal comma" in said.err
     path = written(tmp_path / "f.csv", "w1,w2,object_present\n" + rows.format("1", "2"))
     said = Said(capsys, "estimate", path, "--scene", scene)
     assert "object_present must be true or false (in a CSV also 1 or 0), is '2'" in said.err
