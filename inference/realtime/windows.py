@@ -11,7 +11,7 @@ three to five, to within a sixth for N from 2 to 4 (docs/model.md, window). So t
 from readings alone, and stated as a part of the covariance, in the direction in which it points.
 Of all half widths m that is taken whose direction has the least noise and bias together; a window
 whose direction does not agree with those of narrower ones ends the search, whatever it says of
-itself.
+itself, and so does one that is bias for the most part.
 """
 
 import math
@@ -33,6 +33,7 @@ _NODES = 5
 # standard deviations. At 2 one of some sixty pairs of windows disagreed by chance in many frames,
 # and left the narrower one where it was off: 90 % intervals held 80 % of 2,500 frames of a sweep
 _AGREEMENT = 3.0
+_MOST = 0.5  # of a derivative, above which its bias leaves nothing of it
 _END = 8  # frames from an end, where windows to one side are better than none
 _BENDS = 3.0  # 2 (N + 3) / (N + 1) is 3.3 to 2.8 of a power law of N = 2 to 4
 # 3! 3! / 5!: from products of distances to the factors of the errors of five and of three readings
@@ -205,6 +206,12 @@ def differences(t: Array, net: Net, gain: Array | None, out: Windows) -> None:
                 b1, b2 = b1 * widest / turn, b2 * widest / turn
                 turn = widest
             widest = turn
+            # along itself too: a chord from a bright frame to a dark one has a direction of its
+            # own
+            bias = math.hypot(b1 / s1, b2 / s2)
+            blur = _AGREEMENT * math.hypot(math.sqrt(whole.v1) / s1, math.sqrt(whole.v2) / s2)
+            if tried > 0 and bias > max(_MOST * math.sqrt(square), blur):
+                break
             angle, sd = math.atan2(y, x), math.sqrt(noise * noise + turn * turn)
             agrees = True
             for earlier in range(tried):
