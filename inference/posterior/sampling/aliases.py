@@ -22,6 +22,7 @@ __all__ = ["Aliases", "aliases_of", "with_aliases"]
 Array = NDArray[np.float64]
 
 _REACH = 6.0  # standard deviations of a prior: beyond, it has a billionth
+_BULK = 3.0  # standard deviations that hold all but a few thousandths
 _TURNS = 1000  # either way, among which the likeliest are chosen
 _MOST = 128  # of one optimum
 _RAREST = 1e-5  # of the likeliest alias's prior density: those of less are left to the move
@@ -47,6 +48,12 @@ class Aliases:
     column: int
     law: Distribution
     turn_m: float
+
+    @property
+    def are_too_many(self) -> bool:
+        """Whether a mixture of them leaves out aliases that hold a share of the posterior."""
+        low, high = self.law.from_normal(np.array([-_BULK, _BULK]))
+        return bool(high - low > _MOST * self.turn_m)
 
     def distances(self, z: Array) -> Array:
         """Return the wall's distances at z of shape (n, d) [m], shape (n,)."""

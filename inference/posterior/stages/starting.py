@@ -191,6 +191,15 @@ def _importance(
 ) -> tuple[Weighted | None, int]:
     """Sample by importance; None where ensembles are to do it instead."""
     target, forced = job.settings.target_ess, job.settings.method == "importance"
+    aliases = aliases_of(density)
+    if aliases is not None and aliases.are_too_many:
+        if not forced:
+            return None, 0
+        raise RefusedError(
+            "importance sampling cannot hold all distances of the background that give the same "
+            f"readings, each {aliases.turn_m:.4g} m behind the last; narrow the prior of its "
+            "distance_m, or use the method emcee"
+        )
     weighted, calls = _weighted_draws(density, proposal, job)
     trusted = weighted.k_hat < MAX_K_HAT
     if forced and not trusted:

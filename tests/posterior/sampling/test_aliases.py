@@ -7,8 +7,11 @@ import pytest
 import scipy
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.posterior.infer import infer
 from inference.posterior.sampling.aliases import aliases_of, with_aliases
 from inference.posterior.sampling.start import refine
+from inference.posterior.settings import SamplerSettings
+from simulator.errors import RefusedError
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
 from simulator.simulate import simulate
@@ -150,3 +153,13 @@ def test_aliases_of_an_optimum_are_optima(joint: dict[str, Any] | None) -> None:
     assert again.factor @ again.factor.T == pytest.approx(
         found[1].factor @ found[1].factor.T, rel=0.05
     )
+
+
+def test_importance_sampling_refuses_what_it_cannot_hold() -> None:
+    wall = {**WALL, "distance_m": {"prior": "uniform", "low": 2.0, "high": 1200.0}}
+    scene = parse_scene({"object": OBJECT, "background": wall, "range_m": RANGES, "discrepancy": 0})
+    truth = parse_scene({"object": OBJECT, "background": WALL, "discrepancy": 0})
+    frames = simulate(parse_sensor(SINE), truth, SampledTrajectory(range_m=[0.3, 0.7]), 1).frames
+    settings = SamplerSettings(method="importance", seed=1)
+    with pytest.raises(RefusedError, match=r"each 7.495 m behind the last"):
+        infer(parse_sensor(SINE), scene, frames, settings)
