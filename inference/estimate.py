@@ -9,10 +9,10 @@ from inference.estimates import Estimates, LeftOut, TechniqueResult
 from inference.known import known_of
 from inference.plan import Plan, cheapest, obstacle, plan
 from inference.realtime.registry import TECHNIQUES
+from inference.realtime.withheld import without_moved
 from inference.shared_error import with_shared_error
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from inference.temperature import solved_where_told, task_of
-from inference.withheld import without_moved
 from simulator.errors import InvalidInputError, Problem, RefusedError
 from simulator.frames import Frames
 from simulator.joint_scene import around, centre

@@ -16,8 +16,8 @@ from inference.fits.likelihood.problem import fit_problem
 from inference.fits.linear.follow import Follow
 from inference.fits.linear.least_squares import LinearFit
 from inference.realtime.net import SATURATED, rule_out
+from inference.realtime.withheld import without_ranges
 from inference.technique import Task
-from inference.withheld import without_ranges
 from simulator.errors import RefusedError
 from simulator.parameters import parameters_of
 
