@@ -4,12 +4,12 @@ import time
 from collections.abc import Sequence
 
 from inference.assumptions import assumptions_of
+from inference.contradicted import without_moved
 from inference.empty_frames import Contradiction, contradiction
 from inference.estimates import Estimates, LeftOut, TechniqueResult
 from inference.known import known_of
 from inference.plan import Plan, cheapest, obstacle, plan
 from inference.realtime.registry import TECHNIQUES
-from inference.realtime.withheld import without_moved
 from inference.shared_error import with_shared_error
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from inference.temperature import solved_where_told, task_of

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from inference.contradicted import CONTRADICTED
 from inference.estimate import estimate
 from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK
-from inference.realtime.withheld import CONTRADICTED
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import Sensor, parse_sensor

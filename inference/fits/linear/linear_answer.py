@@ -11,12 +11,12 @@ from inference.estimates import TechniqueResult
 from inference.fits.answer.model_checks import REASONS
 from inference.fits.answer.ranges import MISFIT, Answer, frame_ranges
 from inference.fits.answer.report import FALSE_ALARM, entries, spoiled, with_parts
+from inference.fits.answer.withheld import without_ranges
 from inference.fits.likelihood.model_error import unexplained
 from inference.fits.likelihood.problem import fit_problem
 from inference.fits.linear.follow import Follow
 from inference.fits.linear.least_squares import LinearFit
 from inference.realtime.net import SATURATED, rule_out
-from inference.realtime.withheld import without_ranges
 from inference.technique import Task
 from simulator.errors import RefusedError
 from simulator.parameters import parameters_of
