@@ -185,17 +185,27 @@ def _maybe_empty(model: Tracker, frames: Frames) -> NDArray[np.bool_]:
 
 
 def _nearest(knots: Array, readings: Array) -> Array:
-    """Return the knots that explain readings best within what the unknowns allow."""
+    """Return the knots that are most probable, given what unknowns and half a step allow.
+
+    A knot where unknowns allow anything, beside a wave as near as no object comes, would always
+    explain readings better than one half a step off: the log of what is allowed counts as well.
+    """
     every = -(-len(knots) // _STARTS)
     some = knots[::every]
     r11, r21, r22 = some[:, SPREAD : SPREAD + 3].T
-    # of I + R R^T, whose root whitens
-    a, b, c = 1.0 + r11**2, r11 * r21, 1.0 + r21**2 + r22**2
+    away1, away2 = 0.5 * every * some[:, MEAN + 2 : MEAN + 4].T
+    # of I + R R^T and half a step, whose root whitens
+    a, b = 1.0 + r11**2 + away1**2, r11 * r21 + away1 * away2
     first = np.sqrt(a)
-    second = np.sqrt(c - (b / first) ** 2)
+    # c - b^2/a, of which nothing is subtracted that is large beside it
+    rest = 1.0 + r22**2 + (r21**2 + away2**2 + (r11 * away2 - r21 * away1) ** 2) / a
+    second = np.sqrt(rest)
     off1 = (readings[:, None, 0] - some[:, MEAN]) / first
     off2 = (readings[:, None, 1] - some[:, MEAN + 1] - (b / first) * off1) / second
-    return np.asarray(every * np.argmin(off1**2 + off2**2, axis=1), dtype=np.float64)
+    return np.asarray(
+        every * np.argmin(off1**2 + off2**2 + 2.0 * np.log(first * second), axis=1),
+        dtype=np.float64,
+    )
 
 
 def _curve(knots: Array, at: Array, count: int) -> tuple[Array, Array, Array]:

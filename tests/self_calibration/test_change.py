@@ -6,17 +6,20 @@ from numpy.typing import NDArray
 
 from inference.self_calibration.change import (
     Residuals,
+    _nearest,
     has_changed,
     surprises_of,
     without_unknowns,
 )
 from inference.self_calibration.mixing import mixed, with_modes
+from inference.tracking.readings_table import MEAN, SPREAD
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.tracker import tracker
 from simulator.frames import Frames
+from simulator.parameters import parameters_of
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import parse_sensor
-from simulator.simulate import simulate
+from simulator.simulate import mean_readings, simulate
 from simulator.trajectories import SampledTrajectory
 
 OBJECT = {"c0": 0.0769, "c1": -0.123, "c2": 0.0957}
@@ -206,3 +209,19 @@ def test_laws_that_nearly_agree_are_shared_or_left_as_they_are() -> None:
     np.testing.assert_allclose(law.modes[1].covariance, wanted, rtol=1e-3)
     # farther than 100 standard deviations of the crosstalk's prior: no half that says so
     assert mixed(found, scene(own, [0.1, 0.1], wide)) == found
+
+
+def test_ranges_start_where_the_object_is_and_not_where_anything_is_possible() -> None:
+    # what a calibration leaves open of the shape: near by, all of the light
+    noise = {"read": [2e-4, 2e-4]}
+    sensor = parse_sensor({"kind": "sine_wave", "frequency_hz": 2e7, "noise": noise})
+    scene = parse_scene({"object": {"c0": 0.036, "c1": -0.038, "c2": 0.118}})
+    table = tracker(sensor, scene).model.table
+    knots = table.knots.copy()
+    near = np.flatnonzero(table.start + table.step * np.arange(len(knots)) < np.log(0.05))
+    knots[near, SPREAD], knots[near, SPREAD + 2] = knots[near, MEAN], knots[near, MEAN]
+    ranges = np.geomspace(0.35, 2.0, 50)
+    readings = mean_readings(sensor, parameters_of(sensor, scene).terms(np.zeros((1, 0))), ranges)
+    u = table.start + _nearest(knots, readings / 2e-4) * table.step
+    # one of the 128 places from which ranges are fitted
+    assert np.abs(u - np.log(ranges)).max() < (table.end - table.start) / 128
