@@ -277,10 +277,12 @@ def draw(path: Path, courses: Iterable[tuple[str, Course, Followed]]) -> None:
         ranges, errors, shares = axes[:, column]
         ranges.plot(t, said.range_m, ".", ms=1.5, color="tab:blue", label="one range")
         ranges.plot(t, of.range_m, lw=0.8, color="black", label="truth")
-        ranges.set(title=name, ylabel="range [m]", ylim=(0.1, 6.0), yscale="log")
+        ranges.set(title=f"{name} start", ylabel="range [m]", ylim=(0.1, 6.0), yscale="log")
+        ranges.set_yticks([0.1, 0.3, 1, 3], ["0.1", "0.3", "1", "3"])
+        ranges.set_yticks([], minor=True)
         errors.fill_between(t, -100 * wide, 100 * wide, color="tab:blue", alpha=0.3, lw=0)
         errors.plot(t, 100 * error, ".", ms=1.5, color="tab:blue")
-        errors.set(ylabel="error, and 90 % interval [% of range]", ylim=(-40, 40))
+        errors.set(ylabel="error, 90 % interval\n[% of range]", ylim=(-40, 40))
         seconds = np.arange(t.size // (10 * HZ)) * 10.0
         rows = held[: seconds.size * 10 * HZ].reshape(seconds.size, -1)
         answered = np.isfinite(rows).sum(axis=1)
@@ -289,7 +291,7 @@ def draw(path: Path, courses: Iterable[tuple[str, Course, Followed]]) -> None:
             seconds, np.where(answered > 0, 100 * share, np.nan), 9.0, align="edge", color="silver"
         )
         shares.axhline(90, color="black", lw=0.8)
-        shares.set(ylabel="intervals that hold the truth [%]", xlabel="time [s]", ylim=(0, 105))
+        shares.set(ylabel="intervals that hold\nthe truth [%]", xlabel="time [s]", ylim=(0, 105))
         for ax in axes[:, column]:
             ax.axvline(of.wall_s, color="tab:purple", lw=1.5, label="wall comes")
             ax.axvline(of.print_s, color="tab:brown", lw=1.5, label="fingerprint")
@@ -298,7 +300,18 @@ def draw(path: Path, courses: Iterable[tuple[str, Course, Followed]]) -> None:
                 label = kind.replace("_", " ")
                 for k, x in enumerate(at):
                     ax.axvline(x, color=color, lw=0.8, ls="--", label=label if k == 0 else None)
-        ranges.legend(fontsize=7, loc="upper left", ncols=4)
+    # below all panels, each kind of line once
+    known = {}
+    for ax in axes[0]:
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            known.setdefault(label, handle)
+    figure.legend(
+        list(known.values()),
+        list(known),
+        loc="outside lower center",
+        ncols=len(known),
+        frameon=False,
+    )
     figure.savefig(path, dpi=100)
 
 
