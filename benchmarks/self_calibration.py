@@ -301,7 +301,7 @@ def draw(path: Path, courses: Iterable[tuple[str, Course, Followed]]) -> None:
                 for k, x in enumerate(at):
                     ax.axvline(x, color=color, lw=0.8, ls="--", label=label if k == 0 else None)
     # below all panels, each kind of line once
-    known = {}
+    known: dict[str, Any] = {}
     for ax in axes[0]:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             known.setdefault(label, handle)

@@ -167,8 +167,9 @@ def _fades(mode: PeakedMode, frame: TrackedFrame, prior: Prior, table: ReadingsT
     for end in (mode.low, mode.high):
         away = min(_TAIL * mode.scale, abs(end - mode.u))
         tail = mode.u + math.copysign(away, end - mode.u)
-        fall = 0.5 * (away / mode.scale) ** 2
-        held = top - log_density(tail, frame, prior, table) < _OPEN * fall
+        scales = away / mode.scale
+        fall = top - log_density(tail, frame, prior, table)
+        held = fall < 0.5 * _OPEN * scales * scales
         if held and _by_noise(tail, _DROWNED, frame, prior, table):
             return True
     return False

@@ -118,7 +118,9 @@ def places_around_folds(positions: Array, values: Array, slopes: Array, roots: A
     """
     places: list[float] = []
     alone = np.zeros_like(roots[:-1])
-    for added in (alone, roots[:-1]) if roots.any() else (alone,):
+    # one reading turns back at the same ranges, whatever is added to its noise
+    twice = roots.any() and slopes.any(axis=0).all()
+    for added in (alone, roots[:-1]) if twice else (alone,):
         left, right = _whitened(slopes[:-1], added), _whitened(slopes[1:], added)
         for k in np.flatnonzero(np.einsum("ij,ij->i", right, left) < 0.0):
             turn = right[k] - left[k]

@@ -89,7 +89,8 @@ def take_unsteady(
     for j in range(nuisance_count(table)):
         g1, g2 = nuisance_at(i, part, j, table)
         new = gain * (across1 * g1 + across2 * g2)
-        shared += (new - numbers[_SHARED + j]) ** 2
+        change = new - numbers[_SHARED + j]
+        shared += change * change
         numbers[_SHARED + j] = new
     seconds = time - numbers[_TIME]
     drift1, drift2 = rules.drift1 * across1, rules.drift2 * across2
