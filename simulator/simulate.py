@@ -51,6 +51,7 @@ class Simulation:
     parameters: dict[str, float]
 
 
+# arguments of their own, no tuple of them: only so a term that is None costs no branch
 @compiled
 def _frame_moments(
     ranges: Array,

@@ -22,7 +22,6 @@ from inference.tracking.hypotheses import (
     CROSSTALK1,
     CROSSTALK2,
     Hypotheses,
-    learns_crosstalk,
     variance_of,
 )
 from inference.tracking.readings_table import ReadingsTable
@@ -39,6 +38,7 @@ __all__ = [
     "log_total",
     "take_width",
 ]
+
 Array = NDArray[np.float64]
 
 ROUGH = 0.15
@@ -72,9 +72,7 @@ def log_total(of: TrackCandidates, first: int, last: int) -> float:
 
 @compiled
 def hides(of: Hypotheses, row: int) -> bool:
-    """Tell whether crosstalk is so little known that a hypothesis's light may be either's."""
-    if not learns_crosstalk(of):
-        return False
+    """Tell whether learnt crosstalk is so little known that its light may be the object's."""
     return max(variance_of(of, row, CROSSTALK1), variance_of(of, row, CROSSTALK2)) > _HIDDEN
 
 
@@ -108,15 +106,7 @@ def log_at_rest(
 
 @borrowed
 @compiled
-def take_width(
-    of: TrackCandidates,
-    first: int,
-    last: int,
-    counted: float,
-    frame: TrackedFrame,
-    prior: Prior,
-    table: ReadingsTable,
-) -> None:
+def take_width(of: TrackCandidates, first: int, last: int, counted: float, at_rest: float) -> None:
     """Take from the candidates of one hypothesis what does not count of their width.
 
     That is the density integrated over u against its top, both relative to the prediction's: the
@@ -128,13 +118,12 @@ def take_width(
         The list, and the hypothesis's part of it.
     counted : float
         Share that counts.
-    frame, prior, table
-        As for `log_density`.
+    at_rest : float
+        As of `log_at_rest`.
     """
-    rest = log_at_rest(of, first, last, frame, prior, table)
-    if rest == -math.inf:
+    if at_rest == -math.inf:
         return
-    width = log_total(of, first, last) - rest
+    width = log_total(of, first, last) - at_rest
     for j in range(first, last):
         of.log_mass[j] -= (1.0 - counted) * width
 
@@ -168,15 +157,12 @@ def let_rest(
     log_empty : float
         Log mass of the empty scene.
     """
-    best, total = -math.inf, 0.0
+    log_rest = -math.inf
     for h in range(at_rest.size):
-        best = max(best, at_rest[h])
-    if best == -math.inf:
+        log_rest = np.logaddexp(log_rest, at_rest[h])
+    if log_rest == -math.inf:
         return
-    for h in range(at_rest.size):
-        total += math.exp(at_rest[h] - best)
-    log_rest = highest + best + math.log(total)
-    change = min(log_empty + _LOG_RESTING - log_rest, 0.0)
+    change = min(log_empty + _LOG_RESTING - (highest + log_rest), 0.0)
     # the heaviest candidate of a hypothesis takes what all of it would have
     for h in range(at_rest.size):
         top = -1

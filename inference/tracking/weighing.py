@@ -56,7 +56,6 @@ from simulator.compiled import compiled
 
 __all__ = ["Model", "Room", "room_for", "weigh_frame", "weigh_known"]
 
-
 Array = NDArray[np.float64]
 
 _SPARE = 5  # times as many hypotheses may be made by a frame as are kept after it
@@ -114,20 +113,24 @@ def _of_followed(
     candidates, followed = room.candidates, int(of.numbers[COUNT])
     counted = counted_widths(of.numbers[ROUGHNESS])
     found, log_before = 0, -math.inf
-    at_rest = room.at_rest
-    for h in range(at_rest.size):
+    learns, at_rest = learns_crosstalk(of), room.at_rest
+    for h in range(at_rest.size if learns else 0):
         at_rest[h] = -math.inf
     for h in range(1, followed + 1):
         old, log_weight = found, log_of(of.weight[h])
         prior = prior_of(of, h, frame.gain, log_weight + log_usual, table)
         found = find_candidates(candidates, found, h, frame, prior, table, scan, room.scanned)
-        if hides(of, h) and found > old:
-            at_rest[h] = log_at_rest(candidates, old, found, frame, prior, table)
-        if followed > 1 and counted < 1.0 and found > old:
+        hidden, smooth = learns and hides(of, h), followed > 1 and counted < 1.0
+        if found == old or not (hidden or smooth):
+            continue
+        rest = log_at_rest(candidates, old, found, frame, prior, table)
+        if hidden:
+            at_rest[h] = rest
+        if smooth:
             log_before = np.logaddexp(log_before, log_total(candidates, old, found))
-            take_width(candidates, old, found, counted, frame, prior, table)
+            take_width(candidates, old, found, counted, rest)
     even_out(candidates, found, log_before)
-    if learns_crosstalk(of) and not frame.known_rate > 0.0:
+    if learns and not frame.known_rate > 0.0:
         # a density is as high at best as that of the empty scene, whose readings these would be
         highest = empty.usual + 0.5 * empty.surprise - log_of(of.weight[0]) - log_usual
         let_rest(candidates, found, at_rest, highest, empty.usual)

@@ -19,7 +19,7 @@ from tests.extreme.tracks import TrackCase, grid_miss, holes_of, random_track, v
 from tests.posterior.scenes import OBJECT
 from tests.tracking.reference import GridFilter
 from tests.tracking.scenes import PLATE, frames_of, read, scene_of, sensor_of
-from tests.tracking.test_track import joined, same
+from tests.tracking.test_track import assert_same, joined
 
 # beside a wall, with errors of the model: an object in the dark, whose ranges are many; a reading
 # that turns back along the range while errors of the distance hide the other one
@@ -163,7 +163,7 @@ STREAMS = [4, 7, 9, 14]  # of twenty frames
 def test_nothing_depends_on_the_unit_of_readings(number: int, power: int) -> None:
     """Powers of two round nothing: the same bits."""
     case = random_track(number)
-    same(case.tracked(), _other(case, 2.0**power, 1.0).tracked())
+    assert_same(case.tracked(), _other(case, 2.0**power, 1.0).tracked())
 
 
 @pytest.mark.parametrize("number", STREAMS[:3])
@@ -190,7 +190,7 @@ def test_a_stream_at_the_ends_may_be_cut_anywhere(number: int) -> None:
     for rows in np.split(np.arange(20), [1, 2, 9]):
         state, part = step(model, state, case.frames.select(rows))
         parts.append(part)
-    same(whole, joined(parts))
+    assert_same(whole, joined(parts))
 
 
 def test_a_stream_of_one_frame_over_and_over_has_no_holes() -> None:

@@ -27,7 +27,7 @@ from tests.tracking.scenes import (
     sensor_of,
     wander,
 )
-from tests.tracking.test_track import below, joined, same
+from tests.tracking.test_track import assert_same, below, joined
 
 Array = NDArray[np.float64]
 
@@ -182,7 +182,7 @@ def test_a_stream_with_known_ranges_may_be_cut_anywhere() -> None:
             part = dataclasses.replace(part, known_range_m=None, known_range_sd_m=None)
         state, result = step(model, state, part)
         parts.append(result)
-    same(whole, joined(parts))
+    assert_same(whole, joined(parts))
 
 
 @pytest.mark.parametrize("scale", [1e-12, 1e12])

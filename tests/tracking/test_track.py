@@ -42,7 +42,7 @@ def below(result: Track, u: float) -> Array:
     return np.asarray((weight * np.nan_to_num(stats.norm.cdf(z))).sum(axis=1) / total)
 
 
-def same(one: Track, other: Track) -> None:
+def assert_same(one: Track, other: Track) -> None:
     """Assert that two results agree to the last bit."""
     for field in dataclasses.fields(Track):
         left, right = getattr(one, field.name), getattr(other, field.name)
@@ -289,8 +289,8 @@ def test_a_stream_may_be_cut_anywhere() -> None:
             before = state_to_bytes(state)
             state, part = step(model, state_from_bytes(before), frames.select(index))
             parts.append(part)
-        same(joined(parts), whole)
-    same(track(sensor, scene, frames, settings), whole)
+        assert_same(joined(parts), whole)
+    assert_same(track(sensor, scene, frames, settings), whole)
 
 
 def test_a_step_changes_nothing_that_it_was_given() -> None:
@@ -314,4 +314,4 @@ def test_nothing_depends_on_the_unit_of_the_readings(scale: float) -> None:
     frames = frames_of(read(sensor, scene, np.linspace(0.5, 1.5, 40), np.random.default_rng(1)))
     one = track(sensor, scene, frames)
     two = track(other, scene_of(scaled), Frames(frames.readings * scale, time_s=frames.time_s))
-    same(one, two)  # powers of two round nothing
+    assert_same(one, two)  # powers of two round nothing
