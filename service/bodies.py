@@ -11,6 +11,7 @@ from starlette.datastructures import Headers
 from starlette.requests import ClientDisconnect
 
 from service.border.held import Held
+from service.column_names import with_remedy
 from service.errors import (
     BodyTooLargeError,
     ClientGoneError,
@@ -21,6 +22,7 @@ from service.errors import (
 from service.known_systems import read_system
 from service.shared import TINY_BYTES, shared_of
 from service.strict_json import SHORT, check_bulk, decode
+from simulator.errors import InvalidInputError
 from simulator.validated import Validated
 
 __all__ = ["BodyOf", "body_of", "check_media_type", "parse_document", "read_limited"]
@@ -57,7 +59,11 @@ def parse_document(model: type[T], raw: bytes) -> T:
     data = decode(raw)
     if raw.count(b",") >= SHORT:  # else nothing in it is long
         check_bulk(data)
-    return read_system(model, data)
+    try:
+        return read_system(model, data)
+    except InvalidInputError as error:
+        frames = data.get("frames") if isinstance(data, dict) else None
+        raise with_remedy(error, frames, "/frames") from None
 
 
 async def read_limited(

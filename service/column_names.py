@@ -6,13 +6,17 @@ from collections.abc import Sequence
 from simulator.errors import InvalidInputError, Problem, escape
 from simulator.frames import FrameColumns
 
-__all__ = ["NAMES", "check_names", "check_readings", "ignored_names", "meant"]
+__all__ = ["NAMES", "check_names", "check_readings", "ignored_names", "meant", "with_remedy"]
 
 NAMES = tuple(FrameColumns.model_fields)
 
 # names that loggers give to columns which this project has under another name
 _OTHER_WORDS = {"t": "time_s", "time": "time_s", "timestamp": "time_s", "present": "object_present"}
 _READINGS = frozenset({"w1", "w2", "i", "q"})
+_NULL = (
+    "is null: leave that frame out of every column, or send frames one by one, as rows (.csv, "
+    ".ndjson) or lines of a stream, where what is wrong with one is said of that one alone"
+)
 _ALIKE = 0.75  # difflib's ratio: one letter in four
 
 
@@ -113,3 +117,28 @@ def check_readings(names: Sequence[str]) -> None:
 def ignored_names(names: Sequence[str]) -> list[str]:
     """Return the names, in their order, that are not those of columns."""
     return [name for name in dict.fromkeys(names) if name not in NAMES]
+
+
+def with_remedy(error: InvalidInputError, columns: object, at: str = "") -> InvalidInputError:
+    """Return an error that says what to do about entries of columns that are null.
+
+    Columns are one document, good as a whole or refused: of rows each stands for itself.
+
+    Parameters
+    ----------
+    error : InvalidInputError
+        Of checking the columns.
+    columns : object
+        As they were sent.
+    at : str
+        Where they stand: the start of their pointers.
+    """
+
+    def told(problem: Problem) -> Problem:
+        found = re.fullmatch(rf"{at}/(\w+)/(\d+)", problem.pointer)
+        column = columns.get(found[1]) if found and isinstance(columns, dict) else None
+        if found and isinstance(column, list) and column[int(found[2])] is None:
+            return Problem(problem.pointer, _NULL)
+        return problem
+
+    return InvalidInputError(*map(told, error.problems))

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from service.column_names import check_names, check_readings, ignored_names, meant
+from service.column_names import check_names, check_readings, ignored_names, meant, with_remedy
 from service.errors import MalformedError
 from service.frame_table import FrameTable, Row, table_of, value_of_json, value_of_text
 from service.strict_json import check_bulk, decode
@@ -122,7 +122,10 @@ def _from_json(raw: bytes) -> FrameTable:
         ignored = ignored_names(list(columns))
         columns = {name: column for name, column in columns.items() if name not in ignored}
     check_bulk(columns)
-    return FrameTable(parse(FrameColumns, columns), (), tuple(ignored))
+    try:
+        return FrameTable(parse(FrameColumns, columns), (), tuple(ignored))
+    except InvalidInputError as error:
+        raise with_remedy(error, columns) from None
 
 
 def _from_ndjson(raw: bytes) -> FrameTable:

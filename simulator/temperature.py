@@ -1,6 +1,6 @@
 """How gain and delay of a sensor follow its temperature."""
 
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
 import pydantic
@@ -10,9 +10,29 @@ from simulator.errors import Problem
 from simulator.quantity import Quantity
 from simulator.validated import Positive, Validated
 
-__all__ = ["Temperature", "temperature_problems"]
+__all__ = ["COLDEST_K", "Temperature", "temperature_problems"]
 
 Array = NDArray[np.float64]
+
+COLDEST_K = 100.0
+"""Below it a temperature is refused [K]: no such sensor works there, and degrees Celsius lie there.
+
+Taken for kelvin, 25 degrees Celsius would change gain and delay by 273 times their drift a kelvin.
+"""
+_CELSIUS = "in kelvin: 25 degrees Celsius are 298.15"
+
+
+def _warm(value: float) -> float:
+    if value < COLDEST_K:
+        raise ValueError(f"is {value:g}, and must be {COLDEST_K:g} or more, {_CELSIUS}")
+    return value
+
+
+_Kelvin = Annotated[
+    Positive,
+    pydantic.AfterValidator(_warm),
+    pydantic.WithJsonSchema({"type": "number", "minimum": COLDEST_K}),
+]
 
 
 class Temperature(Validated):
@@ -26,12 +46,12 @@ class Temperature(Validated):
         By how much later light seems to come per kelvin [s/K]; a sine wave turns by 2 pi f times
         it. Left out: it does not.
     reference_k : float
-        Temperature at which gain and delay are what the sensor states [K].
+        Temperature at which gain and delay are what the sensor states [K], `COLDEST_K` or more.
     """
 
     gain_drift_per_k: Quantity | None = None
     delay_drift_s_per_k: Quantity | None = None
-    reference_k: Positive = 298.15
+    reference_k: _Kelvin = 298.15
 
     @pydantic.model_validator(mode="after")
     def _says_something(self) -> Self:
@@ -81,10 +101,13 @@ def temperature_problems(of: Temperature | None, temperature_k: Array | None) ->
         message = "is missing: the sensor has temperature coefficients; null where it is not known"
         return [Problem("/temperature_k", message)]
     with np.errstate(invalid="ignore"):
-        cold = np.flatnonzero(temperature_k <= 0)
+        cold = np.flatnonzero(temperature_k < COLDEST_K)
         dark = np.flatnonzero(1.0 + of.known[0] * (temperature_k - of.reference_k) <= 0)
     if cold.size:
-        message = f"entry {cold[0]} is {temperature_k[cold[0]]:g}, and must be above 0 K"
+        message = (
+            f"entry {cold[0]} is {temperature_k[cold[0]]:g}, and must be {COLDEST_K:g} or more, "
+            f"{_CELSIUS}"
+        )
         return [Problem("/temperature_k", message)]
     if dark.size:
         message = (

@@ -8,6 +8,7 @@ from service.routes import (
     identifiability,
     metrics,
     posteriors,
+    root,
     simulations,
     streams,
     techniques,
@@ -17,6 +18,7 @@ from service.routes import (
 __all__ = ["ROUTERS"]
 
 ROUTERS: tuple[APIRouter, ...] = (
+    root.router,
     estimates.router,
     identifiability.router,
     posteriors.router,

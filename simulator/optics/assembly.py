@@ -18,6 +18,7 @@ from simulator.optics.occlusion import hidden_pair
 from simulator.optics.radiometry import observe_batch, observe_shell, shadow
 from simulator.optics.surfaces import Shell, Surface
 from simulator.sensor import PulsedSensor, Sensor
+from simulator.temperature import COLDEST_K
 from simulator.validated import Validated
 
 __all__ = ["OpticalScene", "Reading", "SceneLight", "illuminate", "modulation_of", "read"]
@@ -205,14 +206,15 @@ def read(
     Raises
     ------
     InvalidInputError
-        As `illuminate`; for a temperature that is not positive; for a resolution without a full
+        As `illuminate`; for a temperature that no sensor has; for a resolution without a full
         scale.
     """
     electronics = scene.electronics
     warm = 0.0
     if temperature_k is not None:
-        if not (math.isfinite(temperature_k) and temperature_k > 0):
-            raise InvalidInputError.at("/temperature_k", "must be a positive temperature in kelvin")
+        if not COLDEST_K <= temperature_k < math.inf:
+            message = f"must be a temperature in kelvin, {COLDEST_K:g} or more"
+            raise InvalidInputError.at("/temperature_k", message)
         warm = temperature_k - electronics.reference_k
     light = illuminate(scene, modulation_of(sensor), tolerance=tolerance)
     everything = light.objects.flux + light.background.flux + light.glass.flux

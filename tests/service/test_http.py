@@ -228,6 +228,30 @@ async def test_multitude_of_aliases(client: httpx.AsyncClient) -> None:
     assert_problem(await client.post("/v1/estimates", json=body), 422)
 
 
+async def test_a_null_reading_is_named_with_what_to_do(
+    client: httpx.AsyncClient, request_body: dict[str, Any]
+) -> None:
+    """Columns are good as a whole or refused; of rows one may be bad."""
+    request_body["frames"] = {"w1": [0.01, None], "w2": [1.5, 1.7], "known_range_m": [None, "x"]}
+    response = await client.post("/v1/estimates", json=request_body)
+    assert response.status_code == 422
+    said = {error["pointer"]: error["detail"] for error in response.json()["errors"]}
+    assert said.keys() == {"/frames/w1/1", "/frames/known_range_m/1"}
+    assert said["/frames/w1/1"].startswith("is null: leave that frame out of every column, or send")
+    assert "null" not in said["/frames/known_range_m/1"]
+
+
+async def test_the_root_says_where_to_go(client: httpx.AsyncClient) -> None:
+    answer = await client.get("/")
+    assert answer.status_code == 200
+    told = answer.json()
+    described = (await client.get(told["openapi"])).json()
+    assert (told["name"], told["version"]) == ("hybridtof", described["info"]["version"])
+    assert (await client.get(told["health"])).status_code == 200
+    assert {"/v1/estimates", "/v1/posteriors", "/v1/streams"} <= set(told["resources"])
+    assert set(told["resources"]) < described["paths"].keys()
+
+
 @pytest.mark.parametrize("content", [b"", b"{", b"nope", b"\xff\xfe", b"[" * 100_000])
 async def test_malformed_body(client: httpx.AsyncClient, content: bytes) -> None:
     for route in ("estimates", "identifiability", "posteriors", "simulations"):

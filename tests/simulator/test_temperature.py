@@ -89,7 +89,8 @@ WARM = SENSORS["pulsed"] | {"temperature": DRIFTS}
     [
         (None, "is missing"),
         ([300.0, 0.0], "entry 1 is 0"),
-        ([300.0, -5.0], "above 0 K"),
+        ([300.0, -5.0], "entry 1 is -5, and must be 100 or more, in kelvin"),
+        ([25.0, 30.0], "entry 0 is 25, and must be 100 or more, in kelvin: 25 degrees Celsius"),
         ([300.0, 1400.0], "leaves no gain"),
         ([300.0], "1 entries where w1 has 2"),
         (["a", "b"], "must hold numbers"),
@@ -111,6 +112,7 @@ def test_bad_temperatures_are_named(column: Any, words: str) -> None:
         ({"reference_k": 300.0}, "/temperature"),
         ({"gain_drift_per_k": "x"}, "/temperature/gain_drift_per_k"),
         (DRIFTS | {"reference_k": 0.0}, "/temperature/reference_k"),
+        (DRIFTS | {"reference_k": 25.0}, "/temperature/reference_k"),
         (DRIFTS | {"offset": 0.0}, "/temperature/offset"),
         (
             {"gain_drift_per_k": {"prior": "normal", "mean": 0.0}},
@@ -127,6 +129,9 @@ def test_bad_coefficients_are_named(temperature: Any, pointer: str) -> None:
 def test_trajectories_name_what_cannot_be_their_temperatures() -> None:
     scene = parse_scene({"object": {"c0": 0.0769, "c1": -0.123, "c2": 0.0957}})
     path = SampledTrajectory(range_m=[0.2, 0.7], temperature_k=[300.0, 1400.0])
+    celsius = SampledTrajectory(range_m=[0.2, 0.7], temperature_k=[25.0, 26.0])
+    with pytest.raises(InvalidInputError, match=r"/trajectory/temperature_k: .* in kelvin"):
+        simulate(parse_sensor(WARM), scene, celsius, 1)
     for sensor, words in ((WARM, "leaves no gain"), (SENSORS["pulsed"], "no coefficients")):
         with pytest.raises(InvalidInputError, match=words) as error:
             simulate(parse_sensor(sensor), scene, path, 1)
