@@ -102,7 +102,7 @@ clean: ## Remove what the targets made
 
 lowest: ## Run the tests that take seconds with the lowest versions that pyproject.toml states (needs uv)
 	uv venv --quiet --clear --python $(PYTHON) out/lowest
-	uv pip compile pyproject.toml --all-extras --resolution lowest-direct --quiet --no-header --no-annotate --output-file out/lowest.txt
+	uv pip compile pyproject.toml --python out/lowest/bin/python --all-extras --resolution lowest-direct --quiet --no-header --no-annotate --output-file out/lowest.txt
 	uv pip install --quiet --python out/lowest/bin/python --requirements out/lowest.txt
 	uv pip install --quiet --python out/lowest/bin/python --no-deps --no-build-isolation --editable .
 	NUMBA_CACHE_DIR=$(CURDIR)/out/lowest/kernels out/lowest/bin/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow" $(LOWEST)
