@@ -5,6 +5,7 @@ import pytest
 from scipy import special
 
 import hybridtof
+from inference.estimates import TechniqueResult
 from tests.posterior.scenes import KINDS, OBJECT, data, sensor_of
 
 NOISE = 1e-4
@@ -66,3 +67,27 @@ def test_an_object_unlike_its_priors_is_a_misfit_that_says_so() -> None:
     assert result.fit is not None
     assert result.fit["checks"]["priors"] < 1e-3
     assert any("priors" in reason for reason in result.fit["reasons"])
+
+
+def test_the_check_of_priors_is_what_the_readings_alone_say_against_them() -> None:
+    """One unknown, told as well by its prior as by readings whose light errs.
+
+    What the readings alone say is the answer under a prior that is a hundred times as wide. In the
+    log of c2 all is linear to a few percent.
+    """
+    sensor = sensor_of("pulsed")
+    frames = data(sensor, {"discrepancy": 0}, 20, 1).frames
+
+    def fitted(median: float, sigma: float) -> TechniqueResult:
+        law = {"prior": "lognormal", "median": median, "sigma": sigma}
+        scene = hybridtof.parse_scene({"object": {**OBJECT, "c2": law}, "discrepancy": 0.05})
+        return hybridtof.estimate(sensor, scene, frames, ["joint_fit"]).results[0]
+
+    alone = fitted(OBJECT["c2"], 5.0).parameters
+    assert alone is not None
+    value, width = (alone["object.c2"][key] for key in ("value", "sd"))
+    width /= value
+    off = 3.0
+    fit = fitted(value * np.exp(off * np.sqrt(2.0) * width), width).fit
+    assert fit is not None
+    assert special.chdtri(1, fit["checks"]["priors"]) == pytest.approx(off**2, rel=0.1)

@@ -9,17 +9,18 @@ from inference.fits.likelihood.places import places_of
 from inference.frame.arguments import Instrument
 
 
-def _places(shot: float | None, gain: float) -> list[int]:
+def _places(shot: float | None, gain: float, relative: float = 0.0) -> list[int]:
     """Ten frames at each of three places, one alone, one without object; noise 1."""
     rng = np.random.default_rng(4)
     light = np.repeat([[300.0, 4000.0], [250.0, 2500.0], [200.0, 1500.0]], 10, axis=0)
     light = np.concatenate([light, [[100.0, 500.0], [0.0, 0.0]]])
     light[:, :] *= gain
+    light *= 1.0 + relative * rng.standard_normal((len(light), 1))
     light += rng.standard_normal(light.shape) * np.sqrt(1.0 + (shot or 0.0) * light)
     frames = np.column_stack([light, np.full(len(light), gain)])
     present = np.arange(len(light)) < len(light) - 1
     order = rng.permutation(len(light))
-    at = Instrument(15.0, None, (1.0, 1.0), shot, 0.0 if shot else None)
+    at = Instrument(15.0, None, (1.0, 1.0), shot, relative if shot else None)
     found = places_of(frames[order], present[order], at)
     assert found is not None
     of_frame = np.empty(len(light), dtype=int)
@@ -28,11 +29,14 @@ def _places(shot: float | None, gain: float) -> list[int]:
     return of_frame.tolist()
 
 
-@pytest.mark.parametrize(("shot", "gain"), [(None, 1.0), (2.0, 1.0), (None, 0.5)])
+@pytest.mark.parametrize(
+    ("shot", "gain", "relative"),
+    [(None, 1.0, 0.0), (2.0, 1.0, 0.0), (None, 0.5, 0.0), (1e-3, 1.0, 0.01)],
+)
 def test_frames_that_read_alike_but_for_noise_are_at_one_place(
-    shot: float | None, gain: float
+    shot: float | None, gain: float, relative: float
 ) -> None:
-    assert _places(shot, gain) == [2] * 10 + [1] * 10 + [0] * 10 + [-1, -1]
+    assert _places(shot, gain, relative) == [2] * 10 + [1] * 10 + [0] * 10 + [-1, -1]
 
 
 def test_frames_along_a_path_are_at_no_place() -> None:

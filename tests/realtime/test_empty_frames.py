@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from inference.contradicted import CONTRADICTED
+from inference.contradicted import CONTRADICTED, without_moved
 from inference.estimate import estimate
 from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK
 from simulator.frames import Frames
@@ -115,9 +115,42 @@ def test_the_direction_of_a_wall_of_unknown_strength(kind: str) -> None:
     assert len(said(sensor, exact, bare)) == 1
 
 
+def test_shot_noise_of_both_windows_is_of_the_same_photons() -> None:
+    """Across the light of the wall: its strength follows the readings along that alone."""
+    sensor = sensor_of("pulsed", shot=1e-5)
+    wall = WALL | {"strength": {"prior": "lognormal", "median": 0.5, "sigma": 1.0}}
+    light = light_of_the_wall("pulsed")
+    across = np.array([-light[1], light[0]]) / np.linalg.norm(light)
+    late, whole = np.square(READ) + 1e-5 * light
+    covariance = np.array([[late, 1e-5 * light[0]], [1e-5 * light[0], whole]])
+    error = math.sqrt(across @ covariance @ across / EMPTY)
+    for away in (-5.1, -4.9, 4.9, 5.1):
+        bare = np.tile(light + away * error * across, (EMPTY, 1))
+        found = said(sensor, {"background": wall, "discrepancy": 0}, bare)
+        assert len(found) == (abs(away) > 5), found
+
+
+def test_the_error_of_the_distance_is_granted_of_the_light_that_was_read() -> None:
+    """With a gain of 2 the wall reads twice as much, and an error of its distance does."""
+    sensor, granted, gain = sensor_of("pulsed"), 0.01, 2.0
+    light = gain * light_of_the_wall("pulsed")
+    of_distance = granted * light[0] / WALL["distance_m"]
+    error = math.hypot(of_distance, READ[0] / math.sqrt(EMPTY))
+    scene = {"background": WALL, "discrepancy": {"flux": 0.01, "range_m": granted}}
+    for away in (-5.1, -4.9, 4.9, 5.1):
+        bare = np.tile(light + [away * error, 0.0], (EMPTY, 1))
+        frames = Frames(
+            np.vstack([bare, [[0.1, 0.4]]]),
+            object_present=np.array([False] * EMPTY + [True]),
+            gain=np.array([gain] * EMPTY + [1.0]),
+        )
+        assert len(estimate(sensor, parse_scene(scene), frames).assumptions) == (abs(away) > 5)
+
+
 def test_what_a_joint_law_leaves_open_is_no_contradiction() -> None:
+    """0.0035 off, and five of noise and law together are 0.0037 and 0.0030."""
     sensor = sensor_of("pulsed")
-    for sd, told in ((1e-3, 0), (1e-4, 1)):
+    for sd, told in ((6e-4, 0), (4e-4, 1)):
         prior = {"prior": "normal", "mean": 0.02, "sd": sd}
         mode = {"weight": 1.0, "mean": [0.0], "covariance": [[1.0]]}
         joint = {"unknowns": ["crosstalk.w2"], "modes": [mode]}
@@ -162,6 +195,25 @@ def test_ranges_that_contradicted_numbers_move_are_not_given(kind: str) -> None:
     timed = dataclasses.replace(frames, time_s=0.1 * np.arange(EMPTY + 4, dtype=np.float64))
     left = estimate(sensor, free, timed, ["differential"]).results[0]
     assert CONTRADICTED not in {left.reasons[i] for i in left.reason}
+
+
+def test_a_range_may_move_by_its_standard_deviation_and_no_root_may_come_or_go() -> None:
+    sensor = parse_sensor({**KINDS["pulsed"], "noise": {"read": [1e-4, 1e-4]}})
+    frames = Frames(np.array([[0.01, 0.4], [0.02, 0.3], [0.03, 0.2], [0.04, 0.1]]))
+    result = estimate(sensor, parse_scene({}), frames).results[0]
+    assert result.root_count.tolist() == [1] * 4
+    result = dataclasses.replace(result, near_fold=np.ones(4, dtype=bool))
+    by = np.array([0.9, -0.9, 1.1, -1.1])[:, None] * result.roots_sd_m
+    found = without_moved(result, dataclasses.replace(result, roots_m=result.roots_m + by))
+    kept = np.array([True, True, False, False])
+    assert np.array_equal(np.isfinite(found.range_m), kept)
+    assert np.array_equal(found.near_fold, kept)
+    more = np.array([1, 2, 1, 2])
+    second = np.where(more[:, None] == 2, 2.0 * result.roots_m[:, :1], np.nan)
+    other = dataclasses.replace(
+        result, roots_m=np.column_stack([result.roots_m, second]), root_count=more
+    )
+    assert np.array_equal(np.isfinite(without_moved(result, other).range_m), more == 1)
 
 
 @pytest.mark.parametrize(

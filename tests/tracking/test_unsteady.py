@@ -6,6 +6,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.tracking.hypotheses import WITHOUT_CROSSTALK
+from inference.tracking.settings import TrackingSettings
 from inference.tracking.track import Track, step, track
 from inference.tracking.tracker import tracker
 from inference.tracking.unsteady import UNSTEADY
@@ -45,6 +46,48 @@ def test_noise_that_is_stated_three_times_too_small_is_said_within_three_seconds
 def test_noise_that_is_as_stated_is_no_misfit(kind: str) -> None:
     # one frame in a million: 2 x 240 frames, 5e-4 at most
     assert not tracked(kind, 1.0).misfit.any()
+
+
+def test_shot_noise_of_both_windows_that_is_as_stated_is_no_misfit() -> None:
+    """One in a million frames. Light changes by 17 noises a frame, along its curve alone."""
+    sensor, scene = sensor_of(1e-5, noise={"shot": 1e-6}), parse_scene({**PLATE, "discrepancy": 0})
+    ranges = 0.5 * np.exp(0.5 * np.sin(STEP_S * np.arange(FRAMES)))
+    terms = parameters_of(sensor, scene).terms(np.zeros((1, 0)))
+    light = mean_readings(sensor, terms, ranges)
+    early = np.column_stack([light[:, 1] - light[:, 0], light[:, 0]])  # and late: of their own
+    rng = np.random.default_rng(1)
+    drawn = early + 1e-3 * np.sqrt(early) * rng.standard_normal((FRAMES, 2))
+    readings = np.column_stack([drawn[:, 1], drawn.sum(axis=1)])
+    readings += 1e-5 * rng.standard_normal((FRAMES, 2))
+    assert not track(sensor, parse_scene(PLATE), frames_of(readings, STEP_S)).misfit.any()
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_known_crosstalk_changes_nothing(kind: str) -> None:
+    crosstalk = np.array([0.3, 0.6])
+    readings, _ = readings_of(kind, 1.0, 3)
+    numbers = []
+    for scene, beside in (({}, 0.0), ({"crosstalk": crosstalk.tolist()}, crosstalk)):
+        model = tracker(sensor_of(NOISE, kind), parse_scene({**PLATE, **scene}))
+        state, _ = step(model, model.first, frames_of(readings[:60] + beside, STEP_S))
+        numbers.append(state.hypotheses.numbers[UNSTEADY])
+    # readings lose the last digits of crosstalk that is a thousand times their noise
+    assert numbers[1] == pytest.approx(numbers[0], rel=1e-9)
+
+
+def test_crosstalk_that_drifts_as_stated_is_no_misfit() -> None:
+    """By five noises a frame; one in a million frames."""
+    readings, _ = readings_of("sine_wave", 1.0, 4)
+    steps = 5.0 * NOISE * np.random.default_rng(6).standard_normal((FRAMES, 2))
+    drift = 5.0 * NOISE / np.sqrt(STEP_S)
+    model = tracker(
+        sensor_of(NOISE, "sine_wave"),
+        parse_scene(PLATE),
+        TrackingSettings(crosstalk_drift=(drift, drift)),
+    )
+    assert model.first.hypotheses.numbers.size > UNSTEADY
+    _, found = step(model, model.first, frames_of(readings + np.cumsum(steps, axis=0), STEP_S))
+    assert not found.misfit.any()
 
 
 def test_the_running_mean_is_at_most_one_and_as_wide_as_its_law() -> None:

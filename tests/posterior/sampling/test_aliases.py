@@ -145,14 +145,13 @@ def test_aliases_of_an_optimum_are_optima(joint: dict[str, Any] | None) -> None:
     places = np.array([aliases.distances(one.z[None])[0] for one in found])
     assert places[1:] == pytest.approx(places[1] + TURN * np.arange(len(found) - 1), rel=1e-9)
     assert best.is_near(aliases.moved(found[1].z[None], places[1:2] - TURN)[0][0])
-    # the next one, climbed to by itself, has the same place, height and width
-    again = refine(density, found[1].z)
-    assert again is not None
-    assert found[1].is_near(again.z)
-    assert again.log_density == pytest.approx(found[1].log_density, abs=0.01)
-    assert again.factor @ again.factor.T == pytest.approx(
-        found[1].factor @ found[1].factor.T, rel=0.05
-    )
+    # the next ones, climbed to by themselves, have the same place, height and width
+    for one in found[1:4]:
+        again = refine(density, one.z)
+        assert again is not None
+        assert one.is_near(again.z)
+        assert again.log_density == pytest.approx(one.log_density, abs=0.01)
+        assert again.factor @ again.factor.T == pytest.approx(one.factor @ one.factor.T, rel=0.05)
 
 
 def test_importance_sampling_refuses_what_it_cannot_hold() -> None:
