@@ -138,7 +138,7 @@ def test_the_error_of_the_distance_is_granted_of_the_light_that_was_read() -> No
     error = math.hypot(of_distance, READ[0] / math.sqrt(EMPTY))
     scene = {"background": WALL, "discrepancy": {"flux": 0.01, "range_m": granted}}
     for away in (-5.1, -4.9, 4.9, 5.1):
-        bare = np.tile(light + [away * error, 0.0], (EMPTY, 1))
+        bare = np.tile(light + np.array([away * error, 0.0]), (EMPTY, 1))
         frames = Frames(
             np.vstack([bare, [[0.1, 0.4]]]),
             object_present=np.array([False] * EMPTY + [True]),
