@@ -23,6 +23,7 @@ from simulator.kernel_cache import CacheFolder, folder_of
 __all__ = [
     "Kernel",
     "NotReadyError",
+    "at_once",
     "compiled",
     "compiled_for_both",
     "compiling_at_once",
@@ -105,6 +106,24 @@ def soon(*kernels: Callable[..., Any]) -> Iterator[None]:
 
 def _soon() -> frozenset[Any]:
     return getattr(_this_thread, "soon", frozenset())
+
+
+@contextlib.contextmanager
+def at_once(*kernels: Callable[..., Any]) -> Iterator[None]:
+    """Let kernels be compiled at their first call in this thread: the interpreter is not asked.
+
+    For who knows that it would be asked in vain, as before the millions of calls of a posterior.
+    """
+    before = _at_once()
+    _this_thread.at_once = before | set(kernels)
+    try:
+        yield
+    finally:
+        _this_thread.at_once = before
+
+
+def _at_once() -> frozenset[Any]:
+    return getattr(_this_thread, "at_once", frozenset())
 
 
 def _in_a_hurry() -> bool:
@@ -271,7 +290,9 @@ class Kernel:
         """Tell whether the interpreter may answer a call."""
         from simulator import uncompiled
 
-        if os.environ.get(_AT_ONCE) == "always" or uncompiled.size(args) > _MANY:
+        if os.environ.get(_AT_ONCE) == "always" or self in _at_once():
+            return False
+        if uncompiled.size(args) > _MANY:
             return False
         return self._left_s(uncompiled.kind_of(args)) > 0.0
 

@@ -21,9 +21,12 @@ from simulator.parameters import Parameters, Terms, parameters_of
 from simulator.scene import Reference, Scene
 from simulator.sensor import Sensor
 
-__all__ = ["CollapsedDensity", "FluxBasis", "collapsed_density"]
+__all__ = ["KERNELS", "CollapsedDensity", "FluxBasis", "collapsed_density"]
 
 Array = NDArray[np.float64]
+
+KERNELS = fill_best_ranges, fill_log_likelihoods
+"""What a density spends its time in: of each there is machine code before the first step."""
 
 
 class FluxBasis(NamedTuple):

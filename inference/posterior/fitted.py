@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.fits.likelihood.levenberg_marquardt import levenberg_marquardt
-from inference.fits.likelihood.multistart import find_maxima
+from inference.fits.likelihood.multistart import EASY, find_maxima
 from inference.fits.likelihood.problem import fit_problem
+from inference.fits.likelihood.profile_slopes import profile_slopes
+from inference.fits.likelihood.screen import screen
 from inference.frame.blocks import DISPLACEMENT, DISPLACEMENT_RATE
 from inference.posterior.job import Job
 from inference.posterior.sampling.start import Optimum, climb, refine
-from simulator.compiled import soon
+from simulator.compiled import at_once, soon
 from simulator.parameters import OFFSET
 
 __all__ = ["fitted_optima"]
@@ -50,7 +52,10 @@ def fitted_optima(job: Job, density: CollapsedDensity) -> list[Optimum]:
     problem = fit_problem(job.sensor, job.scene, job.frames.select(job.usable))
     if problem.names != names:
         return []
-    with soon(levenberg_marquardt):  # with terms beside the object a start takes hundreds of steps
+    # with terms beside the object a start takes hundreds of steps, and with several thousands
+    many = len(problem) > EASY
+    kernels = screen, levenberg_marquardt, profile_slopes
+    with at_once(*kernels) if many else soon(levenberg_marquardt):
         fits = find_maxima(problem)
     found = []
     for fit in fits[:_MOST]:

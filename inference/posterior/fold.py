@@ -22,6 +22,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import TypeVar
 
+from inference.density.collapsed import KERNELS
 from inference.posterior.archive import FORMAT
 from inference.posterior.job import Job, prepare
 from inference.posterior.libraries import import_libraries
@@ -44,6 +45,7 @@ from inference.posterior.stages.starting import StartTask, begin
 from inference.posterior.stages.tempering import SetOutTask, TemperTask
 from inference.posterior.stages.walking import WalkTask
 from inference.posterior.summary import draw, summarise
+from simulator.compiled import at_once
 
 __all__ = [
     "FORMAT",
@@ -88,7 +90,8 @@ def start(job: Job) -> Checkpoint:
     import_libraries()
     if job.scene.optional_terms:
         return Checkpoint(Selecting(), 0)
-    return begin(job)
+    with at_once(*KERNELS):
+        return begin(job)
 
 
 def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float = 0.0) -> tuple[Task, ...]:
@@ -120,7 +123,8 @@ def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float = 0.0) -> tuple[Task, .
 def run(task: Task) -> Piece:
     """Run one part of a chunk."""
     import_libraries()
-    return task.run()
+    with at_once(*KERNELS):
+        return task.run()
 
 
 def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoint:

@@ -332,6 +332,25 @@ def test_who_is_in_a_hurry_gets_what_is_there(monkeypatch: pytest.MonkeyPatch) -
         kernel(3.0)
 
 
+def test_who_knows_that_the_interpreter_is_too_slow_does_not_ask_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run(*_: object) -> tuple[float, float]:
+        raise AssertionError("the interpreter is asked")
+
+    monkeypatch.setattr("simulator.uncompiled.run", run)
+    monkeypatch.delenv("KERNELS_COMPILE", raising=False)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    kernel: Any = simulator.compiled.compiled(half)
+    with simulator.compiled.at_once(kernel):
+        with simulator.compiled.at_once():
+            assert kernel(3.0) == 1.5
+        assert kernel(3) == 1.5  # another kind of call
+    other: Any = simulator.compiled.compiled(half)
+    with pytest.raises(AssertionError, match="asked"):
+        other(3.0)
+
+
 def test_who_calls_often_waits_a_tenth_as_long_for_the_interpreter(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -14,7 +14,7 @@ from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.screen import screen
 from inference.identifiability.information import Information
 
-__all__ = ["BREADTH", "find_maxima", "find_starts"]
+__all__ = ["BREADTH", "EASY", "find_maxima", "find_starts"]
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ class _Effort:
 _LITTLE = _Effort(points=300, climbs=12, few=6, kept=4, many=40, polished=3)
 # with crosstalk and background together optima lie in long flat valleys
 _MUCH = _Effort(points=600, climbs=24, few=10, kept=8, many=MANY, polished=6)
-_EASY = 5  # unknowns
+EASY = 5  # unknowns
 _WAVES = 3  # of such tries, as long as they help
 _QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)  # values of each unknown that are tried
 _HELD, _RELEASED = 30, 60  # steps of a try while its unknown is held, and after that
@@ -167,7 +167,7 @@ def _screened(problem: FitProblem) -> tuple[NDArray[np.intp], Array, _Effort]:
     """Return the frames that are enough to look for optima, the screen, and the effort."""
     order, empty = _by_light(problem)
     chosen = np.sort(np.concatenate([_spread(order, _FRAMES), _spread(empty, 6)]))
-    effort = _LITTLE if len(problem) <= _EASY else _MUCH
+    effort = _LITTLE if len(problem) <= EASY else _MUCH
     return chosen, _starts(problem.select(chosen), effort.points), effort
 
 
@@ -221,7 +221,7 @@ def find_maxima(problem: FitProblem) -> tuple[Maximum, ...]:
     second = _climbed(problem, chosen, starts, effort)
     last = [followed(problem, optimum) for optimum in second[: effort.polished]]
     last = _distinct(problem, last, _MOST)
-    for _ in range(_WAVES if last and len(problem) > _EASY else 0):
+    for _ in range(_WAVES if last and len(problem) > EASY else 0):
         before = last[0].deviance
         last = _distinct(problem, last + _second_wave(problem, last[0], starts), _MOST)
         if before - last[0].deviance < TOP:
