@@ -7,6 +7,7 @@ from inference.assumptions import assumptions_of
 from inference.contradicted import without_moved
 from inference.empty_frames import Contradiction, contradiction
 from inference.estimates import Estimates, LeftOut, TechniqueResult
+from inference.first_step import first_step
 from inference.known import known_of
 from inference.plan import Plan, cheapest, obstacle, plan
 from inference.realtime.registry import TECHNIQUES
@@ -88,13 +89,15 @@ def estimate_planned(
     supposed = assumptions_of(scene, sensor, frames)
     against = contradiction(scene, sensor, frames)
     if against is not None:
-        supposed = (*supposed, against.said)
+        supposed = (against.said, *supposed)
     if techniques is None:
         if choice.chosen is None:
-            return Estimates(None, (), choice.left_out, supposed)
+            advice = first_step(sensor, scene, frames, choice, None)
+            return Estimates(None, (), choice.left_out, supposed, advice)
         result = _run(sensor, scene, frames, choice.chosen, against)
         if isinstance(result, LeftOut):
-            return Estimates(None, (), (result, *choice.left_out), supposed)
+            advice = first_step(sensor, scene, frames, choice, result)
+            return Estimates(None, (), (result, *choice.left_out), supposed, advice)
         return Estimates(choice.chosen, (result,), choice.left_out, supposed)
     problems = [
         Problem(f"/techniques/{i}", f"{name!r} is not a technique")
@@ -104,6 +107,7 @@ def estimate_planned(
     if problems:
         raise InvalidInputError(*problems)
     served: list[TechniqueResult] = []
+    refused: LeftOut | None = None
     left_out = {item.name: item for item in choice.left_out if item.name not in techniques}
     if choice.chosen is not None and choice.chosen not in techniques:
         left_out[choice.chosen] = LeftOut(choice.chosen, "was not asked for")
@@ -116,10 +120,12 @@ def estimate_planned(
         found = LeftOut(name, reason) if reason else _run(sensor, scene, frames, name, against)
         if isinstance(found, LeftOut):
             left_out[name] = found
+            refused = found if reason is None else refused
         else:
             served.append(found)
     chosen = cheapest(result.technique for result in served)
-    return Estimates(chosen, tuple(served), tuple(left_out.values()), supposed)
+    todo = None if served else first_step(sensor, scene, frames, choice, refused)
+    return Estimates(chosen, tuple(served), tuple(left_out.values()), supposed, todo)
 
 
 def _run(

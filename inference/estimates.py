@@ -146,9 +146,12 @@ class Estimates:
         Every other technique.
     assumptions : tuple of str
         What the results suppose without a check (`inference.assumptions`).
+    do_first : str or None
+        Where there is no result the one thing to do about it (`inference.first_step`).
     """
 
     chosen: str | None
     results: tuple[TechniqueResult, ...]
     left_out: tuple[LeftOut, ...]
     assumptions: tuple[str, ...] = ()
+    do_first: str | None = None

@@ -58,8 +58,9 @@ def nuisance_of(
     if posterior is None:
         if free:
             raise RefusedError(
-                f"{', '.join(free)} unknown: a tracker needs numbers or a posterior; infer one "
-                "from frames of this scene first, and pass it, or calibrate the scene"
+                f"{', '.join(free)} unknown: a tracker needs numbers or a posterior; calibrate the "
+                "scene first (hybridtof calibrate, or a posterior of frames of this scene), or "
+                "let the stream learn it (--calibrate, over HTTP `calibrate`)"
             )
         steps = np.eye(len(names))[[names.index(name) for name in told]]
         near = parameters.natural(np.concatenate([origin[None], steps, -steps]))

@@ -53,7 +53,10 @@ def encode_estimates(estimates: Estimates, shape: AnswerShape = "rows") -> bytes
         parts.append(b"," if number else b"")
         parts += _technique(result, shape)
     parts += [b'],"left_out":', _left_out(estimates.left_out)]
-    parts += [b',"assumptions":', encode(estimates.assumptions), b"}"]
+    parts += [b',"assumptions":', encode(estimates.assumptions)]
+    if estimates.do_first is not None:
+        parts += [b',"do_first":', encode(estimates.do_first)]
+    parts.append(b"}")
     return b"".join(parts)
 
 

@@ -131,6 +131,7 @@ class _Answer(pydantic.BaseModel):
     chosen: str | None
     left_out: list[LeftOutTechnique]
     assumptions: list[str]
+    do_first: str | None = None
 
 
 class EstimatesResponse(_Answer):

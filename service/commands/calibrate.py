@@ -57,8 +57,6 @@ def _run(args: argparse.Namespace) -> int:
             note(args, line)
     elif record.result is not None:
         note(args, f"{args.output} is not written: nothing was drawn")
-    if record.result is not None and record.result["fit"]["misfit"]:
-        note(args, f"misfit: {'; '.join(record.result['fit']['reasons'])}")
     return exit_code_of(args, record)
 
 

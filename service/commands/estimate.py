@@ -2,6 +2,10 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from inference.estimates import LeftOut
 
 from service.commands.command import FRAMES_HELP, Subparsers, add_command, note
 
@@ -70,10 +74,8 @@ def _run(args: argparse.Namespace) -> int:
             args.output.write_text(estimates_as(args.output.suffix, document), encoding="utf-8")
     if args.output is None:
         write_result(encoded)
-    doubted = doubts(sensor)  # said already
-    for supposed in estimates.assumptions:
-        if supposed not in doubted:
-            note(args, f"note: {supposed}")
+    if estimates.do_first is not None:
+        note(args, f"no technique has a range; do this first: {estimates.do_first}")
     for result in estimates.results:
         if result.fit is not None and result.fit["misfit"]:
             note(
@@ -82,10 +84,19 @@ def _run(args: argparse.Namespace) -> int:
                 f"(misfit, p value {result.fit['p_value']:.2g}): "
                 f"{'; '.join(result.fit['reasons'])}",
             )
-    if estimates.results:
-        return 0
-    if args.output is not None:
-        for item in estimates.left_out:
-            note(args, f"note: {item.name} is left out: {item.reason}")
-    # why none serves stands in what is left out
-    return 3
+    doubted = doubts(sensor)  # said already
+    for supposed in estimates.assumptions:
+        if supposed not in doubted:
+            note(args, f"note: {supposed}")
+    if not estimates.results and args.output is not None and args.output.suffix.lower() != ".json":
+        for line in _why(estimates.left_out):
+            note(args, f"note: {line}")
+    return 0 if estimates.results else 3
+
+
+def _why(left_out: "tuple[LeftOut, ...]") -> list[str]:
+    """Return a line for each reason, with all the techniques that it is the reason of."""
+    of_reason: dict[str, list[str]] = {}
+    for item in left_out:
+        of_reason.setdefault(item.reason, []).append(item.name)
+    return [f"{', '.join(names)}: {reason}" for reason, names in of_reason.items()]

@@ -91,4 +91,7 @@ def _run(args: argparse.Namespace) -> int:
     with naming(sources | {"": str(args.scene)}):
         result = identifiability_of(parse(IdentifiabilityRequest, data))
     write_result(pydantic_core.to_json(dataclasses.asdict(result)))
+    for row in result.identifiability:
+        if row.parameter == "range_m" and row.status != "identified":
+            note(args, f"range_m, the scale of all ranges, would be {row.status}: {row.reason}")
     return 0

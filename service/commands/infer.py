@@ -104,12 +104,28 @@ def exit_code_of(args: argparse.Namespace, record: "JobRecord") -> int:
             return 2
         sys.stderr.write(f"hybridtof: error: {record.problem['detail']}\n")
         return 3 if record.problem["status"] < 500 else 4
-    verdict: dict[str, Any] = {} if record.result is None else record.result["verdict"]
-    if verdict.get("converged"):
-        return 0
-    reasons = "; ".join(verdict.get("reasons", ()))
-    sys.stderr.write(f"hybridtof: not converged: {reasons}\n")
-    return 3
+    result: dict[str, Any] = record.result or {}
+    verdict: dict[str, Any] = result.get("verdict", {})
+    converged = bool(verdict.get("converged"))
+    if not converged:
+        reasons = "; ".join(verdict.get("reasons", ()))
+        sys.stderr.write(f"hybridtof: not converged: {reasons}\n")
+    for line in _warnings(result):
+        note(args, line)
+    return 0 if converged else 3
+
+
+def _warnings(result: dict[str, Any]) -> list[str]:
+    """Return what decides whether ranges of a posterior are to be used, what matters most first."""
+    said = []
+    fit = result.get("fit") or {}
+    if fit.get("misfit"):
+        said.append(f"misfit: do not use the ranges as they are: {'; '.join(fit['reasons'])}")
+    return said + [
+        f"range_m, the scale of all ranges, is {row['status']}: {row['reason']}"
+        for row in result.get("identifiability") or ()
+        if row["parameter"] == "range_m" and row["status"] != "identified"
+    ]
 
 
 def _format_of(path: Path) -> str:

@@ -52,8 +52,12 @@ def test_an_estimate_that_no_technique_serves_is_no_answer(
         json.dumps({"sensor": SENSOR, "scene": {"crosstalk": unknown, "motion": "static"}})
     )
     code, out, err = run(capsys, "estimate", frames, "--scene", path)
-    assert (code, err) == (3, "")
     body = json.loads(out)
+    advice = body["do_first"]
+    assert (code, err) == (
+        3, f"hybridtof: no technique has a range; do this first: {advice}\n"
+    )  # fmt: skip
+    assert advice.startswith("take 5 frames without the object (object_present false), send them")
     assert body["chosen"] is None
     assert any("needs motion" in item["reason"] for item in body["left_out"])
 

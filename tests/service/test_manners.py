@@ -320,6 +320,42 @@ def test_a_fit_that_misfits_gives_no_range_and_says_so(
     assert all(",none,,,,,false," in row and "(misfit)" in row for row in rows)
 
 
+def test_what_to_do_first_where_no_technique_serves(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Before all reasons, each of which is said once, for all the techniques that it is of."""
+    leak = {"crosstalk": [{"prior": "halfnormal", "sd": 0.1}] * 2}
+    scene = written(tmp_path / "s.json", {"sensor": SENSOR, "scene": leak})
+    frames = written(tmp_path / "f.csv", "w1,w2\n0.02,1.7\n")
+    said = Said(capsys, "estimate", frames, "--scene", scene)
+    document = json.loads(said.out)
+    first = "take 5 frames without the object (object_present false) and 4 frames of the object"
+    assert (said.code, document["results"]) == (3, [])
+    assert document["do_first"].startswith(first)
+    assert len(document["left_out"]) == 14
+    assert said.err.count("\n") == 1
+    assert document["do_first"] in said.err
+    out = tmp_path / "out.csv"
+    said = Said(capsys, "estimate", frames, "--scene", scene, "--output", out)
+    advice, *reasons = said.err.splitlines()
+    assert first in advice
+    assert len(reasons) < 6
+    names = [name for line in reasons for name in line.split(": ")[2].split(", ")]
+    assert sorted(names) == sorted(item["technique"] for item in document["left_out"])
+    assert Said(capsys, "estimate", frames, "--scene", scene, "--quiet").err == ""
+
+
+def test_ranges_that_frames_would_leave_open_are_said(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    leak = {"crosstalk": [{"prior": "halfnormal", "sd": 0.1}] * 2}
+    scene = written(tmp_path / "s.json", {"sensor": SENSOR, "scene": leak})
+    asked = ("identifiability", "--scene", scene, "--ranges", "0.3", "0.5")
+    assert "range_m, the scale of all ranges, would be" in Said(capsys, *asked).err
+    wide = (*asked, "0.7", "0.9", "1.1", "--empty", "5")
+    assert Said(capsys, *wide).err == ""
+
+
 @pytest.mark.parametrize("command", ["estimate", "simulate"])
 def test_a_file_that_cannot_be_written_is_refused_before_the_work(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, command: str
