@@ -10,9 +10,12 @@ from inference.assumptions import doubtful_unit
 from simulator.frames import Frames
 from simulator.sensor import Sensor
 
-__all__ = ["doubts"]
+__all__ = ["LOOKED", "doubts", "noise_doubts"]
 
 Array = NDArray[np.float64]
+
+LOOKED = 32
+"""Frames of a stream by which its noise is looked at, once."""
 
 # a few numbers that were typed are round by themselves
 _FEWEST = 6
@@ -43,15 +46,29 @@ def doubts(sensor: Sensor, frames: Frames | None = None) -> list[str]:
     doubt = doubtful_unit(sensor)
     found = [] if doubt is None else [doubt]
     if frames is not None:
-        found += _of_noise(sensor, frames)
+        found += noise_doubts(sensor, frames.readings)
         if frames.time_s is not None:
             found += _of_times(frames.time_s)
     return found
 
 
-def _of_noise(sensor: Sensor, frames: Frames) -> Iterator[str]:
+def noise_doubts(sensor: Sensor, readings: Array) -> Iterator[str]:
+    """Yield for each column that is rounded by more than its stated noise that it is.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        As stated.
+    readings : ndarray, shape (n, 2)
+        Of some of its frames.
+
+    Yields
+    ------
+    str
+        A sentence for a person.
+    """
     for k, column in enumerate(sensor.columns):
-        values = np.abs(frames.readings[:, k])
+        values = np.abs(readings[:, k])
         step = _rounding(values)
         if step is None:
             continue

@@ -16,6 +16,9 @@ __all__ = ["add_parser"]
 
 LAG = 300
 
+# of few answers: they are not read for it otherwise
+_SUPPOSES = b'"assumptions":['
+
 
 def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     """Add the command to the command line."""
@@ -87,6 +90,7 @@ def _follower(
 
 
 def _run(args: argparse.Namespace) -> int:
+    import json
     import time
 
     from service.checked_system import checked_system
@@ -121,5 +125,8 @@ def _run(args: argparse.Namespace) -> int:
             kept.add(taken)
             place = taken.place
             write_result(taken.answers[0])
+            if _SUPPOSES in taken.answers[0]:
+                for supposed in json.loads(taken.answers[0]).get("assumptions", ()):
+                    note(args, f"note: {supposed}")
     # of a stream in which no line is a frame nothing was answered
     return 0 if place.answered else 2

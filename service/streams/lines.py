@@ -83,6 +83,8 @@ class Place:
         What is told of a stream that calibrates itself.
     supposed : bool
         Whether a line was told what its answer supposes.
+    early : sequence of pairs of float, or None
+        Readings of the first frames, until there are enough to look at their noise; then None.
     """
 
     state: TrackState | CalibrationState
@@ -97,6 +99,7 @@ class Place:
     last: bytes = b""
     calibration: dict[str, Any] | None = None
     supposed: bool = False
+    early: Sequence[Sequence[float]] | None = ()
 
 
 class Earlier(Protocol):

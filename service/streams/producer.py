@@ -29,7 +29,7 @@ from simulator.errors import InvalidInputError
 
 __all__ = ["Producer", "lines_of", "place_of"]
 
-_KEPT = (*COUNTS, "unnumbered", "surprise", "misfit", "calibration", "supposed")
+_KEPT = (*COUNTS, "unnumbered", "surprise", "misfit", "calibration", "supposed", "early")
 _BLOCK = 2**17  # of a batch of a thousand lines, which is to be one turn
 _TRIES = 3
 

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from inference.assumptions import unused_temperature
 from inference.self_calibration.following import Piece
 from service.errors import BodyTooLargeError, ConflictError, GoneError
 from service.streams.answered import encoded, error_of, more_of, text_of
@@ -30,6 +29,7 @@ from service.streams.shapes import (
     passes,
     shape_of,
 )
+from service.streams.supposing import More, Supposing, told_with
 from service.streams.together import together
 from simulator.errors import HybridTofError, InvalidInputError
 from simulator.frames import Frames
@@ -41,7 +41,6 @@ __all__ = ["take"]
 _Waiting = tuple[int, int, float, float, tuple[Any, ...], dict[str, Any] | None]
 
 _ARRIVED: Callable[[Line], float] = attrgetter("arrived")
-_More = Sequence[dict[str, Any] | None] | None
 
 
 def take(
@@ -87,7 +86,7 @@ class _Batch:
         self._unnumbered = place.unnumbered
         self._counts = dict.fromkeys(COUNTS, 0)
         self._surprise, self._misfit = place.surprise, place.misfit
-        self._supposed = place.supposed
+        self._told = Supposing(place.supposed, place.early)
         self._answers: list[bytes] = []
         self._at: dict[int, int] = {}
         self._repeats: list[tuple[int, int, int]] = []
@@ -120,7 +119,7 @@ class _Batch:
             misfit=self._misfit,
             last=last,
             calibration=self._follower.told(self._state),
-            supposed=self._supposed,
+            **self._told._asdict(),
             **{name: getattr(self._place, name) + n for name, n in self._counts.items()},
         )
         return Taken(place, text, kept, len(self._repeats), any(self._counts.values()))
@@ -244,15 +243,9 @@ class _Batch:
         for place, answer in zip(at, lines_in(b"".join(map(text_of, said))), strict=True):
             self._answers[place] = answer
 
-    def _supposing(self, frames: Frames, also: _More) -> _More:
-        """Tell what answers suppose, once a stream: with the first frame where it plays a part."""
-        told = None if self._supposed else unused_temperature(self._model.sensor, frames)
-        if told is None:
-            return also
-        self._supposed = True
-        more = list(also or [None] * len(frames))
-        at, reason = told
-        more[at] = (more[at] or {}) | {"assumptions": [reason]}
+    def _supposing(self, frames: Frames, also: More) -> More:
+        """Return what is said of frames, with what is told once a stream."""
+        self._told, more = told_with(self._told, self._model.sensor, frames, also)
         return more
 
     def _say(
@@ -261,7 +254,7 @@ class _Batch:
         sequences: Sequence[int],
         times: Sequence[float],
         arrivals: Sequence[float],
-        also: _More,
+        also: More,
     ) -> list[Said]:
         """Return what follows the stream says of frames, piece by piece."""
         latencies, start, said = time.perf_counter() - np.array(arrivals), 0, []

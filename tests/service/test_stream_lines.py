@@ -3,6 +3,7 @@
 import asyncio
 import itertools
 import json
+import math
 import time
 from collections.abc import Sequence
 from types import SimpleNamespace
@@ -309,6 +310,22 @@ def test_kept_numbers_are_the_same_answers(model: Tracker) -> None:
     plain = [Line(frame(n), 0.0) for n in range(1, 40)]
     small = take(Plain(model), Place(model.first), plain, JsonLines(), Kept())
     assert 2 * len(small.kept) < sum(map(len, small.answers))
+
+
+def test_noise_below_the_rounding_is_told_once(model: Tracker) -> None:
+    """With the 32nd frame, however the lines are cut, and none of readings that are not rounded."""
+    lines = [frame(n, w1=round(0.02 + 1e-3 * (n % 7), 3)) for n in range(1, 50)]
+    lines.insert(3, b"junk")
+    whole = answered(model, [lines])
+    assert [n for n, line in enumerate(whole) if "assumptions" in line] == [32]
+    late, light = whole[32]["assumptions"]
+    assert late.startswith("w1 is rounded to 0.001, and its stated noise is 1e-06: state 0.00029")
+    assert light.startswith("w2 is rounded to 0.01")
+    for size in (1, 7, 32, 33):
+        cut = [lines[at : at + size] for at in range(0, len(lines), size)]
+        assert answered(model, cut) == whole
+    fine = [frame(n, w1=0.02 + math.sin(n) / 1e6, w2=1.7 + math.cos(n) / 1e6) for n in range(50)]
+    assert not any("assumptions" in line for line in answered(model, [fine]))
 
 
 def test_a_temperature_that_nothing_uses_is_told_once(model: Tracker) -> None:

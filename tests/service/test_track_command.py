@@ -24,6 +24,17 @@ def answers(said: Said) -> list[dict[str, Any]]:
     return [json.loads(line) for line in said.out.splitlines()]
 
 
+def test_noise_below_the_rounding_is_noted_once(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path
+) -> None:
+    rows = "".join(f"{0.1 * n:.1f},0.02,{1.7 - 0.01 * n:.2f}\n" for n in range(40))
+    path = written(tmp_path / "f.csv", "time_s,w1,w2\n" + rows)
+    said = Said(capsys, "track", path, "--scene", scene)
+    assert said.err.count("is rounded to") == 1
+    assert said.err.startswith("hybridtof: note: w2 is rounded to 0.01")
+    assert Said(capsys, "track", path, "--scene", scene, "--quiet").err == ""
+
+
 def test_track_is_the_tracker(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path
 ) -> None:
