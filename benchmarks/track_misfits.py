@@ -39,14 +39,16 @@ KINDS: tuple[dict[str, Any], ...] = (
     {"kind": "pulsed", "pulse_width_s": 3e-8},
     {"kind": "sine_wave", "frequency_hz": 2e7},
 )
-# factors on the noise and on the constant light, beside what is stated
+# factors on the noise, on the constant light and on the object's, beside what is stated
 FAULTS = {
-    "healthy": (1.0, 1.0),
-    "noise 1.5": (1.5, 1.0),
-    "noise 2": (2.0, 1.0),
-    "noise 3": (3.0, 1.0),
-    "crosstalk +3 %": (1.0, 1.03),
-    "crosstalk +10 %": (1.0, 1.1),
+    "healthy": (1.0, 1.0, 1.0),
+    "noise 1.5": (1.5, 1.0, 1.0),
+    "noise 2": (2.0, 1.0, 1.0),
+    "noise 3": (3.0, 1.0, 1.0),
+    "crosstalk +3 %": (1.0, 1.03, 1.0),
+    "crosstalk +10 %": (1.0, 1.1, 1.0),
+    "object +50 %": (1.0, 1.0, 1.5),
+    "object +100 %": (1.0, 1.0, 2.0),
 }
 _SILENT = parse_sensor({"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1.0, 1.0]}})
 _PLATES = [g for g in CLASSES.values() if not (g.crosstalk or g.background)]
@@ -80,7 +82,7 @@ def path_of(rng: np.random.Generator, number: int, count: int) -> Array:
 
 
 def first_said(
-    number: int, exact: bool, count: int, faults: tuple[float, float], objects: Objects
+    number: int, exact: bool, count: int, faults: tuple[float, float, float], objects: Objects
 ) -> float | None:
     """Return when a track first says misfit [s], infinite: never; None: no such object."""
     if (number, exact) not in objects:
@@ -109,8 +111,8 @@ def first_said(
     crosstalk = middle * (0.0, 0.1, 0.3, 1.0)[rng.integers(4)] * np.array([0.6, 0.8])
     if faults[1] != 1.0:
         crosstalk = middle * np.array([0.6, 0.8])
-    more, shift = faults
-    readings = means + shift * crosstalk + more * noise * rng.standard_normal((count, 2))
+    more, shift, brighter = faults
+    readings = brighter * means + shift * crosstalk + more * noise * rng.standard_normal((count, 2))
     sensor = parse_sensor({**kind, "noise": {"read": [noise, noise]}})
     stated = {"object": known, "crosstalk": crosstalk.tolist()}
     frames = Frames(readings, time_s=STEP_S * np.arange(count, dtype=np.float64))

@@ -13,12 +13,16 @@ from inference.estimates import Status
 from inference.tracking.empty_scene import learn_empty
 from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import COUNT, PENDING, ROUGHNESS, RUNNING, TIME, Hypotheses
+from inference.tracking.lasting import lasting_of
 from inference.tracking.prediction import predict
+from inference.tracking.readings_table import nuisance_count
 from inference.tracking.report import (
     BEST,
+    LASTING,
     OUTLIER,
     POSITION,
     PRESENT,
+    SD,
     STATUS,
     SURPRISE,
     UNSTEADY_MEAN,
@@ -102,8 +106,9 @@ def run_filter(
         out[i, OUTLIER], out[i, SURPRISE] = outlier, numbers[RUNNING]
         if numbers.size > UNSTEADY:
             if kinds[i] == USABLE and outlier < 0.5 and out[i, PRESENT] > 0.5:
-                u = out[i, BEST + POSITION]
-                take_unsteady(of, 1, u, frame, times[i], model.table, rules)
+                u, sd = out[i, BEST + POSITION], out[i, BEST + SD]
+                take_unsteady(of, 1, u, sd, frame, times[i], model.table, rules)
             out[i, UNSTEADY_MEAN] = numbers[UNSTEADY]
+            out[i, LASTING] = lasting_of(numbers, nuisance_count(model.table), rules.memory)
         if kinds[i] == SATURATED or kinds[i] == EMPTY_SATURATED:
             out[i, STATUS] = _SATURATED

@@ -24,6 +24,7 @@ __all__ = [
     "CROSSTALK",
     "HYPOTHESES",
     "HYPOTHESIS_COLUMNS",
+    "LASTING",
     "MODEL_SD",
     "OUTLIER",
     "POSITION",
@@ -44,7 +45,7 @@ Array = NDArray[np.float64]
 
 # columns of a report
 STATUS, PRESENT, OUTLIER, SURPRISE, HYPOTHESES, BEST = range(6)
-CROSSTALK, UNSTEADY_MEAN, REPORT_COLUMNS = 12, 16, 17
+CROSSTALK, UNSTEADY_MEAN, LASTING, REPORT_COLUMNS = 12, 16, 17, 18
 # columns of a hypothesis, and of the best range: u, its sd, the parts of it that all frames share
 # because the scene and because the model may be wrong, rate, its sd, weight (of the best range
 # given that an object is there)

@@ -1,6 +1,7 @@
 """The numbers that a tracker's settings stand for."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -10,7 +11,7 @@ from inference.tracking.nuisance_jacobian import NuisanceJacobian
 from inference.tracking.observed import Observed
 from inference.tracking.settings import TrackingSettings
 
-__all__ = ["is_felt", "rules_of", "surprise_limit", "unsteady_limit"]
+__all__ = ["MisfitLimits", "is_felt", "misfit_limits", "rules_of"]
 
 _BREADTH = 10.0  # of an outlier's law, in units of the noise: wider than what noise explains
 _SAME = 0.05  # nats per weight: two hypotheses merge long before any of their intervals shows it
@@ -60,6 +61,37 @@ def rules_of(
 def is_felt(shared: NuisanceJacobian) -> bool:
     """Tell whether errors that frames share are felt beside the noise."""
     return bool(np.abs(shared.along).max(initial=0.0) > _SHARED)
+
+
+class MisfitLimits(NamedTuple):
+    """Above what a frame is a misfit."""
+
+    surprise: float  # running surprise
+    unsteady: float  # running mean of changes across the curve
+    lasting: float  # mean of what is left across the curve, in standard deviations of what may be
+
+
+def misfit_limits(
+    settings: TrackingSettings, rules: Rules, channels: int, shared: NuisanceJacobian
+) -> MisfitLimits:
+    """Return the limits, each passed by chance as often as the settings allow.
+
+    Parameters
+    ----------
+    settings : TrackingSettings
+        With the probability of a false alarm.
+    rules : Rules
+        With the memory of the means.
+    channels : int
+        Readings of a frame that are used.
+    shared : NuisanceJacobian
+        What all frames err in common.
+    """
+    return MisfitLimits(
+        surprise_limit(settings, rules, channels, shared),
+        unsteady_limit(settings, rules),
+        float(scipy.stats.norm.isf(0.5 * settings.false_alarm)),
+    )
 
 
 def surprise_limit(

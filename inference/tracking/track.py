@@ -15,6 +15,7 @@ from inference.tracking.report import (
     CROSSTALK,
     HYPOTHESES,
     HYPOTHESIS_COLUMNS,
+    LASTING,
     MODEL_SD,
     OUTLIER,
     POSITION,
@@ -69,7 +70,8 @@ class Track:
     surprise : ndarray, shape (n,)
         Running mean of the normalised innovation squared per reading: 1 where all is as modelled.
     misfit : ndarray of bool, shape (n,)
-        Whether it is above what chance allows: scene, noise or motion are not as stated.
+        Whether it, jumps or what lasts beside the curve are above what chance allows: scene, noise
+        or motion are not as stated.
     hypotheses_m, hypotheses_sd_m, hypotheses_weight : ndarray, shape (n, k)
         All ranges by ascending order, padded with nan [m].
     crosstalk, crosstalk_sd : ndarray, shape (n, 2), optional
@@ -265,7 +267,7 @@ def _track(model: Tracker, out: Array, rows: Array) -> Track:
     range_m, ranges = np.exp(out[:, BEST + POSITION]), np.exp(rows[:, :, POSITION])
     sd, scene, error = (out[:, BEST + column] for column in (SD, SCENE_SD, MODEL_SD))
     added = model.added(out[:, BEST + POSITION])
-    most, unsteady = model.limits
+    limits = model.limits
     return Track(
         status=out[:, STATUS].astype(np.uint8),
         present=out[:, PRESENT].copy(),
@@ -281,7 +283,9 @@ def _track(model: Tracker, out: Array, rows: Array) -> Track:
         weight=out[:, BEST + WEIGHT].copy(),
         outlier=out[:, OUTLIER].copy(),
         surprise=out[:, SURPRISE].copy(),
-        misfit=(out[:, SURPRISE] > most) | (out[:, UNSTEADY_MEAN] > unsteady),
+        misfit=(out[:, SURPRISE] > limits.surprise)
+        | (out[:, UNSTEADY_MEAN] > limits.unsteady)
+        | (out[:, LASTING] > limits.lasting),
         hypotheses_m=ranges,
         hypotheses_sd_m=ranges * np.hypot(rows[:, :, SD], model.added(rows[:, :, POSITION])),
         hypotheses_weight=rows[:, :, WEIGHT].copy(),

@@ -20,7 +20,7 @@ from inference.tracking.nuisance_jacobian import crosstalk_root, nuisance_jacobi
 from inference.tracking.observed import Observed, observed_of
 from inference.tracking.places import Places
 from inference.tracking.readings_table import ReadingsTable
-from inference.tracking.rules import is_felt, rules_of, surprise_limit, unsteady_limit
+from inference.tracking.rules import MisfitLimits, is_felt, misfit_limits, rules_of
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
 from inference.tracking.tabulate import empty_readings, knots_of, places_of, table_of
@@ -55,9 +55,9 @@ class Tracker:
         What is read of every frame.
     model : Model
         What the kernels take.
-    limits : (float, float)
-        Running surprise, and running mean of changes across the curve, above which the model does
-        not fit.
+    limits : MisfitLimits
+        Above what the model does not fit: of the running surprise, of the running mean of changes
+        across the curve, and of what lasts there.
     first : TrackState
         The state before any frame.
     added_sd : ndarray, shape (knots,), optional
@@ -72,7 +72,7 @@ class Tracker:
     settings: TrackingSettings
     observed: Observed
     model: Model
-    limits: tuple[float, float]
+    limits: MisfitLimits
     first: TrackState
     added_sd: Array | None = None
     crosstalk: tuple[float, float] = (0.0, 0.0)
@@ -178,7 +178,7 @@ def tracker(
     bare = np.column_stack([empty, jacobian.empty])
     places = places_of(knots, jacobian.along, bare, observed, settings.rate_sd)
     rules = rules_of(settings, observed, scene.motion == "static", jacobian)
-    limit = surprise_limit(settings, rules, observed.channels, jacobian)
+    limits = misfit_limits(settings, rules, observed.channels, jacobian)
     one, other = parameters.crosstalk or ("", "")
     by_prior = posterior is None and one in untold, posterior is None and other in untold
     first = first_state(
@@ -197,7 +197,6 @@ def tracker(
     by_table = sd_by_table(knots, observed.by_rate)
     if by_table is not None:
         added = by_table if added is None else np.hypot(added, by_table)
-    limits = limit, unsteady_limit(settings, rules)
     return Tracker(sensor, settings, observed, model, limits, first, added, static)
 
 

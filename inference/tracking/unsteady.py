@@ -5,6 +5,9 @@ surprise tells little of it. But it is smooth along the range, and what is left 
 across the curve hardly changes with it from one frame to the next: that changes by noise. Noise
 that is stated too small shows at once, beside any error of the model or of the scene.
 
+What is left across the curve may also last, by more than those errors: another object, light that
+nobody stated. `inference.tracking.lasting` has its mean.
+
 docs/model.md, unsteady, has the statistic.
 """
 
@@ -13,6 +16,12 @@ import math
 from inference.tracking.borrowed import borrowed
 from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import CROSSTALK1, CROSSTALK2, Hypotheses, learns_crosstalk
+from inference.tracking.lasting import (
+    crosstalk_variance,
+    first_lasting,
+    sagitta,
+    take_lasting,
+)
 from inference.tracking.motion import Rules
 from inference.tracking.readings_table import (
     ReadingsTable,
@@ -30,7 +39,8 @@ __all__ = ["UNSTEADY", "first_unsteady", "take_unsteady"]
 
 # places in `Hypotheses.numbers` behind its own, only where errors that frames share are felt: the
 # running mean, and of the last frame its time, what is left of its two readings, the direction
-# across the curve (nan: there was none), and what every nuisance parameter does along that
+# across the curve (nan: there was none), and what every nuisance parameter does along that; behind
+# them what lasts
 UNSTEADY, _TIME, _LEFT1, _LEFT2, _ACROSS1, _ACROSS2, _SHARED = range(6, 13)
 # standard deviations that an error which frames share may be off by: beyond it one in a million is
 _ALLOWED = 5.0
@@ -39,7 +49,7 @@ _MOST = 15.1  # squared change at which a single frame is cut: noise exceeds it 
 
 def first_unsteady(nuisance: int) -> list[float]:
     """Return these numbers before any frame, of so many nuisance parameters."""
-    return [1.0] + [math.nan] * (_SHARED - _TIME + nuisance)
+    return [1.0] + [math.nan] * (_SHARED - _TIME + nuisance) + first_lasting(nuisance)
 
 
 @borrowed
@@ -48,19 +58,20 @@ def take_unsteady(
     of: Hypotheses,
     row: int,
     u: float,
+    sd: float,
     frame: TrackedFrame,
     time: float,
     table: ReadingsTable,
     rules: Rules,
 ) -> None:
-    """Take a frame into the running mean of changes across the curve.
+    """Take a frame into the running means of what is left across the curve, and of its changes.
 
     Parameters
     ----------
     of, row : Hypotheses, int
         The state, and the hypothesis whose crosstalk is taken; the numbers are changed in place.
-    u : float
-        log r of the frame.
+    u, sd : float
+        log r of the frame, and its standard deviation.
     frame, time : TrackedFrame, float
         The frame and when it was [s].
     table, rules : ReadingsTable, Rules
@@ -85,8 +96,8 @@ def take_unsteady(
     across1, across2 = -slope2 / size, slope1 / size
     i, part = cell_of(u, table)
     turn1, turn2 = across1 - numbers[_ACROSS1], across2 - numbers[_ACROSS2]
-    shared = 0.0
-    for j in range(nuisance_count(table)):
+    shared, count = 0.0, nuisance_count(table)
+    for j in range(count):
         g1, g2 = nuisance_at(i, part, j, table)
         new = gain * (across1 * g1 + across2 * g2)
         change = new - numbers[_SHARED + j]
@@ -99,6 +110,10 @@ def take_unsteady(
     change -= numbers[_ACROSS1] * numbers[_LEFT1] + numbers[_ACROSS2] * numbers[_LEFT2]
     # the crosstalk that is taken from both is the same
     change -= turn1 * known1 + turn2 * known2
+    deviation = across1 * (left1 - known1) + across2 * (left2 - known2)
+    bend = gain * sagitta(u, sd, across1, across2, table)
+    open_crosstalk = crosstalk_variance(of, row, across1, across2, table)
+    take_lasting(numbers, count, deviation, bend, open_crosstalk, rules.memory)
     if not math.isnan(change):
         own = min(change * change / variance, _MOST)
         numbers[UNSTEADY] += (1.0 - rules.memory) * (own - numbers[UNSTEADY])

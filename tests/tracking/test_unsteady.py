@@ -115,7 +115,7 @@ def test_the_running_mean_is_at_most_one_and_as_wide_as_its_law() -> None:
     sd = np.sqrt(3.0 / len(squares))
     # 1 in 10,000 seeds of a mean of 1; what a shared error may add makes it less
     assert 1.0 - 0.3 - 3.7 * sd < squares.mean() < 1.0 + 3.7 * sd
-    limit = model.limits[1]
+    limit = model.limits.unsteady
     freedom = 1.0 / (2.0 * 1.5 * (1.0 - memory) / (1.0 + memory))
     assert limit == pytest.approx(scipy.stats.gamma.isf(1e-6, freedom, scale=1 / freedom), rel=0.02)
 
