@@ -11,7 +11,7 @@ from typing import Any
 import numba
 from numba.core import codegen, compiler, runtime
 
-__all__ = ["InnerCompiler", "rebuilt"]
+__all__ = ["ClosedCompiler", "InnerCompiler", "rebuilt"]
 
 # numba's classes carry no types, and its stubs know a part of its names
 _numba: Any = numba
@@ -53,6 +53,28 @@ class InnerCompiler(_Compiler):  # type: ignore[misc]
         super().__init__(typing, target, library, *more)
         self.state.library = _InnerLibrary(target.codegen(), "inner")
         self.state.targetctx.get_executable = _key  # of a context of this compiling alone
+
+
+class _ClosedLibrary(_Library):  # type: ignore[misc]
+    """Code of a kernel, and of all that it calls, which is its own (`simulator.closed`)."""
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            # numba gives functions such names; others are of its runtime, and known by theirs
+            if function.linkage.name == "linkonce_odr" and function.name.startswith("_ZN"):
+                function.linkage = "internal"
+        super()._optimize_final_module()
+
+
+class ClosedCompiler(_Compiler):  # type: ignore[misc]
+    """numba's compiler, of a kernel that Python alone calls."""
+
+    def compile_extra(self, function: Callable[..., Any]) -> Any:
+        """Compile a function as numba does, but for its library."""
+        library = _ClosedLibrary(self.state.targetctx.codegen(), function.__qualname__)
+        library.enable_object_caching()
+        self.state.library = library
+        return super().compile_extra(function)
 
 
 def _key(library: Any, described: Any, environment: Any) -> Any:

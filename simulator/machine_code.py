@@ -8,8 +8,9 @@ import numba
 from numba import extending, types
 from numba.core import caching, sigutils
 
+from simulator.closed import CLOSED
 from simulator.compile_lock import turn
-from simulator.inner_code import InnerCompiler, rebuilt
+from simulator.inner_code import ClosedCompiler, InnerCompiler, rebuilt
 from simulator.kernel_cache import CacheFolder, base_folder
 from simulator.quick_compiler import quicken, rare_collections
 
@@ -100,20 +101,23 @@ def dispatcher(
 ) -> Any:
     """Return numba's dispatcher of a function, with its machine code in a folder.
 
-    One of an inner function answers kernels alone (`simulator.inner_code`).
+    One of an inner function answers kernels alone (`simulator.inner_code`), and one of a closed
+    kernel Python alone (`simulator.closed`).
 
     Division by zero gives inf or nan as in numpy; the interpreter lock is released; no fast-math,
     because error-free transformations and tests for nan must survive.
     """
     hidden = {name: value for name, value in options.items() if name.startswith("_")}
-    for_kernels = {"no_cpython_wrapper": True, "pipeline_class": InnerCompiler} if inner else {}
+    pipeline: dict[str, Any] = {"pipeline_class": ClosedCompiler} if hidden.pop(CLOSED, 0) else {}
+    if inner:
+        pipeline = {"no_cpython_wrapper": True, "pipeline_class": InnerCompiler}
     made = _njit(
         nogil=True,
         error_model="numpy",
         fastmath=False,
         no_cfunc_wrapper=True,  # nothing here is called from C
-        **{name: value for name, value in options.items() if name not in hidden},
-        **for_kernels,
+        **{name: value for name, value in options.items() if not name.startswith("_")},
+        **pipeline,
     )(function)
     made.targetoptions.update(hidden)
     made.compile = rare_collections()(made.compile)

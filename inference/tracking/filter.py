@@ -30,6 +30,7 @@ from inference.tracking.report import (
 )
 from inference.tracking.unsteady import UNSTEADY, take_unsteady
 from inference.tracking.weighing import Model, room_for, weigh_frame, weigh_known
+from simulator.closed import closed
 from simulator.compiled import compiled
 
 __all__ = ["EMPTY", "EMPTY_SATURATED", "SATURATED", "USABLE", "run_filter"]
@@ -44,6 +45,7 @@ _SATURATED = int(Status.SATURATED)
 _LATE = 4.0  # frames over which the roughness of the motion is a mean
 
 
+@closed
 @compiled
 def run_filter(
     out: Array,

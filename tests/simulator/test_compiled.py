@@ -13,6 +13,7 @@ import pytest
 
 import simulator.compiled
 from simulator import kernel_cache
+from simulator.closed import closed
 
 ROOT = Path(simulator.compiled.__file__).resolve().parents[1]
 DECORATORS = {"compiled", "compiled_for_both"}
@@ -201,6 +202,33 @@ def test_what_only_kernels_call_is_never_made_runnable_and_taken_in_from_the_dis
         path.parent.name == "inner": b"ELF" in path.read_bytes() for path in tmp_path.rglob("*.nbc")
     }
     assert runnable == {True: False, False: True}
+
+
+@pytest.mark.usefixtures("always")
+@pytest.mark.parametrize(("said", "whose"), [([closed], "internal"), ([], "linkonce_odr")])
+def test_what_a_closed_kernel_calls_is_its_own(
+    said: list[Any], whose: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from simulator import inner_code
+
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    found: dict[str, str] = {}
+    optimize = inner_code._Library._optimize_final_module
+
+    def note(library: Any) -> None:
+        found.update({one.name: one.linkage.name for one in library._final_module.functions})
+        optimize(library)
+
+    monkeypatch.setattr(inner_code._Library, "_optimize_final_module", note)
+    monkeypatch.setitem(globals(), "within", simulator.compiled.compiled(half))
+    for _ in range(2):  # the second comes from the disk
+        kernel: Any = simulator.compiled.compiled(quarter)
+        for say in said:
+            say(kernel)
+        assert kernel(3.0) == 0.75
+    assert sum(kernel.dispatcher.stats.cache_hits.values()) == 1
+    assert {found[name] for name in found if "4half" in name} == {whose}
+    assert {found[name] for name in found if "7quarter" in name} == {"external"}
 
 
 @pytest.mark.usefixtures("always")
