@@ -1,4 +1,4 @@
-"""Light that a scene does not state: crosstalk that drifts, and a second object that rests.
+"""Light that a scene does not state: crosstalk that drifts, a second object that rests, a wall.
 
 Five empty frames come first, or come first and last, of 30 frames of a disk of 15 cm radius from
 0.25 to 1.8 m behind unknown crosstalk; the noise is 1/300 of the median light. A table says how far
@@ -49,7 +49,12 @@ def readings(kind: str, r: Array, flux: Array) -> Array:
 
 
 def one(
-    kind: str, seed: int, drift: float = 0.0, last: bool = False, second: bool = False
+    kind: str,
+    seed: int,
+    drift: float = 0.0,
+    last: bool = False,
+    second: bool = False,
+    wall: bool = False,
 ) -> Outcome:
     """Fit one set.
 
@@ -65,14 +70,23 @@ def one(
         Whether empty frames come last, too.
     second : bool
         Whether a disk of 10 cm radius rests at 1.5 m wherever the object is there.
+    wall : bool
+        Whether a wall of 3 m radius stands at 3 m, which empty frames show.
     """
     rng = np.random.default_rng(seed)
-    r, flux = disk(np.geomspace(0.25, 1.8, _FRAMES), 0.15, 0.6)
+    z = np.geomspace(0.25, 1.8, _FRAMES)
+    r, flux = disk(z, 0.15, 0.6)
     light = readings(kind, r, flux)
     if second:
         light = light + readings(kind, *disk(np.array([1.5]), 0.1, 0.5))
     after = _EMPTY if last else 0
-    bare = np.vstack([np.zeros((_EMPTY, 2)), light, np.zeros((after, 2))])
+    behind = np.zeros((1, 2))
+    if wall:
+        behind = readings(kind, *disk(np.array([3.0]), 3.0, 0.5))
+        # what the object hides is a disk of the wall, as seen from the sensor
+        hidden = [disk(np.array([3.0]), 0.15 * 3.0 / near, 0.5) for near in z]
+        light = light + behind - np.vstack([readings(kind, *each) for each in hidden])
+    bare = np.vstack([behind.repeat(_EMPTY, 0), light, behind.repeat(after, 0)])
     n = len(bare)
     median = float(np.median(flux))
     crosstalk = median * np.array([0.3, 1.0])
@@ -117,6 +131,8 @@ def main() -> None:
     for kind in ("pulsed", "sine_wave"):
         found = [one(kind, seed, second=True) for seed in sets]
         print(row(f"second object, {kind}", found), flush=True)
+        found = [one(kind, seed, wall=True) for seed in sets]
+        print(row(f"a wall at 3 m, {kind}", found), flush=True)
 
 
 if __name__ == "__main__":
