@@ -14,7 +14,7 @@ from inference.density.representatives import Representatives
 from inference.posterior.sampling.ensemble import Ensemble
 from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.population import Population
-from inference.posterior.sampling.proposal import Mixture, Proposal
+from inference.posterior.sampling.proposal import Local, Mixture, Proposal
 from inference.posterior.sampling.reparametrisation import Reparametrisation
 from inference.posterior.sampling.transport import TriangularMap
 from inference.posterior.sampling.verdict import Verdict
@@ -128,6 +128,7 @@ _PARTS = {
         Ensemble,
         Frames,
         Settled,
+        Local,
         Mixture,
         Population,
         Proposal,

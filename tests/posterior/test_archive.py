@@ -18,7 +18,7 @@ from inference.posterior.archive import pack, pack_addition, pack_parts, unpack,
 from inference.posterior.sampling.ensemble import Ensemble, new_ensemble
 from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.population import Population
-from inference.posterior.sampling.proposal import Mixture, Proposal
+from inference.posterior.sampling.proposal import Local, Mixture, Proposal
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.sampling.verdict import Verdict
 from simulator.frames import Frames
@@ -90,6 +90,8 @@ def parts() -> list[Any]:
     rng = np.random.default_rng(120)
     mixture = Mixture(rng.standard_normal((1, 2)), np.ones((1, 2, 2)), np.ones(1))
     proposal = Proposal(mixture, fit_map(rng.standard_normal((50, 2))), 0.5)
+    assert proposal.transport is not None
+    local = dataclasses.replace(proposal, local=(Local(proposal.transport, mixture),))
     start = rng.standard_normal((4, 2))
     ensemble = new_ensemble(proposal, start, np.zeros(4), np.random.SeedSequence(7))
     return [
@@ -97,6 +99,7 @@ def parts() -> list[Any]:
         (ensemble, ensemble),
         mixture,
         proposal,
+        local,
         Population(start, np.zeros(4), np.ones(4), 0.25, -1e308, 3, 99),
         WeightedDraws(np.ones((3, 2)), np.ones(3), np.ones(3) / 3, math.inf, -1e308),
         Frames(np.ones((2, 2)), gain=np.array([1.0, np.nextafter(1.0, 2.0)])),

@@ -9,14 +9,26 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.start import Optimum
 from inference.posterior.sampling.transport import TriangularMap
 
-__all__ = ["Local", "Mixture", "Proposal", "log_student", "mixture_of", "student"]
+__all__ = [
+    "Local",
+    "Mixture",
+    "Proposal",
+    "completed",
+    "log_student",
+    "mixture_of",
+    "student",
+]
 
 Array = NDArray[np.float64]
 
 _LAPLACE_SHARE = 0.15  # of a proposal with a map that stays with the optima
+_LOCAL_SHARE = 0.2  # of a proposal with laws around single places, that is theirs
+_MOST_LOCAL = 4  # of them
+_LONG = 10.0  # jumps until one is taken, above which a place gets a law
 _MAP_DEGREES = 6.0  # of freedom in a map's coordinates, where the posterior is nearly normal
 _DEGREES = 5.0  # of freedom: heavier tails than any posterior that the Laplace shape fits
 
@@ -126,9 +138,9 @@ class Local:
         x, log_det = self.transport.unbend(z)
         return self.law.log_density(x) + log_det
 
-    def draw(self, rng: np.random.Generator, n: int) -> Array:
+    def draw(self, random: np.random.Generator | np.random.RandomState, n: int) -> Array:
         """Draw n points, shape (n, d)."""
-        return self.transport.bend(self.law.draw(rng, n))[0]
+        return self.transport.bend(self.law.draw(random, n))[0]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -144,11 +156,14 @@ class Proposal:
         weight, and ensembles walk in these coordinates.
     share : float
         Of the steps of an ensemble that propose from it.
+    local : tuple of Local
+        Laws around places of which the others hold too little.
     """
 
     optima: Mixture
     transport: TriangularMap | None
     share: float
+    local: tuple[Local, ...] = ()
 
     def unbend(self, z: Array) -> tuple[Array, Array]:
         """Return the walkers' coordinates of z, and log |dx/dz|."""
@@ -164,6 +179,14 @@ class Proposal:
 
     def log_density(self, z: Array) -> Array:
         """Return the log density at z of shape (n, d), shape (n,)."""
+        most = self._log_density_of_most(z)
+        if not self.local:
+            return most
+        share = math.log(_LOCAL_SHARE / len(self.local))
+        each = [share + law.log_density(z) for law in self.local]
+        return np.asarray(np.logaddexp.reduce([math.log1p(-_LOCAL_SHARE) + most, *each], axis=0))
+
+    def _log_density_of_most(self, z: Array) -> Array:
         laplace = self.optima.log_density(z)
         if self.transport is None:
             return laplace
@@ -173,6 +196,16 @@ class Proposal:
 
     def draw(self, random: np.random.Generator | np.random.RandomState, n: int) -> Array:
         """Draw n points z, shape (n, d); emcee brings a RandomState."""
+        z = self._draw_of_most(random, n)
+        if not self.local:
+            return z
+        own = random.uniform(size=n) < _LOCAL_SHARE
+        which = np.where(own, (len(self.local) * random.uniform(size=n)).astype(int), -1)
+        for k, law in enumerate(self.local):
+            z[which == k] = law.draw(random, int(np.count_nonzero(which == k)))
+        return z
+
+    def _draw_of_most(self, random: np.random.Generator | np.random.RandomState, n: int) -> Array:
         z = self.optima.draw(random, n)
         if self.transport is None:
             return z
@@ -187,3 +220,39 @@ class Proposal:
         old, old_det = self.bend(coords)
         # densities in the walkers' coordinates: that of z times |dz/dx|
         return x, self.log_density(old) + old_det - self.log_density(new) + new_det
+
+
+def completed(proposal: Proposal, laws: Sequence[Local], draws: WeightedDraws) -> Proposal:
+    """Add laws around single places to a proposal, where it holds too little.
+
+    A walker leaves a place by a jump as seldom as the density there exceeds that of the proposal:
+    a branch that a map does not follow is hardly ever entered, and then not left.
+
+    Parameters
+    ----------
+    proposal : Proposal
+        Of jumps.
+    laws : sequence of Local
+        To choose from.
+    draws : WeightedDraws
+        Of the posterior, from elsewhere.
+
+    Returns
+    -------
+    Proposal
+        With the laws that lower the largest excess at the draws, until it is tenfold at most.
+    """
+
+    def excess(of: Proposal) -> Array:
+        return np.asarray(draws.log_density - draws.log_evidence - of.log_density(draws.z))
+
+    others, beyond = list(laws), excess(proposal)
+    while others and len(proposal.local) < _MOST_LOCAL and beyond.max() > math.log(_LONG):
+        worst = draws.z[np.argmax(beyond)][None]
+        found = others.pop(int(np.argmax([law.log_density(worst)[0] for law in others])))
+        more = dataclasses.replace(proposal, local=(*proposal.local, found))
+        after = excess(more)
+        if after.max() >= beyond.max():
+            break
+        proposal, beyond = more, after
+    return proposal

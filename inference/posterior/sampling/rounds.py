@@ -26,7 +26,7 @@ from inference.posterior.sampling.importance import (
     draw_weighted,
     pareto_k_hat,
 )
-from inference.posterior.sampling.proposal import Local, Mixture, Proposal
+from inference.posterior.sampling.proposal import Local, Mixture, Proposal, completed
 from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.transport import fit_map
 
@@ -117,7 +117,7 @@ class Rounds:
     Attributes
     ----------
     proposal : Proposal
-        With the last map.
+        With the last map, and laws around the places of which it holds too little.
     draws : WeightedDraws
         Those that count.
     dissent : float
@@ -188,7 +188,10 @@ def in_rounds(
             most_drawn = np.max(draws.log_density - pool.blend.log_density(draws.z))
             found = Rounds(proposal, draws, _worst(excess > most_drawn, ends), calls)
             if over or (found.trusted and draws.ess >= target_ess):
-                return found
+                if not found.trusted:
+                    return found
+                around = [law for law in pool.laws if isinstance(law, Local)]
+                return dataclasses.replace(found, proposal=completed(proposal, around, draws))
         drawn = pool.z[ends[-1] :]
         sample = _sample(drawn, log_weights, members[beyond], len(members), rng)
         flatter = _flatter(log_weights, pool.target[ends[-1] :])

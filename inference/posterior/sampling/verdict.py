@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 
 MAX_R_HAT = 1.01
 _TAUS = 50.0  # steps of each ensemble, in autocorrelation times
+_STAYS = 20.0  # and in those of the density by the proposal's
 _LEAST_ACCEPTANCE = 0.05
 _BURN_IN = 0.2  # share of the steps left out
 _STANDSTILL = 0.25  # of the kept steps that a walker may spend in one place
@@ -68,6 +69,9 @@ class Chains:
         Names of the parameters.
     streams : tuple of bytes
         Digest of where each ensemble's random stream stands; empty where that is not known.
+    log_ratio : ndarray, shape (ensembles, m, steps), or None
+        Log of the density over that of the proposal, of the first m walkers; None where nothing was
+        proposed from.
     """
 
     z: Array
@@ -76,6 +80,20 @@ class Chains:
     acceptance: Array
     names: tuple[str, ...]
     streams: tuple[bytes, ...] = ()
+    log_ratio: Array | None = None
+
+    @property
+    def stay(self) -> float:
+        """Autocorrelation time of the density over that of the proposal [steps].
+
+        Walkers stay longest where it is largest: jumps seldom lead there, and seldom away. A branch
+        of some thousandths in which walkers stay moves the means of parameters little at each step,
+        and is lost in what their own autocorrelation sums up. nan where it is not known.
+        """
+        if self.log_ratio is None:
+            return math.nan
+        ratio = np.exp(self.log_ratio - self.log_ratio.max())
+        return autocorrelation_time(ratio.reshape(-1, ratio.shape[-1]).T, common=True)
 
     def quantities(self) -> Iterator[tuple[str, Array]]:
         """Yield every parameter, the log density and, with several modes, their indicators."""
@@ -173,6 +191,16 @@ def _length(chains: Chains) -> str | None:
     return None
 
 
+def _stay(chains: Chains) -> str | None:
+    steps, stay = chains.z.shape[2], chains.stay
+    if steps < _STAYS * stay:
+        return (
+            f"{steps} steps are only {steps / stay:.0f} times as long as walkers stay where hardly "
+            f"any jump leads, {_STAYS:.0f} are needed: a branch there may be told too little"
+        )
+    return None
+
+
 def _agreement(chains: Chains) -> str | None:
     worst, name = 1.0, ""
     for quantity, draws in chains.quantities():
@@ -259,6 +287,7 @@ def judge(chains: Chains, target_ess: int) -> Verdict:
     findings = (
         _acceptance(chains),
         _length(chains),
+        _stay(chains),
         _agreement(chains),
         _means(chains),
         _precision(chains, target_ess),

@@ -35,6 +35,7 @@ __all__ = [
 ]
 
 MOST_STEPS = 20_000
+_COMPARED = 40_000  # draws at most, whose density is compared with that of the proposal
 
 
 class _NotBegun:
@@ -127,7 +128,13 @@ class Walking:
 
     def chains(self, names: tuple[str, ...]) -> Chains:
         """Return the kept draws of all ensembles; `names` are those of the parameters."""
-        return chains_of(self.ensembles, self.proposal.optima.nearest, names)
+        kept = chains_of(self.ensembles, self.proposal.optima.nearest, names)
+        ensembles, walkers, steps, d = kept.z.shape
+        some = slice(min(walkers, max(_COMPARED // (ensembles * max(steps, 1)), 1)))
+        proposed = self.proposal.log_density(kept.z[:, some].reshape(-1, d))
+        log_density = kept.log_density[:, some]
+        log_ratio = log_density - proposed.reshape(log_density.shape)
+        return dataclasses.replace(kept, log_ratio=log_ratio)
 
     def progress(self, target_ess: int) -> Progress:
         """Tell how far this is."""

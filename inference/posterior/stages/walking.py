@@ -23,7 +23,7 @@ from inference.posterior.stages.chunk import steps_from
 from inference.posterior.stages.ensembles import POPULATIONS
 from inference.posterior.stages.stage import Tempering, Walking
 
-__all__ = ["WalkTask", "merge", "tasks"]
+__all__ = ["WalkTask", "is_slow", "merge", "tasks"]
 
 # steps of autocorrelation above which the proposal is adapted: as often as there are entries
 _SLOW = (10.0, 10.0, 40.0)
@@ -93,7 +93,7 @@ def merge(
 
 
 def _judged(job: Job, stage: Walking, kept: Chains) -> Tempering | Walking:
-    if _is_slow(kept, stage.adaptations):
+    if is_slow(kept, stage.adaptations):
         return _adapted(job, stage, kept)
     columns = np.moveaxis(kept.z, -1, 0)
     least = min(effective_sample_size(draws) for draws in columns)
@@ -106,14 +106,17 @@ def _judged(job: Job, stage: Walking, kept: Chains) -> Tempering | Walking:
     )
 
 
-def _is_slow(kept: Chains, adaptations: int) -> bool:
+def is_slow(kept: Chains, adaptations: int) -> bool:
     """Tell whether the ensembles should propose from something else."""
     if adaptations >= len(_SLOW):
         return False
     steps = kept.z.shape[2]
     times = [autocorrelation_time(x.reshape(-1, steps).T) for x in np.moveaxis(kept.z, -1, 0)]
     # a parameter that does not move has no finite time
-    return not max(times) < _SLOW[adaptations]
+    if not max(times) < _SLOW[adaptations]:
+        return True
+    # populations find the branches that a proposal leaves out; a map fitted to the draws does not
+    return adaptations == 0 and kept.stay > _SLOW[0]
 
 
 def _adapted(job: Job, stage: Walking, kept: Chains) -> Tempering | Walking:
