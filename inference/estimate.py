@@ -7,7 +7,7 @@ from inference.assumptions import assumptions_of
 from inference.contradicted import without_moved
 from inference.empty_frames import Contradiction, contradiction
 from inference.estimates import Estimates, LeftOut, TechniqueResult
-from inference.first_step import first_step
+from inference.first_step import beyond_bounds, first_step
 from inference.known import known_of
 from inference.plan import Plan, cheapest, obstacle, plan
 from inference.realtime.registry import TECHNIQUES
@@ -92,13 +92,15 @@ def estimate_planned(
         supposed = (against.said, *supposed)
     if techniques is None:
         if choice.chosen is None:
-            advice = first_step(sensor, scene, frames, choice, None)
+            advice: str | None = first_step(sensor, scene, frames, choice, None)
             return Estimates(None, (), choice.left_out, supposed, advice)
         result = _run(sensor, scene, frames, choice.chosen, against)
         if isinstance(result, LeftOut):
             advice = first_step(sensor, scene, frames, choice, result)
             return Estimates(None, (), (result, *choice.left_out), supposed, advice)
-        return Estimates(choice.chosen, (result,), choice.left_out, supposed)
+        bounds = result.range_bounds_m is not None
+        advice = beyond_bounds(sensor, scene, frames, choice.chosen) if bounds else None
+        return Estimates(choice.chosen, (result,), choice.left_out, supposed, advice)
     problems = [
         Problem(f"/techniques/{i}", f"{name!r} is not a technique")
         for i, name in enumerate(techniques)

@@ -147,7 +147,8 @@ class Estimates:
     assumptions : tuple of str
         What the results suppose without a check (`inference.assumptions`).
     do_first : str or None
-        Where there is no result the one thing to do about it (`inference.first_step`).
+        Where there is no result, or bounds alone, the one thing to do about it
+        (`inference.first_step`).
     """
 
     chosen: str | None

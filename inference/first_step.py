@@ -1,4 +1,4 @@
-"""The one thing to do first where no technique has a result, in place of fourteen reasons."""
+"""The one thing to do first where no technique has a range, in place of fourteen reasons."""
 
 import dataclasses
 
@@ -15,7 +15,7 @@ from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
-__all__ = ["first_step"]
+__all__ = ["beyond_bounds", "first_step"]
 
 _EMPTY = 5  # frames without the object: they bound constant light by the sensor's own noise
 _FIT = "joint_fit"
@@ -63,6 +63,38 @@ def first_step(
         if timed is not None:
             return f"give time_s, or derivative columns: {timed} then serves"
         return "state crosstalk and background as numbers: hybridtof calibrate learns them"
+    return _more_frames(sensor, scene, objects, empty, refused)
+
+
+def beyond_bounds(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> str:
+    """Return what to do first about a technique that tells bounds, since the object is unknown.
+
+    Parameters
+    ----------
+    sensor, scene, frames : Sensor, Scene, Frames
+        The request.
+    name : str
+        The technique.
+
+    Returns
+    -------
+    str
+        One sentence for a person.
+    """
+    known = known_of(scene, sensor)
+    if obstacle(ALL_TECHNIQUES[_FIT], sensor, scene, known, frames) is None:
+        return f"{name} tells bounds alone: ask for {_FIT}, which tells ranges of these frames"
+    state = rule_out(sensor, frames)
+    empty, objects = (int(np.count_nonzero(state == of)) for of in (ABSENT, 0))
+    if scene.motion != "radial" or scene.optional_terms:
+        return f"{name} tells bounds alone: state the object's c0 and c1, or {_POSTERIOR}"
+    return f"{name} tells bounds alone: {_more_frames(sensor, scene, objects, empty, None)}"
+
+
+def _more_frames(
+    sensor: Sensor, scene: Scene, objects: int, empty: int, refused: LeftOut | None
+) -> str:
+    """Return of what there are too few frames; a posterior, where more do not help."""
     unknowns = unknowns_of(sensor, scene)
     dark = any(name.startswith(_OF_LIGHT) for name in unknowns)
     needed = max(frames_needed(sensor.kind, unknowns, dark or empty > 0), objects)

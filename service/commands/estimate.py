@@ -75,7 +75,7 @@ def _run(args: argparse.Namespace) -> int:
     if args.output is None:
         write_result(encoded)
     if estimates.do_first is not None:
-        note(args, f"no technique has a range; do this first: {estimates.do_first}")
+        note(args, f"no ranges; do this first: {estimates.do_first}")
     for result in estimates.results:
         if result.fit is not None and result.fit["misfit"]:
             note(

@@ -86,6 +86,23 @@ def test_a_sensor_that_is_not_calibrated_is_to_be_calibrated() -> None:
     assert "known_range_m" in found.do_first
 
 
+def test_where_bounds_alone_are_told_a_fit_is_named_or_what_it_takes() -> None:
+    sensor, scene = parse_sensor(SENSORS["pulsed"]), parse_scene({"crosstalk": LEAK})
+    ranges = np.linspace(0.3, 1.0, 8)
+    light = 0.1 * 0.08 / (ranges**2 * (ranges**2 + 0.08))
+    readings = np.stack([light * ranges / 15.0, light], axis=1)
+    many = Frames(readings, time_s=np.arange(8.0))
+    found = estimate(sensor, scene, many)
+    assert found.chosen == "differential"
+    assert found.do_first is not None
+    assert found.do_first.endswith("ask for joint_fit, which tells ranges of these frames")
+    few = estimate(sensor, scene, Frames(readings[:3], time_s=np.arange(3.0))).do_first
+    assert few is not None
+    assert "take 5 frames without the object (object_present false) and 4 frames of the" in few
+    known = estimate(sensor, parse_scene({"crosstalk": LEAK, "object": PLATE}), many)
+    assert (known.chosen, known.do_first) == ("differential", None)
+
+
 def test_where_there_is_a_result_there_is_nothing_to_do() -> None:
     sensor = parse_sensor(SENSORS["pulsed"])
     assert estimate(sensor, parse_scene({}), frames(1)).do_first is None

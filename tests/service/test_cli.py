@@ -55,7 +55,7 @@ def test_an_estimate_that_no_technique_serves_is_no_answer(
     body = json.loads(out)
     advice = body["do_first"]
     assert (code, err) == (
-        3, f"hybridtof: no technique has a range; do this first: {advice}\n"
+        3, f"hybridtof: no ranges; do this first: {advice}\n"
     )  # fmt: skip
     assert advice.startswith("take 5 frames without the object (object_present false), send them")
     assert body["chosen"] is None
