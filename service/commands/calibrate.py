@@ -61,7 +61,7 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _learnt(document: bytes) -> list[str]:
-    """Return a line for every unknown: what was stated of it, and what is known now."""
+    """Return the verdict, and for every unknown what was stated of it and what is known now."""
     calibration = json.loads(document)["scene"]["calibration"]
     lines = []
     for now in calibration["unknowns"]:
@@ -72,4 +72,4 @@ def _learnt(document: bytes) -> list[str]:
         after = f"{now['mean']:.4g} +- {now['sd']:.2g} (90 %: {now['q05']:.4g} to {now['q95']:.4g})"
         lines.append(f"{now['unknown']}: {before} -> {after}")
     verdict = "converged" if calibration["converged"] else "not converged"
-    return [*lines, f"verdict: {verdict}, {'misfit' if calibration['misfit'] else 'no misfit'}"]
+    return [f"verdict: {verdict}, {'misfit' if calibration['misfit'] else 'no misfit'}", *lines]

@@ -128,5 +128,9 @@ def _run(args: argparse.Namespace) -> int:
             if _SUPPOSES in taken.answers[0]:
                 for supposed in json.loads(taken.answers[0]).get("assumptions", ()):
                     note(args, f"note: {supposed}")
+    if place.errors:
+        note(args, f"note: lines that are no frames: {place.errors}; their answers have an `error`")
+    if place.misfit:
+        note(args, "note: misfit at the end: the readings are not as sensor and scene say")
     # of a stream in which no line is a frame nothing was answered
     return 0 if place.answered else 2

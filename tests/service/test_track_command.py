@@ -82,9 +82,15 @@ def test_a_bad_line_is_answered_and_changes_nothing(
            '{"time_s": -1, "w1": 0.02, "w2": 1.7}', '{"time_s": 0.05, "W1": 0.02, "w2": 1.7}',
            '{"time_s": 0.05, "w1": 0.02, "w2": 1.7, "sequence": "x"}']  # fmt: skip
     given(monkeypatch, "\n".join([json.dumps(good[0]), *bad, json.dumps(good[1])]))
-    found = answers(Said(capsys, "track", "-", "--scene", scene))
+    said = Said(capsys, "track", "-", "--scene", scene)
+    found = answers(said)
+    assert said.err == (
+        "hybridtof: note: lines that are no frames: 6; their answers have an `error`\n"
+    )
     given(monkeypatch, "\n".join(map(json.dumps, good)))
-    first, last = answers(Said(capsys, "track", "-", "--scene", scene))
+    said = Said(capsys, "track", "-", "--scene", scene)
+    first, last = answers(said)
+    assert said.err == ""
     assert found[0] | {"latency_s": 0} == first | {"latency_s": 0}
     assert (first["camera"], first["sequence"], last["sequence"]) == ("left", 10, 11)
     assert found[-1] | {"latency_s": 0} == last | {"latency_s": 0, "sequence": 17}
