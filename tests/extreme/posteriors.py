@@ -19,6 +19,7 @@ from simulator.sensor import PulsedSensor, Sensor, parse_sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
 from tests.extreme.nested import Reference, reference_of
+from tests.extreme.wall_curve import wall_curve
 from tests.extreme.wall_turns import reference_of_turns
 
 __all__ = ["PosteriorCase", "Verdict", "errors_of", "held", "quadrature_of", "random_case"]
@@ -116,7 +117,9 @@ def quadrature_of(case: PosteriorCase) -> Reference | None:
     sine = not isinstance(case.sensor, PulsedSensor)
     if wall is not None and sine and not isinstance(wall.distance_m, float | int):
         law = wall.distance_m.distribution().truncated(low=0.0)
-        return reference_of_turns(density, case.sensor, law)
+        found = reference_of_turns(density, case.sensor, law)
+        curve = wall_curve(density) if found is None else None
+        return found if curve is None else curve.reference()
     return reference_of(density, density.parameters.natural, len(density.parameters.names))
 
 

@@ -6,7 +6,9 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.special import logsumexp
 
+from inference.density.collapsed import collapsed_density
 from inference.posterior import fold
 from inference.posterior.answer.error_parts import ParameterErrorParts
 from inference.posterior.answer.posterior import ParameterSummary
@@ -14,6 +16,7 @@ from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages.stage import Tempering, Walking
 from tests.extreme.nested import Reference, reference_of
 from tests.extreme.posteriors import errors_of, held, quadrature_of, random_case
+from tests.extreme.wall_curve import wall_curve
 
 Array = NDArray[np.float64]
 
@@ -149,3 +152,30 @@ def test_every_number_that_is_off_is_seen(fault: str) -> None:
     else:
         x = np.exp(1.05 * np.log(x))
     assert errors_of(exact, 0, right, x)[fault] > 6
+
+
+@pytest.mark.parametrize("turn", [0, 1])
+def test_the_curve_of_one_frame_is_what_the_density_has_across_it(turn: int) -> None:
+    """Of one frame with much light; along lines of one strength, up to one constant."""
+    case = random_case(241)
+    density = collapsed_density(case.sensor, case.scene, case.frames)
+    curve = wall_curve(density)
+    assert curve is not None
+    log_r = np.log(np.array([0.2, 0.4, 0.6, 1.0]))  # 1.6 m before the wall in its first turn
+    strength, distance, seen = places = curve.at(np.exp(log_r))
+    step = 1e-6
+    after, before = (curve.at(np.exp(log_r + d))[0] for d in (step, -step))
+    along = np.log(np.abs(after - before) / (2 * step))
+    wanted = curve.log_weights(np.exp(log_r), places, np.array([1.0 * turn]))[:, 0] - along
+    parameters = density.parameters
+    found = np.empty(len(log_r))
+    for k in range(len(log_r)):
+        wide = curve.read / (seen[k] * strength[k] * 2 * math.pi / curve.sensor.max_range_m)
+        to_m = distance[k] + turn * curve.sensor.max_range_m + wide * np.linspace(-12, 12, 241)
+        z = parameters.standard(np.column_stack([np.full(241, strength[k]), to_m]))
+        heights = logsumexp(density(z) + np.log(np.gradient(z[:, 1])))
+        law = parameters.unknowns[0].law
+        assert law is not None
+        # of the strength, by its coordinate
+        found[k] = heights + law.log_density(strength[k : k + 1])[0] + 0.5 * z[0, 0] ** 2
+    assert found - wanted == pytest.approx(np.full(len(log_r), found[0] - wanted[0]), abs=1e-4)
