@@ -231,7 +231,8 @@ class _Run(Generic[J, C, T, P]):
         wall_s = time.monotonic() - self.began
         progress = await asyncio.to_thread(runner.fold.progress, self.job, checkpoint)
         self.pace = Pace.followed(self.pace, progress, wall_s)
-        if progress.phase != self.record.progress["phase"]:
+        # the pieces of a start are as unlike one another as phases are
+        if progress.phase == "starting" or progress.phase != self.record.progress["phase"]:
             self.longest = 0.0
         added = None
         if before is not None:

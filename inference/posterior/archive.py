@@ -16,6 +16,7 @@ from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.proposal import Local, Mixture, Proposal
 from inference.posterior.sampling.reparametrisation import Reparametrisation
+from inference.posterior.sampling.start import Ends, Optimum
 from inference.posterior.sampling.transport import TriangularMap
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.selection.consequence import Reported
@@ -125,11 +126,13 @@ _PARTS = {
     for part in (
         Candidate,
         Decision,
+        Ends,
         Ensemble,
         Frames,
         Settled,
         Local,
         Mixture,
+        Optimum,
         Population,
         Proposal,
         Reported,

@@ -41,7 +41,7 @@ from inference.posterior.stages.stage import (
     Walking,
     Weighted,
 )
-from inference.posterior.stages.starting import StartTask, begin
+from inference.posterior.stages.starting import StartTask
 from inference.posterior.stages.tempering import SetOutTask, TemperTask
 from inference.posterior.stages.walking import WalkTask
 from inference.posterior.summary import draw, summarise
@@ -70,7 +70,7 @@ P = TypeVar("P")
 
 
 def start(job: Job) -> Checkpoint:
-    """Find starting points; with optional terms, once they are decided by the first chunks.
+    """Return where a job begins: with its optional terms, or with starting points.
 
     Parameters
     ----------
@@ -80,18 +80,8 @@ def start(job: Job) -> Checkpoint:
     Returns
     -------
     Checkpoint
-
-    Raises
-    ------
-    RefusedError
-        Where no parameters explain the frames at all, or importance sampling alone was asked for
-        and cannot be trusted.
     """
-    import_libraries()
-    if job.scene.optional_terms:
-        return Checkpoint(Selecting(), 0)
-    with at_once(*KERNELS):
-        return begin(job)
+    return Checkpoint(Selecting() if job.scene.optional_terms else Starting(), 0)
 
 
 def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float = 0.0) -> tuple[Task, ...]:
@@ -110,8 +100,8 @@ def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float = 0.0) -> tuple[Task, .
     match checkpoint.stage:
         case Selecting():
             return selecting.tasks(job)
-        case Starting():
-            return (StartTask(sampled(job, checkpoint)),)
+        case Starting() as stage:
+            return (StartTask(sampled(job, checkpoint), stage),)
         case Tempering() as stage:
             return tempering.tasks(sampled(job, checkpoint), stage)
         case Walking() as stage:
@@ -121,7 +111,24 @@ def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float = 0.0) -> tuple[Task, .
 
 
 def run(task: Task) -> Piece:
-    """Run one part of a chunk."""
+    """Run one part of a chunk.
+
+    Parameters
+    ----------
+    task : Task
+        From `tasks`.
+
+    Returns
+    -------
+    Piece
+        For `merge`.
+
+    Raises
+    ------
+    RefusedError
+        By one that looks for starting points, where no parameters explain the frames at all, or
+        importance sampling alone was asked for and cannot be trusted.
+    """
     import_libraries()
     with at_once(*KERNELS):
         return task.run()

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-__all__ = ["QUESTIONS"]
+__all__ = ["FIRST_STEPS", "QUESTIONS"]
 
 Body = dict[str, Any]
 _PULSED: Body = {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1e-5, 1e-4]}}
@@ -81,13 +81,19 @@ def _track(sensor: Body, scene: Body, **data: bool) -> None:
     step(model, model.first, frames)
 
 
-def _posterior(sensor: Body, scene: Body, **data: bool) -> None:
+def _posterior(sensor: Body, scene: Body, whole_start: bool, **data: bool) -> None:
+    """Ask for the first step of a posterior, or for its whole start and one step more."""
     from inference.posterior import fold
     from inference.posterior.settings import SamplerSettings
+    from inference.posterior.stages.stage import Starting
 
     parsed, known, frames = _question(sensor, scene, **data)
     job = fold.prepare(parsed, known, frames, SamplerSettings(seed=1))
-    ahead = fold.tasks(job, fold.start(job))
+    checkpoint = fold.start(job)
+    while whole_start and isinstance(checkpoint.stage, Starting):
+        pieces = [fold.run(task) for task in fold.tasks(job, checkpoint)]
+        checkpoint = fold.merge(job, checkpoint, pieces)
+    ahead = fold.tasks(job, checkpoint)
     if ahead:
         fold.run(ahead[0])
 
@@ -136,22 +142,28 @@ def _many() -> dict[str, Callable[[], object]]:
     }
 
 
-def _posteriors() -> dict[str, Callable[[], object]]:
+def _posteriors(whole_start: bool) -> dict[str, Callable[[], object]]:
+    ask = partial(_posterior, whole_start=whole_start)
     optional = {"crosstalk": {"values": [_VAGUE, _VAGUE], "optional": True}}
     both = _CROSSTALK | {"background": _FREE_WALL}
     return {
-        "posterior, object": partial(_posterior, _PULSED, {}),
-        "posterior, at rest": partial(_posterior, _PULSED, {"motion": "static"}),
-        "posterior, sine wave": partial(_posterior, _SINE, {}),
-        "posterior, crosstalk": partial(_posterior, _PULSED, _CROSSTALK, crosstalk=True),
-        "posterior, optional": partial(_posterior, _PULSED, optional, crosstalk=True),
-        "posterior, wall": partial(_posterior, _PULSED, both, wall=True, crosstalk=True),
+        "posterior, object": partial(ask, _PULSED, {}),
+        "posterior, at rest": partial(ask, _PULSED, {"motion": "static"}),
+        "posterior, sine wave": partial(ask, _SINE, {}),
+        "posterior, crosstalk": partial(ask, _PULSED, _CROSSTALK, crosstalk=True),
+        "posterior, optional": partial(ask, _PULSED, optional, crosstalk=True),
+        "posterior, wall": partial(ask, _PULSED, both, wall=True, crosstalk=True),
     }
 
 
 QUESTIONS: dict[str, Callable[[], object]] = {
     **_single(),
     **_many(),
-    **_posteriors(),
+    **_posteriors(whole_start=True),
 }
 """What a process may be asked first, by its name."""
+
+FIRST_STEPS: dict[str, Callable[[], object]] = {
+    f"first step of a {name}": step for name, step in _posteriors(whole_start=False).items()
+}
+"""What is there of a posterior when something of it can be told, stored or cancelled."""

@@ -12,6 +12,8 @@ from inference.posterior import checks, fold
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages.stage import Starting
+from inference.posterior.stages.starting import begin
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.scene import parse_scene
@@ -265,13 +267,13 @@ def test_empty_frames_that_can_teach_nothing_are_refused(crosstalk: Any) -> None
 def test_readings_beyond_any_number_are_refused_before_sampling(value: float) -> None:
     job = fold.prepare(SENSOR, parse_scene({}), with_reading(value), QUICK)
     with pytest.raises(RefusedError, match="noise's `read`"):
-        fold.start(job)
+        begin(job, Starting())
 
 
 def test_a_reading_a_million_times_its_noise_away_is_refused_before_sampling() -> None:
     job = fold.prepare(SENSOR, parse_scene({}), with_reading(1e3), QUICK)
     with pytest.raises(RefusedError, match=r"number 3 \(from 0\): check the units"):
-        fold.start(job)
+        begin(job, Starting())
 
 
 WRONG: dict[str, Callable[[], tuple[dict[str, Any], Frames]]] = {

@@ -9,7 +9,7 @@ from inference.posterior import fold
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.sampling.start import find_optima
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages.stage import Tempering, Walking
+from inference.posterior.stages.stage import Starting, Tempering, Walking
 from inference.posterior.stages.starting import begin
 from simulator.scene import parse_scene
 from tests.posterior.scenes import OBJECT, data, sensor_of
@@ -39,7 +39,7 @@ def test_the_true_valley_is_found_where_a_screen_of_the_prior_sees_false_ones() 
     assert find_optima(density, np.random.default_rng(0))[0].log_density < density(z)[0] - 1000.0
     best = max(fitted_optima(job, density), key=lambda optimum: optimum.log_density)
     assert best.log_density > density(z)[0]
-    stage = begin(job).stage
+    stage = begin(job, Starting()).stage
     assert isinstance(stage, Tempering | Walking)
     assert density(stage.proposal.optima.centres).max() == pytest.approx(best.log_density, abs=1e-3)
 

@@ -14,7 +14,8 @@ from inference.posterior.sampling.importance import WeightedDraws, draw_weighted
 from inference.posterior.sampling.population import Population
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages import starting
-from inference.posterior.stages.stage import Tempering, Walking, Weighted
+from inference.posterior.stages.stage import Starting, Tempering, Walking, Weighted
+from inference.posterior.stages.starting import begin
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.scene import Scene, Stroke, parse_scene
@@ -203,7 +204,7 @@ def test_populations_that_die_are_not_called_for_again() -> None:
     }
     frames = data(sensor, {"background": wall}, frames=6, span=(3.3, 4.2)).frames
     job = fold.prepare(sensor, parse_scene(scene), frames, SamplerSettings(seed=1, ensembles=2))
-    checkpoint = fold.start(job)
+    checkpoint = begin(job, Starting())
     assert isinstance(checkpoint.stage, Tempering)
     populations = [fold.run(task) for task in fold.tasks(job, checkpoint)]
     assert all(isinstance(one, Population) and len(one.z) == 0 for one in populations)
@@ -236,7 +237,7 @@ def test_importance_sampling_is_bounded_whatever_is_asked_for(
         *example("pulsed", crosstalk=False),
         SamplerSettings(seed=1, method="importance", target_ess=1_000_000),
     )
-    stage = fold.start(job).stage
+    stage = begin(job, Starting()).stage
     assert counts == [3000] * len(counts)
     assert isinstance(stage, Weighted)
     assert not stage.verdict.converged

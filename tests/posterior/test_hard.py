@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from inference.posterior.fold import merge, prepare, progress, run, start, summarise, tasks
+from inference.posterior.fold import merge, prepare, progress, run, summarise, tasks
 from inference.posterior.job import Job
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages.checkpoint import Checkpoint
-from inference.posterior.stages.stage import Tempering
+from inference.posterior.stages.stage import Starting, Tempering
+from inference.posterior.stages.starting import begin
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
 from simulator.simulate import Simulation, simulate
@@ -49,7 +50,7 @@ def job(simulation: Simulation) -> Job:
 
 @pytest.fixture(scope="module")
 def begun(job: Job) -> Checkpoint:
-    return start(job)
+    return begin(job, Starting())
 
 
 def test_populations_are_called_for(begun: Checkpoint) -> None:

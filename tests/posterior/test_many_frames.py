@@ -14,6 +14,8 @@ from inference.posterior.sampling.proposal import mixture_of
 from inference.posterior.sampling.represent import doubts, represent
 from inference.posterior.sampling.start import Optimum, refine
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages.stage import Starting
+from inference.posterior.stages.starting import begin
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import Sensor
@@ -116,7 +118,7 @@ def test_ranges_of_all_frames_are_answered(monkeypatch: pytest.MonkeyPatch) -> N
     frames, ranges = frames_of(sensor, n)
     settings = SamplerSettings(seed=3, target_ess=100, method="importance")
     job = fold.prepare(sensor, parse_scene({}), frames, settings)
-    checkpoint = fold.start(job)
+    checkpoint = begin(job, Starting())
     by = checkpoint.representatives
     assert by is not None
     assert len(by.chosen) < most < n

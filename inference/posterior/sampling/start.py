@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.density.profile import linearise
 
-__all__ = ["Optimum", "climb", "find_optima", "refine"]
+__all__ = ["Ends", "Optimum", "climb", "climbed", "find_optima", "optima_of", "refine"]
 
 Array = NDArray[np.float64]
 
@@ -55,6 +55,22 @@ class Optimum:
         """Tell whether z of shape (d,) lies within half a standard deviation."""
         step = scipy.linalg.solve_triangular(self.factor, z - self.z, lower=True)
         return bool(np.linalg.norm(step) < _NEAR)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Ends:
+    """Where climbs ended.
+
+    Attributes
+    ----------
+    z : ndarray, shape (n, d)
+        Points, the best first.
+    values : ndarray, shape (n,)
+        Their joint log densities.
+    """
+
+    z: Array
+    values: Array
 
 
 def _profile(density: CollapsedDensity, z: Array) -> tuple[Array, Array]:
@@ -232,6 +248,11 @@ def find_optima(density: CollapsedDensity, rng: np.random.Generator) -> list[Opt
     list of Optimum
         Distinct maxima within 20 nats of the best; empty where the density is nowhere finite.
     """
+    return optima_of(density, climbed(density, rng))
+
+
+def climbed(density: CollapsedDensity, rng: np.random.Generator) -> Ends:
+    """Climb the joint density from the best points of the prior, as `find_optima` begins."""
     screen = density.parameters.sample(rng, _SCREEN)
     screen[0] = 0.0
     starts = _spread_out(screen, _profile(density, screen)[0], _CLIMBS)
@@ -239,10 +260,29 @@ def find_optima(density: CollapsedDensity, rng: np.random.Generator) -> list[Opt
     best, others = ends[:_FOLLOWED], ends[_FOLLOWED:]
     best = [climb(density, z, _MORE_ITERATIONS) for z, value in best if np.isfinite(value)]
     ends = sorted([*best, *others], key=lambda end: -end[1])
+    points = np.array([z for z, _ in ends]).reshape(len(ends), screen.shape[1])
+    return Ends(points, np.array([value for _, value in ends]))
+
+
+def optima_of(density: CollapsedDensity, ends: Ends) -> list[Optimum]:
+    """Refine the ends of climbs on the collapsed density.
+
+    Parameters
+    ----------
+    density : CollapsedDensity
+        The density.
+    ends : Ends
+        From `climbed`.
+
+    Returns
+    -------
+    list of Optimum
+        As of `find_optima`.
+    """
     optima: list[Optimum] = []
     visited: list[Optimum] = []
-    for z, value in ends:
-        if not np.isfinite(value) or value < ends[0][1] - 60.0:
+    for z, value in zip(ends.z, ends.values, strict=True):
+        if not np.isfinite(value) or value < ends.values[0] - 60.0:
             continue
         if any(one.is_near(z) for one in visited):
             continue

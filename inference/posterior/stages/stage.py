@@ -7,7 +7,7 @@
                            +-> Tempering -> Weighted or Walking
                            +-> Walking -> (Tempering -> Weighted or Walking)
 
-A job without optional terms begins behind `Starting`. Ensembles that hardly move call for
+A job without optional terms begins with `Starting`. Ensembles that hardly move call for
 populations, once.
 """
 
@@ -20,6 +20,7 @@ from inference.posterior.sampling.ensemble import Ensemble
 from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.proposal import Mixture, Proposal
+from inference.posterior.sampling.start import Ends, Optimum
 from inference.posterior.sampling.verdict import Chains, Verdict, chains_of
 
 __all__ = [
@@ -53,9 +54,23 @@ class Selecting(_NotBegun):
     """It is being decided which optional terms stay."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Starting(_NotBegun):
-    """It is decided which optional terms stay; starting points come next."""
+    """It is decided which optional terms stay; optima are looked for, in one way after the other.
+
+    Attributes
+    ----------
+    ends : Ends or None
+        Where climbs from the prior ended; None before the first.
+    optima : tuple of Optimum or None
+        What was found so far, the best first; None before any climb's end was refined.
+    fitted : bool
+        Whether those of the fit over all frames are among them.
+    """
+
+    ends: Ends | None = None
+    optima: tuple[Optimum, ...] | None = None
+    fitted: bool = False
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

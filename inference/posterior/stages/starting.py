@@ -16,13 +16,20 @@ from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, dr
 from inference.posterior.sampling.population import carried
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.represent import represent
-from inference.posterior.sampling.start import Optimum, climb, find_optima, refine
+from inference.posterior.sampling.start import Optimum, climb, climbed, optima_of, refine
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.sampling.warm import Warm, warm_start
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.chunk import evaluations
 from inference.posterior.stages.ensembles import POPULATIONS, new_ensembles
-from inference.posterior.stages.stage import Drawing, Settled, Tempering, Walking, Weighted
+from inference.posterior.stages.stage import (
+    Drawing,
+    Settled,
+    Starting,
+    Tempering,
+    Walking,
+    Weighted,
+)
 from inference.posterior.streams import Stream
 from simulator.errors import RefusedError
 
@@ -41,27 +48,54 @@ _SHARE = 0.5  # of an ensemble's steps that are independent jumps
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StartTask:
-    """The start of sampling in the scene that was chosen."""
+    """One way of looking for optima in the scene that was chosen; behind the last, the start.
+
+    Attributes
+    ----------
+    job : Job
+        Without optional terms.
+    stage : Starting
+        What was found before.
+    """
 
     job: Job
+    stage: Starting
 
     def run(self) -> Checkpoint:
-        """Find starting points."""
-        return begin(self.job)
+        """Return what is known then, and the density evaluations that were counted."""
+        job, stage = self.job, self.stage
+        if len(job.density().parameters) == 0:
+            return _settled(job)
+        some = _of_some_frames(job) if job.is_large else job
+        density = some.density()
+        if stage.ends is None:
+            ends = climbed(density, job.stream(Stream.SCREEN))
+            return Checkpoint(dataclasses.replace(stage, ends=ends), 0)
+        if stage.optima is None:
+            optima = optima_of(density, stage.ends)
+            return Checkpoint(dataclasses.replace(stage, optima=tuple(optima)), 0)
+        optima = list(stage.optima)
+        if not stage.fitted:
+            for fitted in fitted_optima(some, density):
+                optima = _with(optima, fitted)
+            return Checkpoint(dataclasses.replace(stage, optima=tuple(optima), fitted=True), 0)
+        return _set_out(job, density, optima)
 
 
-def begin(job: Job) -> Checkpoint:
-    """Find the optima, and set up ensembles or draw weighted samples.
+def begin(job: Job, stage: Starting) -> Checkpoint:
+    """Find the optima, and set up ensembles or draw weighted samples, in one go.
 
     Parameters
     ----------
     job : Job
         Without optional terms.
+    stage : Starting
+        What was found before.
 
     Returns
     -------
     Checkpoint
-        The first stage, and the density evaluations that it took.
+        The first stage of sampling, and the density evaluations that it took.
 
     Raises
     ------
@@ -69,14 +103,35 @@ def begin(job: Job) -> Checkpoint:
         Where no parameters explain the frames at all, or importance sampling alone was asked for
         and cannot be trusted.
     """
+    reached = StartTask(job, stage).run()
+    while isinstance(reached.stage, Starting):
+        reached = StartTask(job, reached.stage).run()
+    return reached
+
+
+def _settled(job: Job) -> Checkpoint:
+    """Return the end of a job in which nothing is unknown but the ranges."""
+    density = job.density()
+    if not np.isfinite(density(np.empty((1, 0)))[0]):
+        raise RefusedError("no range allowed by the scene explains every frame")
+    check_ranges(density, job.scene, np.empty(0))
+    return Checkpoint(Settled(), 1)
+
+
+def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum]) -> Checkpoint:
+    """Look for the last optima, and set up what comes behind them.
+
+    Parameters
+    ----------
+    job : Job
+        Without optional terms.
+    some : CollapsedDensity
+        Of all frames, or of so few that optima are looked for in.
+    optima : list of Optimum
+        Found so far.
+    """
     whole = density = job.density()
-    if len(density.parameters) == 0:
-        if not np.isfinite(density(np.empty((1, 0)))[0]):
-            raise RefusedError("no range allowed by the scene explains every frame")
-        check_ranges(density, job.scene, np.empty(0))
-        return Checkpoint(Settled(), 1)
-    some = _of_some_frames(job) if job.is_large else job
-    optima, scouted, calls = _optima(some, some.density())
+    optima, scouted, calls = _with_scouts(job, some, optima)
     if job.is_large and optima:
         by, optima, used = represent(density, optima, job.stream(Stream.REPRESENTATIVES))
         job, calls = dataclasses.replace(job, representatives=by), calls + used
@@ -139,11 +194,10 @@ def _ensembles(
     return new_ensembles(density, warm.proposal, (*starts, scouted), seeds, walkers)
 
 
-def _optima(job: Job, density: CollapsedDensity) -> tuple[list[Optimum], Array, int]:
-    """Find optima in three ways, and points that no optimum was told to; with the evaluations."""
-    optima = find_optima(density, job.stream(Stream.SCREEN))
-    for fitted in fitted_optima(job, density):
-        optima = _with(optima, fitted)
+def _with_scouts(
+    job: Job, density: CollapsedDensity, optima: list[Optimum]
+) -> tuple[list[Optimum], Array, int]:
+    """Add optima that scouts find, and return these, told to none; with the evaluations."""
     found, calls = _scouted(_thinned(density), job.stream(Stream.SCOUTS))
     if len(found):
         optima = _with(optima, refine(density, climb(density, found[0])[0]))

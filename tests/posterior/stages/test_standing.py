@@ -8,8 +8,9 @@ from inference.posterior import fold
 from inference.posterior.sampling.importance import pareto_k_hat, smoothed
 from inference.posterior.sampling.population import Population
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages.stage import Walking, Weighted
+from inference.posterior.stages.stage import Starting, Walking, Weighted
 from inference.posterior.stages.standing import _weighted, standing
+from inference.posterior.stages.starting import begin
 from tests.posterior.scenes import example
 
 
@@ -19,7 +20,7 @@ def test_stopped_before_the_first_chunk_the_weighted_draws_answer() -> None:
     Quantiles of 5 % of 400 draws err by 0.1 sd; five times that, with those of the ensembles.
     """
     job = fold.prepare(*example("pulsed", crosstalk=False), SamplerSettings(seed=7))
-    checkpoint = fold.start(job)
+    checkpoint = begin(job, Starting())
     assert isinstance(checkpoint.stage, Walking)
     assert isinstance(standing(checkpoint.stage), Weighted)
     first = fold.summarise(job, checkpoint, 0.0, 0.0)
