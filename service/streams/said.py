@@ -58,7 +58,7 @@ class Said(NamedTuple):
 def said_of(
     track: Track,
     sequences: Sequence[int],
-    times: Sequence[float],
+    times: Sequence[float] | NDArray[np.float64],
     latencies: NDArray[np.float64],
     more: tuple[str, ...] = (),
 ) -> Said:
@@ -86,8 +86,12 @@ def said_of(
     table[OWN::3] = track.hypotheses_m.T
     table[OWN + 1 :: 3] = track.hypotheses_sd_m.T
     table[OWN + 2 :: 3] = track.hypotheses_weight.T
+    if isinstance(sequences, range):  # its numbers are not looked at one by one
+        sequence = np.arange(sequences.start, sequences.stop, dtype=np.int64)
+    else:
+        sequence = np.array(sequences, dtype=np.int64)
     return Said(
-        np.array(sequences, dtype=np.int64),
+        sequence,
         np.array(times, dtype=np.float64),
         track.status,
         track.misfit,

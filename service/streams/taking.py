@@ -11,6 +11,7 @@ from operator import attrgetter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inference.self_calibration.following import Piece
 from service.errors import BodyTooLargeError, ConflictError, GoneError
@@ -252,7 +253,7 @@ class _Batch:
         self,
         pieces: Sequence[Piece],
         sequences: Sequence[int],
-        times: Sequence[float],
+        times: Sequence[float] | NDArray[np.float64],
         arrivals: Sequence[float],
         also: More,
     ) -> list[Said]:

@@ -9,6 +9,7 @@ from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inference.tracking.tracker import Tracker
 from service.streams.forms import Form
@@ -19,8 +20,8 @@ from simulator.frames import Frames
 
 __all__ = ["Together", "together"]
 
-_Read = tuple[tuple[str, ...], Callable[[str], Sequence[Any]]]
-_DROPPED = attrgetter("dropped")
+_Read = tuple[tuple[str, ...], Callable[[str], Sequence[Any]], Callable[[str], set[type]]]
+_RAW, _DROPPED = attrgetter("raw"), attrgetter("dropped")
 _FEW = 4  # fewer are answered as quickly one by one
 
 
@@ -33,15 +34,15 @@ class Together(NamedTuple):
         n of them.
     sequences : sequence of int
         Their numbers.
-    times : sequence of float
-        Their times as they were sent [s].
+    times : ndarray, shape (n,)
+        Their times [s].
     passed : list of dict, or None
         What is passed through of each; None where nothing is.
     """
 
     frames: Frames
     sequences: Sequence[int]
-    times: Sequence[float]
+    times: NDArray[np.float64]
     passed: list[dict[str, Any] | None] | None
 
 
@@ -67,31 +68,30 @@ def together(
     Together or None
         None where a closer look at each line is needed.
     """
-    raws = [line.raw for line in lines if line.raw is not None]
-    if len(lines) < _FEW or len(raws) < len(lines) or any(map(_DROPPED, lines[1:])):
+    raws = list(map(_RAW, lines))
+    if len(lines) < _FEW or not all(raws) or any(map(_DROPPED, lines[1:])):
         return None
     read = _alike(form, raws)
     if read is None:
         return None
-    names, values_of = read
+    names, values_of, types_of = read
     shape = shape_of(model, names)
     if shape.problem is not None:
         return None
     last, after, time_s = where
     stated = values_of("sequence") if "sequence" in names else None
     sequences = _numbers(stated, len(lines), last, after)
-    columns = {name: values_of(name) for name in shape.columns}
-    kinds = dict(zip(shape.columns, shape.kinds, strict=True))
-    sound = all(set(map(type, columns[name])) <= kinds[name] for name in columns)
-    if sequences is None or not sound:
-        return None
-    times = columns["time_s"]
-    increasing = np.diff(np.array([time_s, *times], dtype=np.float64)) > 0
-    if not increasing[1:].all() or not (increasing[0] or np.isnan(time_s)):
+    kinds = zip(shape.columns, shape.kinds, strict=True)
+    if sequences is None or not all(types_of(name) <= kind for name, kind in kinds):
         return None
     try:
-        found = frames_of(model, shape, list(columns.values()))
+        found = frames_of(model, shape, list(map(values_of, shape.columns)))
     except HybridTofError:
+        return None
+    times = found.time_s
+    if times is None or not (times[1:] > times[:-1]).all():
+        return None
+    if not (times[0] > time_s or np.isnan(time_s)):
         return None
     passed: list[dict[str, Any] | None] | None = None
     if shape.passed:
@@ -101,10 +101,10 @@ def together(
 
 
 def _alike(form: Form, raws: Sequence[bytes]) -> _Read | None:
-    """Return the names of members that all lines have, and what gives the values of each."""
+    """Return the names of members that all lines have, and what gives values and types of each."""
     numbers = form.numbers_in(raws)
     if numbers is not None:
-        return numbers.names, numbers.column
+        return numbers.names, numbers.column, lambda _: {int, float}
     try:
         frames = form.frames_in(raws)
     except HybridTofError:
@@ -112,7 +112,11 @@ def _alike(form: Form, raws: Sequence[bytes]) -> _Read | None:
     names = tuple(frames[0])
     if set(map(tuple, frames)) != {names}:
         return None
-    return names, lambda name: [frame[name] for frame in frames]
+
+    def values_of(name: str) -> list[Any]:
+        return [frame[name] for frame in frames]
+
+    return names, values_of, lambda name: set(map(type, values_of(name)))
 
 
 def _numbers(
@@ -124,5 +128,5 @@ def _numbers(
     first = stated[0]
     if set(map(type, stated)) != {int} or first < 0 or not last < first <= LARGEST - count:
         return None
-    counted = list(range(first, first + count))
-    return counted if stated == counted else None
+    counted = range(first, first + count)
+    return counted if stated == list(counted) else None
