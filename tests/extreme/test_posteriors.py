@@ -13,7 +13,8 @@ from inference.posterior import fold
 from inference.posterior.answer.error_parts import ParameterErrorParts
 from inference.posterior.answer.posterior import ParameterSummary
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages.stage import Tempering, Walking
+from inference.posterior.stages.stage import Starting, Tempering, Walking
+from inference.posterior.stages.starting import begin
 from tests.extreme.nested import Reference, reference_of
 from tests.extreme.posteriors import errors_of, held, quadrature_of, random_case
 from tests.extreme.wall_curve import wall_curve
@@ -37,7 +38,7 @@ def test_a_branch_that_jumps_hardly_reach_calls_for_populations() -> None:
     case = random_case(296)
     settings = SamplerSettings(seed=case.seed, target_ess=200)
     job = fold.prepare(case.sensor, case.scene, case.frames, settings)
-    checkpoint = fold.start(job)
+    checkpoint = begin(job, Starting())
     stages: list[object] = [checkpoint.stage]
     while type(stages[-1]) is Walking:
         checkpoint = fold.merge(job, checkpoint, [fold.run(t) for t in fold.tasks(job, checkpoint)])
