@@ -10,6 +10,7 @@ from inference.realtime.net import COMMON_REASONS, SATURATED
 
 __all__ = [
     "DROWNED",
+    "NEGATIVE",
     "NOISE_BAND",
     "OUTSIDE",
     "Candidates",
@@ -23,6 +24,11 @@ Flags = NDArray[np.bool_]
 
 # standard deviations within which noise explains a reading on the wrong side of a limit
 NOISE_BAND = 3.0
+
+NEGATIVE = (
+    "the light is below zero by far more than noise: the crosstalk or the noise is not as stated"
+)
+"""Reason of light that is no weak light: nothing is known of what is before the sensor."""
 
 AMBIGUOUS = len(COMMON_REASONS)
 FOLD = AMBIGUOUS + 1

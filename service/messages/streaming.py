@@ -29,6 +29,8 @@ __all__ = [
 ]
 
 LINES = "application/x-ndjson"
+_HARDLY = 0.05  # probability of an object below which the scene is called empty
+_DOUBTED = 0.5  # probability that a frame has nothing to do with the scene
 _FORMS = (LINES, *(message.media_type for message in MESSAGES), "application/json")
 
 _SAID = frozenset(
@@ -93,11 +95,22 @@ def _measured(answer: Mapping[str, Any], limits_m: Limits) -> Measured:
         status=answer["status"],
         range_m=answer["range_m"] if unique else None,
         variance_m2=variance,
-        side="far" if answer["status"] == "none" else None,
+        side="far" if _is_empty(answer) else None,
         certain=unique and variance is not None and not answer["misfit"],
         time_s=answer["time_s"],
         limits_m=limits_m,
     )
+
+
+def _is_empty(answer: Mapping[str, Any]) -> bool:
+    """Tell whether an empty scene explains a frame, and an object hardly could.
+
+    Robots drive through what is "too far or nothing". Readings that neither an object as stated nor
+    an empty scene explains are of something else, and that may stand right before the sensor.
+    """
+    if answer["status"] != "none" or answer["misfit"]:
+        return False
+    return bool(answer["present"] < _HARDLY and answer["outlier"] < _DOUBTED)
 
 
 def _variance(answer: Mapping[str, Any]) -> float | None:

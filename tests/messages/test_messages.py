@@ -126,7 +126,7 @@ def messages_of(sensor: Any, scene: Any, columns: Any) -> tuple[list[Any], list[
 def test_one_range_too_near_none_and_saturated() -> None:
     sensor = SENSOR | {"full_scale": [1.0, 1.0]}
     columns = {
-        "w1": [0.0242, 0.0, 0.014, 0.304, 2.0], "w2": [0.4230, -0.1, 0.021, 0.52, 2.0],
+        "w1": [0.0242, 0.0, 0.006, 0.304, 2.0], "w2": [0.4230, 0.019, 0.021, 0.52, 2.0],
         "time_s": [0.0, 0.1, 0.2, 1.75, 3.0],
     }  # fmt: skip
     reading, distance = messages_of(sensor, {"crosstalk": [0.004, 0.02]}, columns)
@@ -146,6 +146,41 @@ def test_one_range_too_near_none_and_saturated() -> None:
     assert math.isnan(reading[4]["range"])
     assert reading[4]["status"] == "saturated"
     assert (distance[4].signal_quality, distance[4].covariance) == (1, 255)
+
+
+def test_readings_that_noise_cannot_make_are_no_free_way() -> None:
+    """Too far is what a robot drives through; light below zero and too late light are faults."""
+    # sensor of a noise of 2e-5 and 1e-3: 20 of them below zero, and w1 8 of them above w2
+    columns = {"w1": [0.004, 0.032], "w2": [0.0, 0.04]}
+    reading, distance = messages_of(SENSOR, {"crosstalk": [0.004, 0.02]}, columns)
+    for said, fields in zip(reading, distance, strict=True):
+        assert said["status"] == "none"
+        assert math.isnan(said["range"])
+        assert fields.signal_quality == 1
+        assert fields.current_distance < fields.min_distance
+
+
+def answer_of(**more: Any) -> dict[str, Any]:
+    return {
+        "sequence": 1, "time_s": 0.0, "status": "none", "range_m": None, "sd_m": None,
+        "hypotheses": [], "misfit": False, "present": 0.0, "outlier": 0.0, **more,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("more", "word"),
+    [
+        ({}, "+inf"),
+        ({"present": 0.04}, "+inf"),
+        ({"present": 0.2}, "nan"),
+        ({"outlier": 0.9}, "nan"),
+        ({"misfit": True}, "nan"),
+        ({"status": "calibrating"}, "nan"),
+    ],
+)
+def test_a_stream_says_too_far_only_of_an_empty_scene(more: dict[str, Any], word: str) -> None:
+    line = line_as_message(ROS, (0.02, 15.0), json.dumps(answer_of(**more)).encode())
+    assert json.loads(line)["message"]["rep117"] == word
 
 
 def test_two_ranges_are_no_range_and_the_variance_is_that_of_both() -> None:
@@ -195,25 +230,29 @@ def test_lines_of_a_stream_as_messages() -> None:
     r = 0.8
     w2 = c0 * c2 / (r**2 * (r**2 + c1 * r + c0))
     frames = [{"time_s": 0.1 * n, "w1": w2 * r / 14.9896, "w2": w2, "id": n} for n in range(6)]
-    frames += [{"time_s": 0.6, "w1": 0.0, "w2": 0.0, "object_present": False}, {"time_s": 0.0}]
+    frames += [{"time_s": 0.6, "w1": 0.0, "w2": 0.0, "object_present": False}]
+    frames += [{"time_s": 0.7, "w1": 9.0 * w2, "w2": 9.0 * w2}, {"time_s": 0.0}]
     lines = [Line(json.dumps(frame).encode(), 0.0) for frame in frames]
     answers = take(model, Place(model.first), lines, JsonLines(), Kept()).answers
     limits = limits_of_tracker(model.base)
     every = {}
     for form in (ROS, MAVLINK):
         found = [json.loads(line) for line in as_messages(form, limits, answers)]
-        assert [line["sequence"] for line in found] == list(range(1, 9))
+        assert [line["sequence"] for line in found] == list(range(1, 10))
         assert found[4]["id"] == 4
-        assert "message" not in found[7]
-        assert found[7] == json.loads(answers[7])
+        assert "message" not in found[8]
+        assert found[8] == json.loads(answers[8])
         assert (found[5]["status"], found[6]["status"]) == ("unique", "none")
-        every[form.name] = [found[n]["message"] for n in (5, 6)]
-    said, empty = map(ros, every[ROS.name])
+        every[form.name] = [found[n]["message"] for n in (5, 6, 7)]
+    said, empty, strange = map(ros, every[ROS.name])
     answer = json.loads(answers[5])
     assert said["range"] == answer["range_m"]
     assert said["variance"] >= answer["sd_m"] ** 2
     assert empty["range"] == math.inf
-    near, nothing = map(mavlink, every[MAVLINK.name])
+    # nothing that the scene has reads so: it may be anything, right before the sensor
+    assert (found[7]["status"], strange["status"]) == ("none", "none")
+    assert math.isnan(strange["range"])
+    near, nothing, _ = map(mavlink, every[MAVLINK.name])
     assert abs(near.current_distance - 80) <= 1
     assert (near.signal_quality, nothing.signal_quality) == (100, 1)
     assert nothing.current_distance > nothing.max_distance

@@ -155,23 +155,26 @@ def test_known_crosstalk_and_gain_are_taken_off_first() -> None:
 def test_statuses_of_a_pulse() -> None:
     sensor = sensor_of("pulsed", full_scale=[10.0, 10.0])
     r0 = 14.9896229
-    readings = [[0.5, 1.0], [0.5, 0.0], [0.5, -1.0], [-1e-9, 1.0], [1.1, 1.0], [1.0, 10.0], [0, 0]]
-    present = np.array([True] * 6 + [False])
+    readings = [[0.5, 1.0], [0.5, 0.0], [0.5, -2e-6], [-1e-9, 1.0], [1.000002, 1.0], [1.0, 10.0]]
+    # by a hundred thousand standard deviations
+    readings += [[0.5, -1.0], [1.1, 1.0], [0, 0]]
+    present = np.array([True] * 8 + [False])
     result = estimate(
         sensor, parse_scene({}), Frames(np.array(readings), object_present=present)
     ).results[0]
-    assert result.status.tolist() == [0, 2, 2, 2, 2, 3, 2]
+    assert result.status.tolist() == [0, 2, 2, 2, 2, 3, 2, 2, 2]
     assert result.range_m[0] == pytest.approx(r0 / 2)
     assert result.sd_parts_m is not None
     noise, model = r0 * 1e-6 * math.sqrt(1.25), RANGE_ERROR_SD
     parts = [float(part[0, 0]) for part in result.sd_parts_m]
     assert parts == pytest.approx([noise, 0.0, model])
     assert result.sd_m[0] == pytest.approx(math.hypot(noise, model))
-    words = ["", "w2 is not", "w2 is not", "contact", "beyond r0", "full scale", "no object"]
+    words = ["", "w2 is not", "w2 is not", "contact", "beyond r0", "full scale", "below zero by"]
+    words += ["above w2 by", "no object"]
     for i, word in enumerate(words):
         assert word in reason_of(result, i)
     assert np.isnan(result.roots_m[1:]).all()
-    assert result.root_count.tolist() == [1, 0, 0, 0, 0, 0, 0]
+    assert result.root_count.tolist() == [1, *[0] * 8]
 
 
 def test_a_phase_just_below_zero_is_contact() -> None:

@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 from simulator.compiled import compiled
 from simulator.readings import noise_parts
 
-__all__ = ["Codes", "Columns", "Pulse", "explain", "pulsed_ranges", "ranges_alone"]
+__all__ = [
+    "CONTRADICTED",
+    "Codes",
+    "Columns",
+    "Pulse",
+    "explain",
+    "pulsed_ranges",
+    "ranges_alone",
+]
 
 Array = NDArray[np.float64]
 
@@ -70,6 +78,10 @@ class Columns(NamedTuple):
     near: NDArray[np.uint8]
 
 
+CONTRADICTED = 5.0
+"""Standard deviations by which noise moves no reading to the wrong side of a limit."""
+
+
 class Codes(NamedTuple):
     """Indices of the reasons that `explain` gives."""
 
@@ -80,6 +92,8 @@ class Codes(NamedTuple):
     lost: int
     saturated: int
     drowned: int
+    negative: int
+    swapped: int
 
 
 @compiled
@@ -179,6 +193,7 @@ def explain(flat: Array, pulse: Pulse, codes: Codes, columns: Columns) -> None:
         Filled by `pulsed_ranges`.
     """
     roots, reason = columns.roots, columns.reason
+    read1, read2 = pulse.read
     for i in range(roots.size):
         if reason[i] == 0:
             continue
@@ -191,10 +206,16 @@ def explain(flat: Array, pulse: Pulse, codes: Codes, columns: Columns) -> None:
             reason[i] = codes.lost
         elif whole <= 0.0:
             reason[i] = codes.dark
+            if -whole > CONTRADICTED * math.sqrt(read2 * read2 + pulse.shot * abs(raw2)):
+                reason[i] = codes.negative
         elif late <= 0.0:
             reason[i] = codes.contact
         elif late > whole:
             reason[i] = codes.beyond
+            # photons that are late are part of all, and cancel: this is their most
+            photons = pulse.shot * (abs(raw1) + abs(raw2))
+            if late - whole > CONTRADICTED * math.sqrt(read1 * read1 + read2 * read2 + photons):
+                reason[i] = codes.swapped
         elif not r > 0.0:
             reason[i] = codes.lost
         elif not pulse.low <= r <= pulse.high:

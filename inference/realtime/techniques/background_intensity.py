@@ -6,7 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.realtime.assemble import NOISE_BAND, Candidates, Outcome, assemble, reasons_of
+from inference.realtime.assemble import (
+    NEGATIVE,
+    NOISE_BAND,
+    Candidates,
+    Outcome,
+    assemble,
+    reasons_of,
+)
 from inference.realtime.from_curve import stacked
 from inference.realtime.model_error import model_error_of
 from inference.realtime.nearest_roots import nearest
@@ -15,6 +22,7 @@ from inference.realtime.solving.background_balance import solve_balance
 from inference.realtime.solving.background_phase import Phase, solve_phase
 from inference.realtime.solving.exact import cycles_phase
 from inference.realtime.solving.known_background import Found, KnownBackground
+from inference.realtime.solving.pulse_ratio import CONTRADICTED
 from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor
 
@@ -28,8 +36,9 @@ _REASONS = reasons_of(
     "the readings lie at or beyond the background",
     "no signal: i and q are zero",
     "no range before the background gives these readings",
+    NEGATIVE,
 )
-_DARK, _CONTACT, _BEYOND, _SILENT, _NO_RANGE = range(len(_REASONS) - 5, len(_REASONS))
+_DARK, _CONTACT, _BEYOND, _SILENT, _NO_RANGE, _NEGATIVE = range(len(_REASONS) - 6, len(_REASONS))
 _SMALL = 0.005  # share of the range up to which the tangent says what noise does
 _CHUNK = 200_000  # candidate roots held at a time, so that they stay in the cache
 
@@ -69,6 +78,8 @@ def _solve(task: Task) -> TechniqueResult:
         reason = np.full(n, _BEYOND)
         reason[net.first <= 0] = _CONTACT
         reason[net.second <= 0] = _DARK
+        with np.errstate(all="ignore"):
+            reason[-net.second > CONTRADICTED * np.sqrt(net.var2)] = _NEGATIVE
     else:
         reason = np.where((net.first == 0) & (net.second == 0), _SILENT, _NO_RANGE)
     support = known.support if task.physical else (0.0, np.inf)

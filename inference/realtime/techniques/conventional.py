@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from inference.estimates import SdParts, Status, TechniqueResult
 from inference.realtime.assemble import (
     DROWNED,
+    NEGATIVE,
     NOISE_BAND,
     OUTSIDE,
     Candidates,
@@ -43,8 +44,13 @@ _REASONS = reasons_of(
     "the phase is below zero within its noise: at or near contact",
     "the phase is below zero within its noise: at or near contact, or at the end of the "
     "unambiguous range",
+    NEGATIVE,
+    "w1 is above w2 by far more than noise: the crosstalk, the noise or the order of the readings "
+    "is not as stated",
 )
-_DARK, _CONTACT, _BEYOND, _SILENT, _WRAPPED, _EITHER = range(len(_REASONS) - 6, len(_REASONS))
+_DARK, _CONTACT, _BEYOND, _SILENT, _WRAPPED, _EITHER, _NEGATIVE, _SWAPPED = range(
+    len(_REASONS) - 8, len(_REASONS)
+)
 _SLACK = 8 * float(np.finfo(float).eps)
 _CODES = Codes(
     dark=_DARK,
@@ -54,6 +60,8 @@ _CODES = Codes(
     lost=UNREPRESENTABLE,
     saturated=SATURATED,
     drowned=DROWNED,
+    negative=_NEGATIVE,
+    swapped=_SWAPPED,
 )
 
 

@@ -4,11 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.realtime.assemble import Outcome, assemble, reasons_of
+from inference.realtime.assemble import NEGATIVE, Outcome, assemble, reasons_of
 from inference.realtime.from_curve import candidates_of
 from inference.realtime.net import UNREPRESENTABLE, Net, known_net_readings
 from inference.realtime.solving.curves import intensity
 from inference.realtime.solving.curves.curve import Curve
+from inference.realtime.solving.pulse_ratio import CONTRADICTED
 from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor
 
@@ -19,8 +20,9 @@ Array = NDArray[np.float64]
 _REASONS = reasons_of(
     "no light from the object: the reading is not positive",
     "the late window reads less than from an object at r0",
+    NEGATIVE,
 )
-_DARK, _BEYOND = len(_REASONS) - 2, len(_REASONS) - 1
+_DARK, _BEYOND, _NEGATIVE = range(len(_REASONS) - 3, len(_REASONS))
 
 
 def range_from_light(
@@ -53,7 +55,8 @@ def range_from_light(
         target = np.where(usable, target, np.nan)
         sd = np.hypot(np.sqrt(variance) * scale, net.relative * target)
         candidates, _ = candidates_of(task, curve, high_m, target, sd)
-    reason = np.where(reading > 0, _BEYOND, _DARK).astype(np.uint8)
+        negative = -reading > CONTRADICTED * np.sqrt(variance)
+    reason = np.where(reading > 0, _BEYOND, np.where(negative, _NEGATIVE, _DARK)).astype(np.uint8)
     support = task.known.support if task.physical else (0.0, np.inf)
     return assemble(name, state, candidates, Outcome(None, support, reason, _REASONS))
 
