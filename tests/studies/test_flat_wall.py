@@ -8,7 +8,7 @@ from benchmarks.flat_wall import fitted_object, fitted_shadow, moments_of, read_
 
 @pytest.mark.parametrize("power", [0, 1, 3])
 def test_the_light_of_a_disk_is_its_closed_form(power: int) -> None:
-    # docs/model.md, table 3.1; 48 nodes of Gauss are exact to roundings for these powers
+    # docs/model.md, 3.4; 48 nodes of Gauss are exact to roundings for these powers
     z, radius = np.array([0.2, 1.0]), 0.4
     c = z / np.hypot(z, radius)
     paths, light = moments_of(z, radius, power)
