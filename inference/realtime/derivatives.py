@@ -12,7 +12,7 @@ from inference.realtime.net import (
     on_time,
     rule_out,
 )
-from inference.realtime.smoothness import rough
+from inference.realtime.smoothness import Uneven, rough
 from inference.realtime.windows import Windows, differences
 from simulator.errors import InvalidInputError
 from simulator.frames import Frames, check_increasing
@@ -80,16 +80,19 @@ def derivatives_of(
     windows = Windows(*(np.full(n, np.nan) for _ in range(6)))
     state = net.state.copy()
     if usable.size >= 2:
-        uneven = np.zeros(usable.size, dtype=np.bool_)
+        none = np.zeros(usable.size, dtype=np.bool_)
+        uneven = Uneven(none, none)
         if not uneven_too:
             uneven = rough(*_of_frames(usable, frames.time_s, net, gain))
-        # no window reaches across what is uneven: it would take in what lies behind a jump
-        for stretch in np.split(usable, np.flatnonzero(np.diff(uneven, prepend=uneven[0]))):
+        # No window reaches across what is uneven: it would take in what lies behind a jump. The
+        # frames beside it, which tell no range themselves, serve those that are farther away: a
+        # window to one side is worst where motion is least even
+        for stretch in np.split(usable, np.flatnonzero(np.diff(uneven.at, prepend=uneven.at[0]))):
             part = Windows(*(np.full(stretch.size, np.nan) for _ in range(6)))
-            differences(*_of_frames(stretch, frames.time_s, net, gain), part)
+            differences(*_of_frames(stretch, frames.time_s, net, gain), not uneven_too, part)
             for whole, some in zip(windows, part, strict=True):
                 whole[stretch] = some
-        state[usable[uneven]] = first_reason + ROUGH
+        state[usable[uneven.near]] = first_reason + ROUGH
         missing = np.isnan(windows.first) & np.isnan(windows.var1) & (state == 0)
         state[missing] = first_reason + UNEVEN_GAIN
         state[(windows.direction_sd > _TOLD) & (state == 0)] = first_reason + DROWNED_CHANGE

@@ -5,12 +5,14 @@ turns back within a frame, moves along a chord of the curve of readings; its dir
 some range in between, whatever windows agree upon.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from inference.realtime.net import Net
 
-__all__ = ["rough"]
+__all__ = ["Uneven", "rough"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -25,11 +27,25 @@ _BY_CHANCE = 0.01  # rate, at most, at which noise alone makes all frames of a s
 _AROUND = 2  # frames on either side, whose windows hold an uneven one
 
 
-def rough(time_s: Array, net: Net, gain: Array | None) -> Flags:
-    """Tell which frames have no derivative that differences could find.
+class Uneven(NamedTuple):
+    """Where readings change unevenly, each of shape (n,).
 
-    Those within two frames of one at which the rate changes threefold, or turns back, by more than
-    its noise. All, where that is so at a fifth of the frames whose rates are told at all, and at
+    Attributes
+    ----------
+    at : ndarray of bool
+        Frames at which the rate changes threefold, or turns back, by more than its noise.
+    near : ndarray of bool
+        Those and the two on either side: they have no derivative that differences could find.
+    """
+
+    at: Flags
+    near: Flags
+
+
+def rough(time_s: Array, net: Net, gain: Array | None) -> Uneven:
+    """Tell where readings change unevenly.
+
+    At all frames, where that is so at a fifth of the frames whose rates are told at all, and at
     one of them by more than noise does anywhere in so many frames.
 
     Parameters
@@ -43,11 +59,11 @@ def rough(time_s: Array, net: Net, gain: Array | None) -> Flags:
 
     Returns
     -------
-    ndarray of bool, shape (n,)
+    Uneven
     """
     n = time_s.size
     if n < 3:
-        return np.zeros(n, dtype=np.bool_)
+        return Uneven(np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_))
     with np.errstate(all="ignore"):
         step = np.diff(time_s)
         reading_sd = np.sqrt(np.column_stack([net.var1, net.var2]))
@@ -71,10 +87,11 @@ def rough(time_s: Array, net: Net, gain: Array | None) -> Flags:
             told, uneven, sure = told & same, uneven & same, sure & same
     count = int(uneven.sum())
     if sure.any() and count >= _FEWEST and count > _SHARE * int(told.sum()):
-        return np.ones(n, dtype=np.bool_)
-    at = np.flatnonzero(uneven) + 1
-    near = np.zeros(n, dtype=np.bool_)
+        return Uneven(np.ones(n, dtype=np.bool_), np.ones(n, dtype=np.bool_))
+    places = np.flatnonzero(uneven) + 1
+    found = Uneven(np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_))
+    found.at[places] = True
     for away in range(-_AROUND, _AROUND + 1):
-        places = at + away
-        near[places[(places >= 0) & (places < n)]] = True
-    return near
+        near = places + away
+        found.near[near[(near >= 0) & (near < n)]] = True
+    return found

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.realtime.net import Net
+from inference.realtime.window_errors import grown, level_turns
 from simulator.compiled import compiled
 
 __all__ = ["HALF_WIDTHS", "Windows", "differences"]
@@ -36,6 +37,7 @@ _AGREEMENT = 3.0
 _MOST = 0.5  # of a derivative, above which its bias leaves nothing of it
 _END = 8  # frames from an end, where windows to one side are better than none
 _BENDS = 3.0  # 2 (N + 3) / (N + 1) is 3.3 to 2.8 of a power law of N = 2 to 4
+_CROOKED = 1.0  # share of the bias that is across, to one side, over the error of three readings
 # 3! 3! / 5!: from products of distances to the factors of the errors of five and of three readings
 _FACTORIALS = 0.3
 
@@ -145,24 +147,27 @@ def _bias(
     whole: _Difference,
     s1: float,
     s2: float,
-) -> tuple[float, float]:
-    """Return about how far a derivative is from the truth, as a vector."""
+) -> tuple[float, float, float]:
+    """Return about how far a derivative is from the truth, as a vector.
+
+    Last comes by how much three readings of the window err, relative to the derivative.
+    """
     if count == 2:  # nothing tells
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     few = 3 if count > 3 else 2
     first = min(max(at - 1, 0), count - few)
     part = _difference(t, net, nodes, at, first, first + few - 1)
     b1, b2 = whole.d1 - part.d1, whole.d2 - part.d2
     if count < _NODES:
-        return b1, b2
+        return b1, b2, 0.0
     size = math.hypot(whole.d1 / s1, whole.d2 / s2)
     bend = math.hypot(b1 / s1, b2 / s2) / size if size > 0.0 else math.inf
     share = _BENDS * _FACTORIALS * whole.distances / (part.distances * part.distances) * bend
-    return share * b1, share * b2
+    return share * b1, share * b2, bend
 
 
 @compiled
-def differences(t: Array, net: Net, gain: Array | None, out: Windows) -> None:
+def differences(t: Array, net: Net, gain: Array | None, radial: bool, out: Windows) -> None:
     """Fill in the differences of n frames.
 
     Parameters
@@ -173,12 +178,16 @@ def differences(t: Array, net: Net, gain: Array | None, out: Windows) -> None:
         Readings of the frames and their noise.
     gain : ndarray, shape (n,), optional
         Factors of the frames on the sensor's gain, where windows must not mix them.
+    radial : bool
+        Whether readings move along a curve. Along a straight line, such as that of an object at a
+        fixed range, bias has the direction of the change, and so has a common error of both.
     out : Windows
         Receives the results.
     """
     n = t.size
     nodes = np.empty(_NODES, dtype=np.intp)
     angles, sds = np.empty(len(HALF_WIDTHS)), np.empty(len(HALF_WIDTHS))
+    turns, products = np.zeros(n), np.zeros(n)
     start, end = 0, n
     for i in range(n):
         if gain is not None and (i == 0 or i == end):
@@ -192,14 +201,21 @@ def differences(t: Array, net: Net, gain: Array | None, out: Windows) -> None:
             if count == 0:
                 break
             whole = _difference(t, net, nodes, at, 0, count - 1)
-            b1, b2 = _bias(t, net, nodes, count, at, whole, s1, s2)
+            b1, b2, bend = _bias(t, net, nodes, count, at, whole, s1, s2)
             x, y = whole.d2 / s2, whole.d1 / s1
             square = x * x + y * y
-            noise, turn = math.inf, 0.0
+            noise, turn, more = math.inf, 0.0, 0.0
             if square > 0.0:
-                spread = x * x * whole.v1 / s1 / s1 + y * y * whole.v2 / s2 / s2
-                spread -= 2.0 * x * y * whole.v12 / s1 / s2
-                noise = math.sqrt(max(spread, 0.0)) / square
+                c1, c2, c12 = whole.v1 / s1 / s1, whole.v2 / s2 / s2, whole.v12 / s1 / s2
+                across = max(x * x * c1 + y * y * c2 - 2.0 * x * y * c12, 0.0) / square
+                noise = math.sqrt(across / square)
+                if radial:
+                    along = (x * x * c2 + y * y * c1 + 2.0 * x * y * c12) / square
+                    both = ((x * x - y * y) * c12 + x * y * (c1 - c2)) / square
+                    growth = grown(square, across, along, both)
+                    noise *= growth
+                    if growth < math.inf:
+                        more = (growth * growth - 1.0) * across / square
                 turn = abs(x * b1 / s1 - y * b2 / s2) / square
             # the bias grows with the window, whatever noise makes of its estimate
             if turn < widest and turn > 0.0:
@@ -209,6 +225,14 @@ def differences(t: Array, net: Net, gain: Array | None, out: Windows) -> None:
             # along itself too: a chord from a bright frame to a dark one has a direction of its
             # own
             bias = math.hypot(b1 / s1, b2 / s2)
+            # to one side errors of third and fifth order do not point the same way: where frames
+            # are far apart, an estimate that lies along the change says nothing of what is across
+            if radial and count == _NODES and at != _NODES // 2 and square > 0.0:
+                sideways = bias / math.sqrt(square) * min(_CROOKED * bend, 1.0)
+                if sideways > turn:
+                    more += sideways * sideways - turn * turn
+                    turn = sideways
+                    widest = turn
             blur = _AGREEMENT * math.hypot(math.sqrt(whole.v1) / s1, math.sqrt(whole.v2) / s2)
             if tried > 0 and bias > max(_MOST * math.sqrt(square), blur):
                 break
@@ -224,6 +248,10 @@ def differences(t: Array, net: Net, gain: Array | None, out: Windows) -> None:
             tried += 1  # noqa: SIM113  # not every width is tried
             if tried == 1 or sd < best:
                 best = sd
+                turns[i], products[i] = turn, whole.distances
                 out.first[i], out.second[i], out.direction_sd[i] = whole.d1, whole.d2, sd
-                out.var1[i], out.var2[i] = whole.v1 + b1 * b1, whole.v2 + b2 * b2
-                out.cov[i] = whole.v12 + b1 * b2
+                out.var1[i] = whole.v1 + b1 * b1 + more * (x * s1) * (x * s1)
+                out.var2[i] = whole.v2 + b2 * b2 + more * (y * s2) * (y * s2)
+                out.cov[i] = whole.v12 + b1 * b2 - more * (x * s1) * (y * s2)
+    if radial:
+        level_turns(net, turns, products, (out.first, out.second), (out.var1, out.var2, out.cov))
