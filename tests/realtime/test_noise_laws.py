@@ -159,7 +159,7 @@ def test_noise_of_a_derivative_counts_the_frames_own_reading(at: int) -> None:
     line = np.arange(5.0)  # whole numbers: nothing is rounded
     net = Net(line, 2 * line, 4 * one, 9 * one, 3 * one, 0.0, np.zeros(5, dtype=np.uint8))
     out = Windows(*(np.full(5, np.nan) for _ in range(6)))
-    differences(np.asarray(t, dtype=np.float64), net, None, out)
+    differences(np.asarray(t, dtype=np.float64), net, None, False, out)
     square = sum(w * w for w in weights) / 0.01
     np.testing.assert_allclose(
         [out.first[at], out.second[at], out.var1[at], out.var2[at], out.cov[at]],
