@@ -17,6 +17,7 @@ from typing import Annotated, Literal, Self
 import pydantic
 
 from simulator.discrepancy import DISCREPANCY_SD
+from simulator.shadow_error import SHADOW_SD
 from simulator.validated import NonNegative, Validated
 
 __all__ = ["FITTED_SHARE", "RANGE_ERROR_SD", "Discrepancy", "ErrorSizes", "ModelError"]
@@ -90,11 +91,15 @@ class ModelError:
     integrated : bool
         Whether they were stated in numbers: a posterior then integrates them out with the ranges.
         Else they enter by linear response, as a part of the error budget.
+    shadow : float
+        Of the shadow on a background (`simulator.shadow_error`); 0: none, as where sizes are
+        stated.
     """
 
     flux: float
     range_m: float
     integrated: bool
+    shadow: float = 0.0
 
     def beside_numbers(self) -> "ModelError":
         """Return what is left of the default where an object's c0, c1 and c2 are numbers.
@@ -120,7 +125,7 @@ class ModelError:
             With the sizes that stand.
         """
         if discrepancy is None or isinstance(discrepancy, str):
-            return cls(DISCREPANCY_SD, RANGE_ERROR_SD, integrated=False)
+            return cls(DISCREPANCY_SD, RANGE_ERROR_SD, integrated=False, shadow=SHADOW_SD)
         if not isinstance(discrepancy, ErrorSizes):
             discrepancy = ErrorSizes(flux=discrepancy)
         flux, range_m = discrepancy.flux, discrepancy.range_m

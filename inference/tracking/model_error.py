@@ -15,6 +15,7 @@ from simulator.discrepancy import SLOPE_SD, discrepancy_basis
 from simulator.model_error import ModelError
 from simulator.parameters import Terms
 from simulator.sensor import PulsedSensor, Sensor, instrument
+from simulator.shadow_error import shadow_errors
 
 __all__ = ["model_changes", "sd_by_derivatives", "sd_by_table"]
 
@@ -32,7 +33,9 @@ def _shapes(positions: Array, sd: float) -> Array:
     return sd * discrepancy_basis(low, high, _NEGLECTED).values(positions).T
 
 
-def model_changes(sensor: Sensor, error: ModelError, knots: Knots, scale: Array) -> list[Array]:
+def model_changes(
+    sensor: Sensor, error: ModelError, terms: Terms, knots: Knots, scale: Array
+) -> list[Array]:
     """Return what every function of the model's errors does to the readings.
 
     Parameters
@@ -41,6 +44,8 @@ def model_changes(sensor: Sensor, error: ModelError, knots: Knots, scale: Array)
         The sensor.
     error : ModelError
         Sizes of the errors.
+    terms : Terms
+        The scene; of its background the first parameter vector is used.
     knots : Knots
         Where readings are tabulated.
     scale : ndarray, shape (2,)
@@ -61,14 +66,34 @@ def model_changes(sensor: Sensor, error: ModelError, knots: Knots, scale: Array)
     if flux > 0:
         changes += [light * s[:, None] for s in _shapes(knots.positions, flux)]
     if error.range_m > 0:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            raw = np.where(scale > 0, light / scale, 0.0)
-        if isinstance(sensor, PulsedSensor) and not scale[1] > 0:
-            shift = sensor.known_shift_m
-            raw[:, 1] = raw[:, 0] * sensor.r0 / (np.exp(knots.positions) + shift)
-        late = delayed(raw, knots.positions, *instrument(sensor)) * scale
+        late = _delayed(sensor, light, knots.positions, scale)
         changes += [late * s[:, None] for s in _shapes(knots.positions, error.range_m)]
-    return changes
+    return changes + _shadow_changes(sensor, error, terms, knots, scale)
+
+
+def _delayed(sensor: Sensor, light: Array, log_r: Array, scale: Array) -> Array:
+    """Return the change of light with the distance that it seems to come, in units of the noise."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        raw = np.where(scale > 0, light / scale, 0.0)
+    if isinstance(sensor, PulsedSensor) and not scale[1] > 0:
+        raw[:, 1] = raw[:, 0] * sensor.r0 / (np.exp(log_r) + sensor.known_shift_m)
+    return delayed(raw, log_r, *instrument(sensor)) * scale
+
+
+def _shadow_changes(
+    sensor: Sensor, error: ModelError, terms: Terms, knots: Knots, scale: Array
+) -> list[Array]:
+    """Return what every function of the shadow's errors does to the readings."""
+    if terms.background is None or not error.shadow > 0:
+        return []
+    _, distance, c0, c1 = terms.background[0].tolist()
+    r = np.exp(knots.positions)
+    by_light, by_distance = shadow_errors(r * (r + c1) / (r * (r + c1) + c0))
+    behind = knots.means[:, MEAN] - knots.means[:, OBJECT]
+    farther = _delayed(sensor, behind, np.full(r.size, math.log(distance)), scale)
+    shapes = _shapes(knots.positions, error.shadow)
+    changes = (behind * by_light[:, None], farther * (distance * by_distance)[:, None])
+    return [change * s[:, None] for change in changes for s in shapes]
 
 
 def sd_by_derivatives(

@@ -70,7 +70,7 @@ def nuisance_jacobian(
             along.append(change)
             empty.append(bare)
     from_scene = len(along)
-    for change in model_changes(sensor, error, knots, scale):
+    for change in model_changes(sensor, error, known.centre, knots, scale):
         if np.abs(change).max() > _FELT:
             along.append(change)
             empty.append(np.zeros(2))

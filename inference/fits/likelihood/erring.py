@@ -131,6 +131,8 @@ class Erring(Maximum):
     def with_known(self, u: Array) -> Array:
         """Return ranges that readings prefer, moved to where what is known beside them counts."""
         problem = self.clean
+        if not np.isfinite(u).any():
+            return u
         for _ in range(_TURNS):
             told = told_at(problem.known, u, self.a)
             if told is None:

@@ -1,5 +1,6 @@
 """Background cancelling: a background of known distance drops out, whatever its strength."""
 
+import dataclasses
 import math
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ from inference.technique import Task, Technique
 from simulator.compiled import compiled
 from simulator.object_model import quadratic
 from simulator.sensor import PulsedSensor, SineWaveSensor
+from simulator.shadow_error import shadow_errors
 
 __all__ = ["BACKGROUND_CANCELLING"]
 
@@ -117,6 +119,11 @@ def _solve(task: Task) -> TechniqueResult:
         sd = np.hypot(np.sqrt(parts.var_free) * scale, net.relative * target)
         distance = known.get("background.distance_m")
         candidates, slopes = candidates_of(task, curve, distance, target, sd)
+        shadow = model_error_of(task).shadow
+        if shadow > 0:
+            by_shadow = _by_shadow(task, parts.whole, candidates.roots) * scale / np.abs(slopes)
+            model = 0.0 if candidates.model is None else candidates.model
+            candidates = dataclasses.replace(candidates, model=np.hypot(model, shadow * by_shadow))
         physical = None
         if task.physical and known.has("background.strength"):
             scene = _Scene(
@@ -136,6 +143,28 @@ def _solve(task: Task) -> TechniqueResult:
     support = known.support if task.physical else (0.0, np.inf)
     outcome = Outcome(physical, support, reason, _REASONS)
     return assemble("background_cancelling", state, candidates, outcome)
+
+
+def _by_shadow(task: Task, whole: Array, roots: Array) -> Array:
+    """Return what errors of the shadow leave of a background, in units of their size, shape (n, m).
+
+    Light that is farther away than the background is not cancelled: docs/model.md, shadow-error.
+    Where no number tells the shadow, it is taken for as large as the object.
+    """
+    sensor, known = task.sensor, task.known
+    c0, c1 = known.get("object.c0"), known.get("object.c1")
+    flux = sensor.known_gain * known.get("object.c2") * (c0 / (roots * (roots + c1) + c0))
+    flux = flux / roots / roots
+    turn = 1.0
+    if isinstance(sensor, SineWaveSensor):
+        distance = known.get("background.distance_m")
+        turn = sensor.wave_number * distance
+        flux = flux * np.cos(turn - sensor.wave_number * roots)
+    if known.has("background.shadow.c0", "background.shadow.c1"):
+        c0, c1 = known.get("background.shadow.c0"), known.get("background.shadow.c1")
+    inner = roots * (roots + c1)
+    _, by_distance = shadow_errors(inner / (inner + c0))
+    return np.asarray(np.abs(whole[:, None] - flux) * turn * by_distance)
 
 
 @compiled

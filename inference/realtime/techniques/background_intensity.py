@@ -25,6 +25,7 @@ from inference.realtime.solving.known_background import Found, KnownBackground
 from inference.realtime.solving.pulse_ratio import CONTRADICTED
 from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor
+from simulator.shadow_error import shadow_errors
 
 __all__ = ["BACKGROUND_INTENSITY"]
 
@@ -65,14 +66,18 @@ def _solve(task: Task) -> TechniqueResult:
         for i in range(0, n, step)
     ]
     roots, sds, late, near, near_frame, physical = zip(*parts, strict=True)
-    error = model_error_of(task).range_m
+    ranges, error = stacked(roots), model_error_of(task)
     with np.errstate(all="ignore"):
+        model = stacked(late) * error.range_m
+        if error.shadow > 0:
+            by_shadow = unit * _moved_by_shadow(sensor, net, background, unit, ranges)
+            model = np.hypot(model, error.shadow * by_shadow)
         candidates = Candidates(
-            stacked(roots) * unit,
+            ranges * unit,
             stacked(sds) * unit,
             stacked(near),
             np.concatenate(near_frame),
-            model=np.abs(stacked(late)) * error if error > 0 else None,
+            model=np.abs(model) if error.range_m > 0 or error.shadow > 0 else None,
         )
     if isinstance(sensor, PulsedSensor):
         reason = np.full(n, _BEYOND)
@@ -87,6 +92,32 @@ def _solve(task: Task) -> TechniqueResult:
         stacked(physical) if task.physical else None, support, reason.astype(np.uint8), _REASONS
     )
     return assemble("background_intensity", net.state, candidates, outcome)
+
+
+def _moved_by_shadow(
+    sensor: Sensor, net: Net, far: KnownBackground, unit: float, r: Array
+) -> Array:
+    """Return how far errors of the shadow move roots, in units of their size, shape (n, m).
+
+    Of late and whole light F = w1 - r w2 - b S (R - r), of a sine wave what points across the
+    object's own direction; docs/model.md, shadow-error.
+    """
+    inner = r * (r + far.c1)
+    q = inner + far.c0
+    seen, slope = far.strength * inner / q, far.strength * far.c0 * (2.0 * r + far.c1) / q / q
+    by_light, by_distance = shadow_errors(inner / q)
+    first, second = net.first[:, None], net.second[:, None]
+    if isinstance(sensor, PulsedSensor):
+        across, turned = far.distance - r, np.full_like(r, far.distance)
+        steep = second - seen + slope * across
+    else:
+        k, offset = sensor.wave_number * unit, sensor.known_phase_rad
+        own = k * r + offset
+        angle = cycles_phase(sensor.frequency_hz, far.distance * unit) + offset - own
+        across, turned = np.sin(angle), k * far.distance * np.cos(angle)
+        flux = first * np.cos(own) + second * np.sin(own) - seen * np.cos(angle)
+        steep = k * flux + slope * across
+    return np.asarray(seen * np.hypot(across * by_light, turned * by_distance) / np.abs(steep))
 
 
 def _part(sensor: Sensor, net: Net, background: KnownBackground, unit: float, width: int) -> Found:
