@@ -12,10 +12,13 @@ from simulator.model_error import FITTED_SHARE, RANGE_ERROR_SD, ModelError
 from simulator.optics.misfit import model_misfit
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import PulsedSensor, parse_sensor
+from simulator.shadow_error import SHADOW_SD
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
 
 Array = NDArray[np.float64]
+
+DEFAULT = ModelError(DISCREPANCY_SD, RANGE_ERROR_SD, integrated=False, shadow=SHADOW_SD)
 
 
 @pytest.mark.parametrize("span", [(0.2, 0.4), (0.05, 1.0), (0.02, 20.0)])
@@ -97,8 +100,8 @@ def test_share_that_a_calibration_leaves() -> None:
 @pytest.mark.parametrize(
     ("scene", "meant"),
     [
-        ({}, ModelError(DISCREPANCY_SD, RANGE_ERROR_SD, integrated=False)),
-        ({"discrepancy": "default"}, ModelError(DISCREPANCY_SD, RANGE_ERROR_SD, integrated=False)),
+        ({}, DEFAULT),
+        ({"discrepancy": "default"}, DEFAULT),
         ({"discrepancy": 0}, ModelError(0.0, 0.0, integrated=False)),
         ({"discrepancy": 0.05}, ModelError(0.05, 0.0, integrated=True)),
         ({"discrepancy": {"range_m": 0.001}}, ModelError(0.0, 0.001, integrated=True)),
