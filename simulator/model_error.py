@@ -39,16 +39,20 @@ class ErrorSizes(Validated):
         Of a smooth relative error of the object's flux along log r.
     range_m : float
         Of a smooth error of the effective distance along log r [m].
+    shadow : float
+        Of the shadow on a background, in units of `simulator.shadow_error.shadow_errors`; single
+        frames and tracks have it, fits, posteriors and simulations do not.
     """
 
     flux: NonNegative = 0.0
     range_m: NonNegative = 0.0
+    shadow: NonNegative = 0.0
 
     @pydantic.model_validator(mode="after")
     def _of_something(self) -> Self:
         if not self.model_fields_set:
             raise ValueError(
-                'states nothing: give flux, range_m or both; "default" for the measured sizes, 0 '
+                'states nothing: give flux, range_m or shadow; "default" for the measured sizes, 0 '
                 "for an exact model"
             )
         return self
@@ -92,8 +96,7 @@ class ModelError:
         Whether they were stated in numbers: a posterior then integrates them out with the ranges.
         Else they enter by linear response, as a part of the error budget.
     shadow : float
-        Of the shadow on a background (`simulator.shadow_error`); 0: none, as where sizes are
-        stated.
+        Of the shadow on a background (`simulator.shadow_error`); 0: none.
     """
 
     flux: float
@@ -129,4 +132,5 @@ class ModelError:
         if not isinstance(discrepancy, ErrorSizes):
             discrepancy = ErrorSizes(flux=discrepancy)
         flux, range_m = discrepancy.flux, discrepancy.range_m
-        return cls(flux, range_m, integrated=flux > 0 or range_m > 0)
+        integrated = flux > 0 or range_m > 0
+        return cls(flux, range_m, integrated=integrated, shadow=discrepancy.shadow)

@@ -122,6 +122,8 @@ def scene_of_draws(
                     "flux": max(learnt.flux, error.flux),
                     "range_m": max(learnt.range_m, error.range_m),
                 }
+                if scene.background is not None:
+                    document["discrepancy"]["shadow"] = error.shadow
     document["calibration"] = calibration
     return parse_scene(document)
 

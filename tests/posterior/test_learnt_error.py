@@ -114,5 +114,6 @@ def test_the_calibrated_scene_has_the_larger_error(flux: float, stated: float | 
     if flux > 0 and stated is None:
         assert found.model_error.flux == learnt.flux > 0.15
         assert found.model_error.range_m >= scene.model_error.range_m
+        assert found.model_error.shadow == scene.model_error.shadow > 0
     else:
         assert found.model_error == scene.model_error

@@ -105,6 +105,11 @@ def test_share_that_a_calibration_leaves() -> None:
         ({"discrepancy": 0}, ModelError(0.0, 0.0, integrated=False)),
         ({"discrepancy": 0.05}, ModelError(0.05, 0.0, integrated=True)),
         ({"discrepancy": {"range_m": 0.001}}, ModelError(0.0, 0.001, integrated=True)),
+        (
+            {"discrepancy": {"flux": 0.1, "shadow": 0.3}},
+            ModelError(0.1, 0.0, integrated=True, shadow=0.3),
+        ),
+        ({"discrepancy": {"shadow": 0.3}}, ModelError(0.0, 0.0, integrated=False, shadow=0.3)),
         ({"discrepancy": {"flux": 0, "range_m": 0}}, ModelError(0.0, 0.0, integrated=False)),
     ],
     ids=str,
