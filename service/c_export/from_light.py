@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Mapping
 
 from inference.realtime.from_curve import curve_parameters
 from inference.realtime.registry import TECHNIQUES
@@ -18,21 +19,23 @@ __all__ = ["background_cancelling", "from_late_light", "from_light"]
 
 # what is common to all: what the light is at a range, and how far errors move the range
 _LIGHT = """
-static int found(real range, real light, real variance, @_answer *out)
+static int found(real range, real light, real variance, real whole, @_answer *out)
 {
     const real q = range * (range + C1) + C0;
     const real bare = STRENGTH / (range * @POWER * q);
     const real slope = bare * (NEARNESS + (1 - range * NEARNESS)
                                * (@P + range * (2 * range + C1) / q) / range);
     const real late = @LATE;
+    const real shadow = @HIDDEN;
+    (void)whole;
     out->range_m = range;
     out->sd_m = SQRT(variance + light * light * (RELATIVE * RELATIVE + FLUX * FLUX)
-                     + late * late) / slope;
+                     + late * late + shadow * shadow) / slope;
     return @_UNIQUE;
 }
 """
 _BRACKET = """
-static int solved(real light, real variance, @_answer *out)
+static int solved(real light, real variance, real whole, @_answer *out)
 {
     real low = LOW, high = HIGH;
     int turns;
@@ -49,11 +52,11 @@ static int solved(real light, real variance, @_answer *out)
         else
             high = middle;
     }
-    return found(low, light, variance, out);
+    return found(low, light, variance, whole, out);
 }
 """
 _TABLE = """
-static int solved(real light, real variance, @_answer *out)
+static int solved(real light, real variance, real whole, @_answer *out)
 {
     int low = 0, high = NODES - 1;
     real range;
@@ -68,7 +71,7 @@ static int solved(real light, real variance, @_answer *out)
     }
     range = ranges[low] + (light - readings[low])
             * ((ranges[high] - ranges[low]) / (readings[high] - readings[low]));
-    return found(range, light, variance, out);
+    return found(range, light, variance, whole, out);
 }
 """
 _HEAD = """
@@ -76,7 +79,7 @@ static int answer(real first, real second, @_answer *out)
 {
 @NOISE"""
 _WHOLE = """    (void)own1;
-    return solved(second - CROSSTALK2, own2 + shared, out);
+    return solved(second - CROSSTALK2, own2 + shared, R(0.0), out);
 }
 """
 _MODULUS = """    const real x = first - CROSSTALK1, y = second - CROSSTALK2;
@@ -84,29 +87,33 @@ _MODULUS = """    const real x = first - CROSSTALK1, y = second - CROSSTALK2;
     if (!(size > 0))
         return @_NONE;
     return solved(size * SQRT(square),
-                  (a * a * (own1 + shared) + b * b * (own2 + shared)) / square, out);
+                  (a * a * (own1 + shared) + b * b * (own2 + shared)) / square, R(0.0), out);
 }
 """
 _LATE = """    (void)own2;
-    return solved(first - CROSSTALK1, own1 + shared, out);
+    return solved(first - CROSSTALK1, own1 + shared, R(0.0), out);
 }
 """
 _FREE = """    const real share = R0 * NEARNESS;
-    const real light = (second - CROSSTALK2) - share * (first - CROSSTALK1);
-    return solved(light, share * share * own1 + own2 + (1 - share) * (1 - share) * shared, out);
+    const real whole = second - CROSSTALK2;
+    const real light = whole - share * (first - CROSSTALK1);
+    return solved(light, share * share * own1 + own2 + (1 - share) * (1 - share) * shared, whole,
+                  out);
 }
 """
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class _Form:
-    """One technique: its curve, what its light is, and what error of the distance does to it."""
+    """One technique: its curve, what its light is, and what errors of the model do to it."""
 
     curve: FluxCurve
     head: str
     late: str
     crosstalk: float
     readings: tuple[float, float] = (0.0, 0.0)
+    hidden: str = "R(0.0)"
+    constants: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
 
 def _strength(asked: Asked) -> float:
@@ -157,6 +164,7 @@ def _exported(asked: Asked, form: _Form, limits: tuple[float, float], bracket: b
         "C0": curve.c0,
         "C1": curve.c1,
         "NEARNESS": curve.nearness,
+        **form.constants,
     }
     slope = curve.least_slope(low, high)
     tables: dict[str, tuple[float, ...]] = {}
@@ -185,6 +193,7 @@ def _exported(asked: Asked, form: _Form, limits: tuple[float, float], bracket: b
         body = _TABLE
     light = _LIGHT.replace("@POWER", "range" if curve.power == 2 else "R(1.0)")
     light = light.replace("@P ", f"{curve.power} ").replace("@LATE", form.late)
+    light = light.replace("@HIDDEN", form.hidden)
     head = _HEAD.replace("@NOISE", noise_lines(asked.sensor)) + form.head
     if "R0" in form.head:
         assert isinstance(asked.sensor, PulsedSensor)  # noqa: S101  # what has late light
@@ -227,6 +236,16 @@ def background_cancelling(asked: Asked) -> Exported:
     distance = asked.known.get("background.distance_m")
     curve = FluxCurve(_strength(asked), 2, c0, c1, 1 / distance)
     shares = [abs(x) / s for x, s in zip(_crosstalk(asked), asked.sensor.noise.read, strict=True)]
-    form = _Form(curve, _FREE, "bare * NEARNESS * MODEL", 2 * sum(shares), (4.0, 2.0))
+    if asked.known.has("background.shadow.c0", "background.shadow.c1"):
+        c0, c1 = asked.known.get("background.shadow.c0"), asked.known.get("background.shadow.c1")
+    form = _Form(
+        curve,
+        _FREE,
+        "bare * NEARNESS * MODEL",
+        2 * sum(shares),
+        (4.0, 2.0),
+        "(whole - bare) * SHADOW * (SHADOW0 / (range * (range + SHADOW1) + SHADOW0))",
+        {"SHADOW": asked.error.shadow, "SHADOW0": c0, "SHADOW1": c1},
+    )
     low, high = _limits(asked, cancelling_ratio.KIND)
     return _exported(asked, form, (low, high), bracket=False)

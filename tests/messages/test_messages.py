@@ -185,10 +185,12 @@ def test_a_stream_says_too_far_only_of_an_empty_scene(more: dict[str, Any], word
 
 def test_two_ranges_are_no_range_and_the_variance_is_that_of_both() -> None:
     reading, distance = messages_of(WAVE, TWO_ROOTS, {"i": [-0.003174], "q": [-0.004943]})
-    # 1.4552 and 1.9987 m, each with an sd of centimetres: half their distance is 0.27 m
+    # 1.4552 and 1.9987 m, half their distance is 0.27 m, with an sd of 0.27 and 0.33 m
     assert reading[0]["status"] == "ambiguous"
     assert math.isnan(reading[0]["range"])
-    assert math.sqrt(reading[0]["variance"]) == pytest.approx(0.272, abs=0.01)
+    assert math.sqrt(reading[0]["variance"]) == pytest.approx(
+        math.sqrt(0.272**2 + (0.265**2 + 0.325**2) / 2), rel=0.01
+    )
     assert (distance[0].signal_quality, distance[0].covariance) == (1, 255)
     assert distance[0].current_distance < distance[0].min_distance
 
