@@ -13,6 +13,7 @@ from inference.tracking.observed import Observed
 from inference.tracking.tabulate import MEAN, OBJECT, OBJECT_SLOPE, SLOPE, Knots, means_over
 from simulator.discrepancy import SLOPE_SD, discrepancy_basis
 from simulator.model_error import ModelError
+from simulator.object_arrays import shadows
 from simulator.parameters import Terms
 from simulator.sensor import PulsedSensor, Sensor, instrument
 from simulator.shadow_error import shadow_errors
@@ -88,7 +89,7 @@ def _shadow_changes(
         return []
     _, distance, c0, c1 = terms.background[0].tolist()
     r = np.exp(knots.positions)
-    by_light, by_distance = shadow_errors(r * (r + c1) / (r * (r + c1) + c0))
+    by_light, by_distance = shadow_errors(shadows(r, c0, c1))
     behind = knots.means[:, MEAN] - knots.means[:, OBJECT]
     farther = _delayed(sensor, behind, np.full(r.size, math.log(distance)), scale)
     shapes = _shapes(knots.positions, error.shadow)

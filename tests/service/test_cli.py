@@ -265,4 +265,7 @@ parts = {"numpy.ma", "numpy.random", "scipy.linalg", "scipy.special", "scipy.sta
 brought = (whole | parts) & sys.modules.keys()
 assert not brought, brought
 """
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, capture_output=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr

@@ -18,6 +18,7 @@ from inference.realtime.solving.curves.curve import Curve
 from inference.realtime.solving.exact import cycles_phase, weighted_differences
 from inference.technique import Task, Technique
 from simulator.compiled import compiled
+from simulator.object_arrays import object_fluxes, shadows
 from simulator.object_model import quadratic
 from simulator.sensor import PulsedSensor, SineWaveSensor
 from simulator.shadow_error import shadow_errors
@@ -153,8 +154,7 @@ def _by_shadow(task: Task, whole: Array, roots: Array) -> Array:
     """
     sensor, known = task.sensor, task.known
     c0, c1 = known.get("object.c0"), known.get("object.c1")
-    flux = sensor.known_gain * known.get("object.c2") * (c0 / (roots * (roots + c1) + c0))
-    flux = flux / roots / roots
+    flux = object_fluxes(roots, sensor.known_gain * known.get("object.c2") * c0, c0, c1)
     turn = 1.0
     if isinstance(sensor, SineWaveSensor):
         distance = known.get("background.distance_m")
@@ -162,8 +162,7 @@ def _by_shadow(task: Task, whole: Array, roots: Array) -> Array:
         flux = flux * np.cos(turn - sensor.wave_number * roots)
     if known.has("background.shadow.c0", "background.shadow.c1"):
         c0, c1 = known.get("background.shadow.c0"), known.get("background.shadow.c1")
-    inner = roots * (roots + c1)
-    _, by_distance = shadow_errors(inner / (inner + c0))
+    _, by_distance = shadow_errors(shadows(roots, c0, c1))
     return np.asarray(np.abs(whole[:, None] - flux) * turn * by_distance)
 
 

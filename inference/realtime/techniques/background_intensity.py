@@ -24,6 +24,7 @@ from inference.realtime.solving.exact import cycles_phase
 from inference.realtime.solving.known_background import Found, KnownBackground
 from inference.realtime.solving.pulse_ratio import CONTRADICTED
 from inference.technique import Task, Technique
+from simulator.object_arrays import quadratics, shadows
 from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor
 from simulator.shadow_error import shadow_errors
 
@@ -102,10 +103,9 @@ def _moved_by_shadow(
     Of late and whole light F = w1 - r w2 - b S (R - r), of a sine wave what points across the
     object's own direction; docs/model.md, shadow-error.
     """
-    inner = r * (r + far.c1)
-    q = inner + far.c0
-    seen, slope = far.strength * inner / q, far.strength * far.c0 * (2.0 * r + far.c1) / q / q
-    by_light, by_distance = shadow_errors(inner / q)
+    q, share = quadratics(r, far.c0, far.c1), shadows(r, far.c0, far.c1)
+    seen, slope = far.strength * share, far.strength * (far.c0 / q) * ((2.0 * r + far.c1) / q)
+    by_light, by_distance = shadow_errors(share)
     first, second = net.first[:, None], net.second[:, None]
     if isinstance(sensor, PulsedSensor):
         across, turned = far.distance - r, np.full_like(r, far.distance)
