@@ -33,11 +33,6 @@ _TIMES = (
 def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, ...]:
     """Return what answers about a scene suppose without a check.
 
-    Parameters
-    ----------
-    scene, sensor, frames : Scene, Sensor, Frames
-        The request.
-
     Returns
     -------
     tuple of str

@@ -30,8 +30,6 @@ def first_step(
 
     Parameters
     ----------
-    sensor, scene, frames : Sensor, Scene, Frames
-        The request.
     choice : Plan
         What would serve it.
     refused : LeftOut, optional
@@ -71,8 +69,6 @@ def beyond_bounds(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> st
 
     Parameters
     ----------
-    sensor, scene, frames : Sensor, Scene, Frames
-        The request.
     name : str
         The technique.
 

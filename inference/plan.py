@@ -49,10 +49,6 @@ def obstacle(
 
     Parameters
     ----------
-    technique : Technique
-        The technique.
-    sensor, scene : Sensor, Scene
-        The request.
     known : Known
         The scene's known numbers.
     frames : Frames, optional

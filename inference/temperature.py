@@ -30,8 +30,6 @@ def solved_where_told(
 
     Parameters
     ----------
-    sensor, frames : Sensor, Frames
-        The request.
     solve : callable
         What answers the others.
 

@@ -123,8 +123,6 @@ class Jobs(Generic[J, C, T, P]):
         ----------
         sensor, scene, frames
             What was asked.
-        settings : SamplerSettings
-            How to sample.
         key, digest : str
             Idempotency key and a digest of the request.
         client : str

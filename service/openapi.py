@@ -46,8 +46,6 @@ def install(app: FastAPI, routers: Sequence[APIRouter]) -> None:
 
     Parameters
     ----------
-    app : FastAPI
-        The application.
     routers : sequence of APIRouter
         Its routers.
     """

@@ -256,13 +256,7 @@ def internal(error: Exception) -> Response:
 
 
 def install(app: FastAPI) -> None:
-    """Let an application answer every refusal with problem details.
-
-    Parameters
-    ----------
-    app : FastAPI
-        The application.
-    """
+    """Let an application answer every refusal with problem details."""
     app.add_exception_handler(HybridTofError, _on_known)
     app.add_exception_handler(HTTPException, _on_http)
     app.add_exception_handler(RequestValidationError, _on_parameters)

@@ -166,8 +166,6 @@ def server_of(app: FastAPI, settings: ServiceSettings, **more: Any) -> uvicorn.S
 
     Parameters
     ----------
-    app : FastAPI
-        The application.
     settings : ServiceSettings
         With the limits.
     **more

@@ -12,8 +12,6 @@ def write_whole(path: Path, data: bytes, *, private: bool) -> None:
 
     Parameters
     ----------
-    path : Path
-        The file.
     data : bytes
         What it is to hold.
     private : bool

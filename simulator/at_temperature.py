@@ -44,8 +44,6 @@ def delayed_light(sensor: Sensor, light: Array, delay_s: Array) -> Array:
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
     light : ndarray, shape (n, 2, ...)
         Readings of light alone, without crosstalk.
     delay_s : ndarray, shape (n,)
@@ -70,8 +68,6 @@ def readings_at_reference(
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
     readings : ndarray, shape (n, 2)
         As read [reading units].
     warm : ndarray, shape (n,)

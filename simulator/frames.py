@@ -241,8 +241,6 @@ def check_frames(sensor: Sensor, frames: Frames) -> None:
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
     frames : Frames
         As a caller made them.
 

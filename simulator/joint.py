@@ -187,8 +187,6 @@ class Calibration(Validated):
         Of writing, ISO 8601.
     seed : int, optional
         Of the posterior.
-    frames : CalibrationFrames
-        The frames.
     left_out : tuple of Omitted
         Terms that the scene does not have, or that the data did not demand.
     model_error : (float, float)

@@ -19,11 +19,6 @@ _WORDS = {
 def priors_of(sensor: Sensor, scene: Scene) -> dict[str, Prior | None]:
     """Return the prior of all that is unknown by its scene path, the law of the ranges apart.
 
-    Parameters
-    ----------
-    sensor, scene : Sensor, Scene
-        The scene.
-
     Returns
     -------
     dict

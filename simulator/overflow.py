@@ -23,8 +23,6 @@ def check_drawn(scene: Scene, drawn: Mapping[str, float]) -> None:
 
     Parameters
     ----------
-    scene : Scene
-        The scene.
     drawn : mapping of str to float
         Values of its unknowns by their names.
 
@@ -62,8 +60,6 @@ def check_readings(
     ----------
     sensor : Sensor
         The sensor, nothing of it unknown.
-    trajectory : RadialTrajectory or SampledTrajectory
-        The trajectory.
     factor : ndarray, shape (n,)
         Factor on the object's signal in every frame.
     moments : ndarray, shape (n, 7)

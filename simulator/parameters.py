@@ -160,8 +160,6 @@ class Parameters:
 
         Parameters
         ----------
-        rng : numpy.random.Generator
-            Source of randomness.
         n : int
             Number of vectors.
 
@@ -204,8 +202,6 @@ def parameters_of(sensor: Sensor, scene: Scene) -> Parameters:
     ----------
     sensor : Sensor
         Bounds ranges and background distance (r0 of a pulse).
-    scene : Scene
-        The scene.
 
     Returns
     -------

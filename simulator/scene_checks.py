@@ -84,8 +84,6 @@ def check_scene(sensor: Sensor, scene: Scene) -> None:
     ----------
     sensor : Sensor
         A pulsed sensor cannot tell ranges or backgrounds beyond r0.
-    scene : Scene
-        The scene.
 
     Raises
     ------

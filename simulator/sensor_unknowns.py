@@ -44,8 +44,6 @@ def add_sensor(sensor: Sensor, known: dict[str, float], unknowns: list[Unknown])
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
     known, unknowns : dict, list
         As of `simulator.unknowns.add_quantity`. What is known stays with the sensor.
     """
@@ -76,8 +74,6 @@ def with_numbers(sensor: Sensor, numbers: Mapping[str, float]) -> Sensor:
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
     numbers : mapping of str to float
         Such as ``sensor.gain``; paths that are not the sensor's play no part.
     """

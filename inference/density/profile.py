@@ -37,8 +37,6 @@ def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearis
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The density.
     z : ndarray, shape (d,)
         Where.
     positions : ndarray, shape (frames,)
@@ -93,8 +91,6 @@ def _eliminate(residual: Array, jacobian: Array, other: Array, basis: FluxBasis)
         Of what stays.
     other : ndarray, shape (frames, m, k)
         Derivative of the residual along the coefficients.
-    basis : FluxBasis
-        Where.
 
     Returns
     -------

@@ -63,8 +63,6 @@ def drawn_by_information(
         A point near the posterior.
     count : int
         How many are drawn; some may be the same.
-    rng : numpy.random.Generator
-        Source of randomness.
 
     Returns
     -------

@@ -88,10 +88,6 @@ def whitened(
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
-    parameters : Parameters
-        The unknowns.
     frames : ndarray, shape (n, 3, 7 or 8)
         As `inference.density.collapsed.CollapsedDensity.frames`.
     z : ndarray, shape (d,)

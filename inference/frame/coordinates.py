@@ -115,8 +115,6 @@ def coordinate_slopes(parameters: Parameters, z: Array) -> tuple[Terms, Array]:
 
     Parameters
     ----------
-    parameters : Parameters
-        The unknowns.
     z : ndarray, shape (d,)
         Where.
 

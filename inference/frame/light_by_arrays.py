@@ -99,8 +99,6 @@ def light(r: Array, scene: FrameScene) -> tuple[Pairs, Pairs]:
     ----------
     r : ndarray, shape (n,)
         [m].
-    scene : FrameScene
-        The parameters.
 
     Returns
     -------
@@ -134,8 +132,6 @@ def information(r: Array, gain: float, scene: FrameScene) -> Array:
         [m].
     gain : float
         The frame's factor.
-    scene : FrameScene
-        The parameters.
 
     Raises
     ------

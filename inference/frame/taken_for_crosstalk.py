@@ -12,13 +12,7 @@ TAKEN_FOR_CROSSTALK = (
 
 
 def taken_for_crosstalk(scene: Scene, frames: Frames) -> bool:
-    """Return whether crosstalk is learnt of empty frames that could show a wall as well.
-
-    Parameters
-    ----------
-    scene, frames : Scene, Frames
-        The request.
-    """
+    """Return whether crosstalk is learnt of empty frames that could show a wall as well."""
     if frames.object_present is None or scene.background is not None:
         return False
     values = scene.crosstalk_values

@@ -54,8 +54,6 @@ def slopes_of_drift(sensor: Sensor, drift: Array, warm: Array, light: Array) -> 
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
     drift : ndarray, shape (2,)
         Of gain [1/K] and delay [s/K].
     warm : ndarray, shape (n,)

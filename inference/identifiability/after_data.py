@@ -35,10 +35,6 @@ def statuses_of_draws(
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
-    parameters : Parameters
-        The unknowns.
     spread : Spread
         Of all draws, the errors of the model included.
     chosen : ndarray, shape (m, d)

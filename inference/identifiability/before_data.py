@@ -142,11 +142,6 @@ def _reference(parameters: Parameters, at: Mapping[str, float] | None) -> Array:
 def check_discrepancy(scene: Scene) -> None:
     """Refuse a discrepancy that nothing can tell.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-
     Raises
     ------
     RefusedError

@@ -27,8 +27,6 @@ class Experiment:
 
     Attributes
     ----------
-    sensor : Sensor
-        The sensor.
     parameters : Parameters
         The unknowns of the scene.
     z : ndarray, shape (d,)

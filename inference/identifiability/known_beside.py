@@ -99,8 +99,6 @@ def with_rates(experiment: Experiment, rates: Array) -> Experiment:
 
     Parameters
     ----------
-    experiment : Experiment
-        As it is.
     rates : ndarray, shape (n, 2)
         As of `Experiment`.
 

@@ -186,11 +186,6 @@ def _at_the_bend(experiment: Experiment) -> tuple[str, Experiment] | None:
 def remedies(experiment: Experiment) -> list[Remedy]:
     """Compute what changes of the experiment would tell.
 
-    Parameters
-    ----------
-    experiment : Experiment
-        As it is.
-
     Returns
     -------
     list of Remedy
@@ -222,11 +217,6 @@ def _emptied(experiment: Experiment, *counts: int) -> list[Remedy]:
 
 def cheap_remedies(experiment: Experiment) -> list[Remedy]:
     """Compute what little more than the frames that there are would tell.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        As it is.
 
     Returns
     -------

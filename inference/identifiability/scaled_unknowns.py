@@ -28,8 +28,6 @@ class ScaledUnknowns:
 
     Attributes
     ----------
-    sensor : Sensor
-        The sensor.
     parameters : Parameters
         The unknowns of the scene.
     z : ndarray, shape (d,)

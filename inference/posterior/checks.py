@@ -84,8 +84,6 @@ def check_best_fit(density: CollapsedDensity, z: Array) -> None:
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The density.
     z : ndarray, shape (d,)
         The best parameters that were found.
 
@@ -111,8 +109,6 @@ def check_ranges(density: CollapsedDensity, scene: Scene, z: Array) -> None:
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The density.
     scene : Scene
         As stated.
     z : ndarray, shape (d,)

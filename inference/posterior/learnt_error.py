@@ -34,8 +34,6 @@ def learnt_error(sensor: Sensor, terms: Terms, frames: Frames, unknowns: int) ->
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
     terms : Terms
         The scene as it was learnt; the first parameter vector is used.
     frames : Frames

@@ -66,10 +66,6 @@ def sample_of(density: CollapsedDensity, stage: Drawing, rng: np.random.Generato
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The density of the job.
-    stage : Drawing
-        Where the job stands.
     rng : numpy.random.Generator
         For resampling by weight.
     """

@@ -39,8 +39,6 @@ def without_draws(job: Job, density: CollapsedDensity, stage: Tempering | Walkin
     ----------
     job : Job
         In the scene that is sampled.
-    density : CollapsedDensity
-        Its density.
     stage : Tempering or Walking
         Where it stands, with the optima that were found.
 

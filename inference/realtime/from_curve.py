@@ -60,8 +60,6 @@ def candidates_of(
     ----------
     task : Task
         Gives the curve's parameters.
-    curve : Curve
-        The curve.
     high_m : float
         Upper end of the technique's interval [m]; the task may set another.
     top, bottom : ndarray, shape (n,)

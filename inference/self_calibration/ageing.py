@@ -65,8 +65,6 @@ def wide_enough(
 
     Parameters
     ----------
-    plan : Plan
-        The stream.
     drift : Drift or None
         The law.
     frames : Frames or None

@@ -113,11 +113,6 @@ def answer(sensor: Sensor, asked: Asked) -> Outcome:
 
     That holds for as long as the processor time of a posterior does not run out, after which it
     has not converged.
-
-    Parameters
-    ----------
-    sensor, asked : Sensor, Asked
-        What is asked.
     """
     try:
         found = infer(sensor, asked.scene, asked.frames, sampler_of(asked))

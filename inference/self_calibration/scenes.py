@@ -114,11 +114,6 @@ def _with_law(scene: Scene, names: list[str], modes: list[dict[str, Any]]) -> Sc
 def knowledge(sensor: Sensor, scene: Scene) -> dict[str, dict[str, float]]:
     """Describe what is known of each unknown, for a reader.
 
-    Parameters
-    ----------
-    sensor, scene : Sensor, Scene
-        The scene.
-
     Returns
     -------
     dict

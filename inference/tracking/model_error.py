@@ -41,8 +41,6 @@ def model_changes(
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
     error : ModelError
         Sizes of the errors.
     terms : Terms
@@ -109,10 +107,6 @@ def sd_by_derivatives(
     ----------
     sensor, error, knots
         As for `model_changes`.
-    terms : Terms
-        The scene.
-    observed : Observed
-        What is read.
 
     Returns
     -------

@@ -42,8 +42,6 @@ def nuisance_jacobian(
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
     error : ModelError
         Errors of the model, which add their shapes.
     known : Nuisance

@@ -94,8 +94,6 @@ def pulsed(
 
     Parameters
     ----------
-    recording : Recording
-        The histograms.
     calibration : Calibration, optional
         Of the time axis; left out, ranges start with the histogram.
     gain : float

@@ -164,8 +164,6 @@ def install(
 
     Parameters
     ----------
-    app : FastAPI
-        The application.
     routers : sequence of APIRouter
         Its routers.
     authorities, keys, traces, room

@@ -138,11 +138,6 @@ def _secret(authorization: str) -> str | None:
 class KeyRing:
     """The keys of a file, read again when it has changed: who is revoked is out at once.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
     Raises
     ------
     InvalidInputError

@@ -71,8 +71,6 @@ class Asked:
     ----------
     technique : str
         Its name.
-    sensor, scene : Sensor, Scene
-        For which.
     known : Known
         The scene's numbers.
     error : ModelError

@@ -75,8 +75,6 @@ def read_document(model: type[T], path: Path) -> T:
     ----------
     model : type
         A subclass of `Validated`.
-    path : Path
-        The file.
 
     Returns
     -------

@@ -32,8 +32,6 @@ class DescribedDraws:
 
     Attributes
     ----------
-    draws : Draws
-        The draws.
     columns : (str, str)
         Names of the two readings.
     frames : ndarray of int, shape (n,)
@@ -65,12 +63,8 @@ def describe_draws(job: Job, method: str, draws: Draws) -> DescribedDraws:
 
     Parameters
     ----------
-    job : Job
-        The job.
     method : str
         How it was sampled.
-    draws : Draws
-        Its draws.
     """
     frames = np.flatnonzero(job.usable)
     also = {

@@ -46,11 +46,6 @@ def _lines(described: DescribedDraws) -> Iterator[bytes]:
 def to_ndjson(described: DescribedDraws) -> bytes:
     """Write draws as NDJSON.
 
-    Parameters
-    ----------
-    described : DescribedDraws
-        The draws.
-
     Returns
     -------
     bytes

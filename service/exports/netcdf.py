@@ -21,11 +21,6 @@ __all__ = ["EXPORT", "to_netcdf"]
 def to_netcdf(described: DescribedDraws) -> bytes:
     """Write draws as NetCDF.
 
-    Parameters
-    ----------
-    described : DescribedDraws
-        The draws.
-
     Returns
     -------
     bytes

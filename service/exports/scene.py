@@ -44,8 +44,6 @@ def write_scene(findings: Mapping[str, Any], job: Job, _: str, draws: Draws) -> 
         With the terms that were kept.
     _ : str
         How it was sampled, which is all the same to a scene.
-    draws : Draws
-        Its draws.
 
     Returns
     -------

@@ -32,8 +32,6 @@ def encode_messages(
 
     Parameters
     ----------
-    message : Message
-        The form.
     sensor, scene, frames
         As they were asked of.
     estimates : Estimates

@@ -74,8 +74,6 @@ def line_as_message(message: Message, limits_m: Limits, line: bytes) -> bytes:
 
     Parameters
     ----------
-    message : Message
-        The form.
     limits_m : (float, float)
         As of `limits_of_tracker`.
     line : bytes

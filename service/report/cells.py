@@ -110,13 +110,6 @@ class Cell:
 def cells_of(scene: ReportScene, effort: Effort) -> Iterator[Cell]:
     """Return what there is to measure of a scene, what takes least first.
 
-    Parameters
-    ----------
-    scene : ReportScene
-        The scene.
-    effort : Effort
-        How much to measure.
-
     Yields
     ------
     Cell

@@ -39,11 +39,6 @@ def _all_known(scene: ReportScene) -> Scene:
 def least_error(scene: ReportScene) -> float | None:
     """Return the median relative error that noise alone leaves where all but the range is known.
 
-    Parameters
-    ----------
-    scene : ReportScene
-        The scene.
-
     Returns
     -------
     float or None

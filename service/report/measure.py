@@ -27,8 +27,6 @@ def measure(cell: Cell, seed: int) -> Row:
 
     Parameters
     ----------
-    cell : Cell
-        What to measure.
     seed : int
         Of everything random: figures of error depend on it alone.
 

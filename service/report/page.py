@@ -222,8 +222,6 @@ def page(report: Report, pictures: Mapping[str, str], terms: str, snr: str | Non
 
     Parameters
     ----------
-    report : Report
-        What was measured.
     pictures : mapping of str to str
         SVG by scene; empty where nothing can be drawn.
     terms, snr : str or None

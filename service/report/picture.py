@@ -151,8 +151,6 @@ def draw_snr(report: Report, ratios: Mapping[str, Mapping[str, float]]) -> Figur
 
     Parameters
     ----------
-    report : Report
-        What was measured.
     ratios : mapping of str to mapping of str to float
         By title, the ratios of scenes that differ in nothing else.
 

@@ -67,8 +67,6 @@ def sets_of(
 
     Parameters
     ----------
-    scene : ReportScene
-        The scene.
     frames : int
         Of each set, with the object.
     seed : int
@@ -103,8 +101,6 @@ def readings_of(scene: ReportScene, frames: int, seed: int, empty: int = 0) -> R
 
     Parameters
     ----------
-    scene : ReportScene
-        The scene.
     frames, empty : int
         Number of frames with and without the object.
     seed : int
@@ -181,8 +177,6 @@ def err_together(sensor: Sensor, told: Scene) -> bool:
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
     told : Scene
         What a method that learns nothing from other frames is told: unknowns of their priors, or a
         model that may be wrong, are the same in all frames of all sets.

@@ -51,8 +51,6 @@ class ReportScene:
     ----------
     name : str
         What is there, in plain words.
-    sensor : Sensor
-        The sensor.
     truth : Scene
         From which frames are simulated: all numbers.
     known : Scene

@@ -20,8 +20,6 @@ def concluding_at_once(plan: Plan, lag: int) -> Conclude:
 
     Parameters
     ----------
-    plan : Plan
-        The stream.
     lag : int
         How many numbers after the frame that it was asked at it applies, 1 or more.
     """
@@ -39,8 +37,6 @@ def concluding_as_before(plan: Plan, events: Mapping[int, Mapping[str, Any]]) ->
 
     Parameters
     ----------
-    plan : Plan
-        The stream.
     events : mapping
         By the number of the calibration, as answers told them. One that is not among them was not
         concluded; one that was not taken is not computed again.

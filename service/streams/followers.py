@@ -65,13 +65,7 @@ class Follower(Protocol):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Plain:
-    """A tracker of one scene.
-
-    Attributes
-    ----------
-    base : Tracker
-        The tracker.
-    """
+    """A tracker of one scene."""
 
     base: Tracker
 
@@ -112,8 +106,6 @@ class Calibrating:
 
     Attributes
     ----------
-    plan : Plan
-        The stream.
     base : Tracker
         Of the scene as it was stated.
     concluding : callable, optional

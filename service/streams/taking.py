@@ -53,8 +53,6 @@ def take(
     ----------
     follower : Follower
         Which answers frames.
-    place : Place
-        Where the stream stands.
     lines : sequence of Line
         What came.
     form : Form

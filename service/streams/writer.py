@@ -11,13 +11,7 @@ _TOGETHER = 32
 
 
 class Writer:
-    """Writes what came while it wrote.
-
-    Parameters
-    ----------
-    store : StreamStore
-        Where to.
-    """
+    """Writes what came while it wrote."""
 
     def __init__(self, store: StreamStore) -> None:
         self._store = store

@@ -70,8 +70,6 @@ def sweep(
 
     Parameters
     ----------
-    scene : PlateScene
-        The plate.
     system : "pulsed" or "sine_wave"
         Pulsed: r_e is the mean of r. Sine wave: r_e = arg(sum dPhi exp(j k r))/k at 5 MHz, while
         Phi stays the plain sum (docs/model.md, appendix-b).

@@ -125,8 +125,6 @@ def illuminate(
 
     Parameters
     ----------
-    scene : OpticalScene
-        The scene.
     modulation : Modulation, optional
         Of the sensor; without it late windows and phasors are nan.
     tolerance : float
@@ -192,10 +190,6 @@ def read(
 
     Parameters
     ----------
-    scene : OpticalScene
-        The scene.
-    sensor : PulsedSensor or SineWaveSensor
-        The sensor.
     rng : numpy.random.Generator, optional
         Source of noise; without it the readings are free of noise (but clipped and rounded).
     temperature_k : float, optional

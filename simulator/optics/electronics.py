@@ -115,8 +115,6 @@ def draw_noise(sensor: Sensor, mean: Pair, signal: Pair, rng: np.random.Generato
         Noise model.
     mean, signal : (float, float)
         Mean readings, and the objects' part of them.
-    rng : numpy.random.Generator
-        Source of randomness.
     """
     noise = sensor.noise
     normal = rng.standard_normal(5)

@@ -92,8 +92,6 @@ def series(
         Pose at a time [s]; of a sphere only the position counts.
     time_s : ndarray, shape (n,)
         Times of the frames [s].
-    sensor : PulsedSensor or SineWaveSensor
-        The sensor.
     rng : numpy.random.Generator, optional
         Source of noise.
     moving : int

@@ -107,8 +107,6 @@ def linear_obstacle(scene: Scene, unknowns: tuple[str, ...]) -> str | None:
 
     Parameters
     ----------
-    scene : Scene
-        The scene.
     unknowns : tuple of str
         Scene paths of what is fitted.
     """
@@ -139,8 +137,6 @@ def joint_obstacle(
 
     Parameters
     ----------
-    sensor, scene : Sensor, Scene
-        The request.
     _known : Known
         The scene's known numbers, not used.
     frames : Frames, optional

@@ -85,15 +85,6 @@ def off_the_top(top: Maximum) -> float:
 def refuse_if_undetermined(problem: FitProblem, top: Maximum, facts: Information) -> None:
     """Refuse where frames tell fewer numbers than are unknown.
 
-    Parameters
-    ----------
-    problem : FitProblem
-        The problem.
-    top : Maximum
-        Its best optimum.
-    facts : Information
-        There.
-
     Raises
     ------
     RefusedError
@@ -145,10 +136,6 @@ def refuse_if_noise_was_followed(
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
-    top : Maximum
-        Its best optimum.
     points : sequence of Maximum
         Other values (`profile_scan`).
 
@@ -177,12 +164,6 @@ def refuse_if_open(
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
-    top : Maximum
-        Its best optimum.
-    facts : Information
-        There.
     wider : float
         Factor on all standard deviations (`inflation`).
     others : sequence of (float, Maximum)

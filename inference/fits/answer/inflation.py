@@ -35,8 +35,6 @@ def loosely_told(problem: FitProblem, facts: Information) -> bool:
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
     facts : Information
         At its best optimum.
     """
@@ -48,10 +46,6 @@ def shift_of(problem: FitProblem, top: Maximum, facts: Information, other: Maxim
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
-    top : Maximum
-        Its best optimum.
     facts : Information
         There, of full rank.
     other : Maximum
@@ -70,10 +64,6 @@ def inflation(
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
-    top : Maximum
-        Its best optimum.
     facts : Information
         There, of full rank.
 

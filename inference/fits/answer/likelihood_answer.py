@@ -51,8 +51,6 @@ def likelihood_answer(
     ----------
     name : str
         The technique.
-    task : Task
-        The request.
     values : dict, optional
         By scene path, all that is unknown besides the ranges, as another fit has found it: where
         the climb begins. Left out: optima are looked for everywhere.

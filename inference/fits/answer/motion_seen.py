@@ -32,8 +32,6 @@ def numbers_shown(problem: FitProblem, top: Maximum) -> float:
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
     top : Maximum
         Its best optimum, which gives the object's part of the readings: to it the relative error
         belongs.

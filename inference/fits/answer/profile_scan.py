@@ -32,10 +32,6 @@ def profile_scan(
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
-    top : Maximum
-        Its best optimum.
     facts : Information
         There, of full rank.
     always : bool

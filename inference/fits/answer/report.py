@@ -43,12 +43,6 @@ def describe(
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
-    top : Maximum
-        Its best optimum.
-    facts : Information
-        There.
     wider : float
         Factor on all standard deviations (`inflation`).
     undecided : sequence of Maximum
@@ -203,8 +197,6 @@ def fit_report(
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
     optima : sequence of Maximum
         Distinct ones, the best first.
     chi_square : float

@@ -149,13 +149,7 @@ class Erring(Maximum):
 
 
 def softened(problem: FitProblem) -> tuple[FitProblem, ...]:
-    """Return problems of more noise, whose optima too are where to look for those of a problem.
-
-    Parameters
-    ----------
-    problem : FitProblem
-        The problem.
-    """
+    """Return problems of more noise, whose optima too are where to look for those of a problem."""
     return tuple(_softened(problem, share) for share in _OF_LIGHT)
 
 
@@ -222,8 +216,6 @@ def contradicting(top: Erring, problem: FitProblem) -> list[int]:
     ----------
     top : Erring
         The best maximum.
-    problem : FitProblem
-        Of which it is.
     """
     named: list[int] = []
     known = problem.known

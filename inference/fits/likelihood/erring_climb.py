@@ -155,8 +155,6 @@ def with_other_ranges(problem: FitProblem, at: Point, x: Array, positions: Array
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
     at : Point
         The end of a climb.
     x, positions : ndarray, shape (d,), (n,)

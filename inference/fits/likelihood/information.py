@@ -20,8 +20,6 @@ def residuals_and_information(
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
     x : ndarray, shape (d,)
         Coordinates.
     positions : ndarray, shape (n,)

@@ -46,8 +46,6 @@ def approach(problem: FitProblem, x: Array, steps: int) -> Maximum:
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
     x : ndarray, shape (d,)
         Start.
     steps : int
@@ -83,8 +81,6 @@ def maximum_from(problem: FitProblem, x: Array) -> Maximum:
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
     x : ndarray, shape (d,)
         Start.
 

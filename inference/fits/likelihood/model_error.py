@@ -45,8 +45,6 @@ def errors_of_readings(
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
     light : ndarray, shape (n, 2)
         The object's part of the readings.
     positions : ndarray, shape (n,)

@@ -87,8 +87,6 @@ def polish(problem: FitProblem, x: Array) -> tuple[Array, float, float, Array]:
 
     Parameters
     ----------
-    problem : FitProblem
-        The problem.
     x : ndarray, shape (d,)
         A point on the way to an optimum.
 

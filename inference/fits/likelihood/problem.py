@@ -215,8 +215,6 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames, *, exact: bool = F
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
     scene : Scene
         The scene; of its priors only the supports bound the fit.
     frames : Frames

@@ -38,8 +38,6 @@ def supports_of(
 
     Parameters
     ----------
-    sensor, scene : Sensor, Scene
-        The request.
     support : (float, float)
         Ranges that the scene allows [m].
     light : (float, float)

@@ -22,8 +22,6 @@ def refuse_at_rest(fit: LinearFit, single: TechniqueResult, unknowns: tuple[str,
 
     Parameters
     ----------
-    fit : LinearFit
-        The fit.
     single : TechniqueResult
         Ranges of single frames, of which the fit has chosen.
     unknowns : tuple of str

@@ -76,8 +76,6 @@ class Equations:
     ----------
     technique : Technique
         Gives the ranges; where it has several roots, the fit over all frames chooses.
-    task : Task
-        The request.
     equation : callable
         (ranges, frames) -> Observed.
     signal : callable
@@ -126,11 +124,6 @@ def _nearest(roots: Array, to: Array) -> Array:
 
 def fit_equations(equations: Equations) -> tuple[LinearFit, TechniqueResult]:
     """Fit one equation a frame.
-
-    Parameters
-    ----------
-    equations : Equations
-        The equations.
 
     Returns
     -------

@@ -43,11 +43,6 @@ class Follow:
     def changes(self, task: Task) -> tuple[Array, Array, float]:
         """Return changes along independent standard normal errors.
 
-        Parameters
-        ----------
-        task : Task
-            The request.
-
         Returns
         -------
         (ndarray, ndarray, float)

@@ -49,8 +49,6 @@ def object_light(sensor: Sensor, shape: Triple, r: Array, frames: Frames) -> tup
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
     shape : (float, float, float)
         c0 [m^2], c1 [m], c2.
     r : ndarray, shape (n,)
@@ -73,8 +71,6 @@ def background_light(sensor: Sensor, background: Quad, r: Array, frames: Frames)
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
     background : (float, float, float, float)
         Strength [reading units], distance [m], c0' [m^2], c1' [m].
     r : ndarray, shape (n,)

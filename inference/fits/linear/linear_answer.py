@@ -46,10 +46,6 @@ def linear_answer(
     ----------
     name : str
         The technique.
-    task : Task
-        The request.
-    fit : LinearFit
-        The fit.
     natural : dict
         By scene path: value, and gradient along the fit's coordinates.
     single : TechniqueResult

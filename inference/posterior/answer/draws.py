@@ -96,14 +96,6 @@ def draws_of(
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The density of the job.
-    job : Job
-        The job.
-    sample : Sample
-        What it has drawn.
-    rng : numpy.random.Generator
-        Source of randomness.
     parts : int
         How many jobs the frames were dealt out to, of which this is one: what all cost counts.
     """

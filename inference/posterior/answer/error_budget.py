@@ -153,8 +153,6 @@ def error_budget(
 
     Parameters
     ----------
-    job, density : Job, CollapsedDensity
-        The job, and its density.
     z : ndarray, shape (n, d)
         Draws of equal weight.
     log_r : ndarray, shape (n, frames)
@@ -164,8 +162,6 @@ def error_budget(
     sensitivity : PriorSensitivity or None
         Where the answer rests on the law of the ranges: what the reference prior would change, as
         the last of the errors.
-    rng : numpy.random.Generator
-        Source of randomness.
     """
     error = job.scene.model_error
     count = int(np.clip(_FRAMES // max(log_r.shape[1], 1), _FEWEST, _REFERENCES))

@@ -37,8 +37,6 @@ def near_fold(job: Job, density: CollapsedDensity, z: Array, log_r: Array) -> ND
 
     Parameters
     ----------
-    job, density : Job, CollapsedDensity
-        The job, and its density.
     z : ndarray, shape (m, d)
         Draws of the parameters.
     log_r : ndarray, shape (m, usable frames)

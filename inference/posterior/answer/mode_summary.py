@@ -16,8 +16,6 @@ def mode_summary(
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The density.
     stage : Drawing
         Where the job stands, with the optima that were found.
     sample : Sample

@@ -86,10 +86,6 @@ def with_model_error(
 
     Parameters
     ----------
-    job, density : Job, CollapsedDensity
-        The job, and its density.
-    sample : Sample
-        What it has drawn.
     draws : Draws
         The same, with ranges.
     sampled : CollapsedDensity

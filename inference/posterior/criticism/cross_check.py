@@ -46,10 +46,6 @@ def cross_check(
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The density.
-    chains : Chains
-        Kept draws.
     proposal : Proposal
         What they were proposed from.
     weighted : WeightedDraws or None
@@ -81,8 +77,6 @@ def false_branch(density: LogDensity, chains: Chains, optima: Mixture) -> str | 
     ----------
     density : callable
         Log density of points (n, d).
-    chains : Chains
-        Kept draws.
     optima : Mixture
         Laplace approximations of all optima that are known.
 
@@ -120,8 +114,6 @@ def moments_disagree(
     ----------
     density : callable
         Log density of points (n, d).
-    chains : Chains
-        Kept draws.
     optima : Mixture
         What tells the modes apart.
     weighted : WeightedDraws

@@ -105,14 +105,10 @@ def fit_residuals(
 
     Parameters
     ----------
-    job, density : Job, CollapsedDensity
-        The job, and its density.
     z : ndarray, shape (d,)
         A draw of the parameters.
     replicates : int
         How many.
-    rng : numpy.random.Generator
-        Source of randomness.
     """
     n, d = len(density.frames), z.size
     density = _with_flux_error(job, density)

@@ -34,8 +34,6 @@ def bias_of_many_frames(density: CollapsedDensity, z: Array, rng: np.random.Gene
         Of all frames.
     z : ndarray, shape (n, d)
         Draws of its posterior.
-    rng : numpy.random.Generator
-        Source of randomness.
 
     Returns
     -------

@@ -103,12 +103,8 @@ def predictive_check(
 
     Parameters
     ----------
-    job, density : Job, CollapsedDensity
-        The job, and its density.
     z : ndarray, shape (m, d)
         Draws of the parameters.
-    rng : numpy.random.Generator
-        Source of randomness.
     others : sequence of Job
         The other parts of a job whose frames were dealt out. Each is fitted on its own, and what
         is looked at is that of all together.

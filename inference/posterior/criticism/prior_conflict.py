@@ -46,8 +46,6 @@ def prior_conflicts(
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The density.
     z : ndarray, shape (n, d)
         Draws of equal weight.
     log_r : ndarray, shape (m, frames)
@@ -161,8 +159,6 @@ def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The density.
     z : ndarray, shape (n, d)
         Draws of equal weight.
     log_r : ndarray, shape (m, frames)
@@ -210,8 +206,6 @@ def ranges_beyond(density: CollapsedDensity, z: Array) -> tuple[NDArray[np.bool_
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The density.
     z : ndarray, shape (d,)
         Parameters, which stay as they are.
 

@@ -67,8 +67,6 @@ def prior_sensitivity(density: CollapsedDensity, z: Array, log_r: Array) -> Prio
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The density.
     z : ndarray, shape (n, d)
         Draws of equal weight.
     log_r : ndarray, shape (n, frames)

@@ -34,8 +34,6 @@ class Aliases:
 
     Attributes
     ----------
-    parameters : Parameters
-        The unknowns.
     column : int
         Of the wall's distance.
     law : Distribution
@@ -128,8 +126,6 @@ class Aliases:
 
         Parameters
         ----------
-        density : CollapsedDensity
-            The density.
         optimum : Optimum
             One of its maxima.
 
@@ -224,8 +220,6 @@ def with_aliases(
     ----------
     aliases : Aliases
         Of the density.
-    density : CollapsedDensity
-        The density.
     optima : list of Optimum
         Maxima of it.
 

@@ -166,12 +166,8 @@ def advance(
 
     Parameters
     ----------
-    density : CollapsedDensity
-        Target.
     proposal : Proposal
         Of the independent move, and the coordinates of all moves; must not change during a run.
-    ensemble : Ensemble
-        Where it stands.
     steps : int
         Number of steps.
     aliases : Aliases, optional

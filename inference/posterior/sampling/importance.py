@@ -186,12 +186,6 @@ def draw_weighted(
 
     Parameters
     ----------
-    density : CollapsedDensity
-        Target.
-    proposal : Law
-        Proposal.
-    rng : numpy.random.Generator
-        Source of randomness.
     n : int
         Number of draws.
 

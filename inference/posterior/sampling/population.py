@@ -70,15 +70,6 @@ def first_population(
 ) -> Population:
     """Draw a population from the prior.
 
-    Parameters
-    ----------
-    density : CollapsedDensity
-        Target.
-    rng : numpy.random.Generator
-        Source of randomness.
-    effort : Effort
-        What it may take.
-
     Returns
     -------
     Population
@@ -196,14 +187,10 @@ def temper(
 
     Parameters
     ----------
-    density : CollapsedDensity
-        Target.
     population : Population
         From `first_population` or this function; not empty, power below 1.
     rng : numpy.random.Generator
         Source of randomness; one of its own for every temperature makes the steps a fold.
-    effort : Effort
-        What it may take.
 
     Returns
     -------
@@ -251,15 +238,6 @@ def _turned(
 
 def carried(density: CollapsedDensity, rng: np.random.Generator, effort: Effort) -> Population:
     """Carry a population all the way from the prior to the posterior.
-
-    Parameters
-    ----------
-    density : CollapsedDensity
-        Target.
-    rng : numpy.random.Generator
-        Source of randomness.
-    effort : Effort
-        What it may take.
 
     Returns
     -------

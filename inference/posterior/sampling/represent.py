@@ -44,8 +44,6 @@ def represent(
         Of all frames.
     optima : sequence of Optimum
         Of the density of some of them, the best first: wider than that of all.
-    rng : numpy.random.Generator
-        Source of randomness.
 
     Returns
     -------

@@ -87,8 +87,6 @@ def climb(
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The density.
     z : ndarray, shape (d,)
         Start.
     iterations : int
@@ -173,8 +171,6 @@ def refine(density: CollapsedDensity, z: Array) -> Optimum | None:
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The density.
     z : ndarray, shape (d,)
         A point near a maximum.
 
@@ -269,8 +265,6 @@ def optima_of(density: CollapsedDensity, ends: Ends) -> list[Optimum]:
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The density.
     ends : Ends
         From `climbed`.
 

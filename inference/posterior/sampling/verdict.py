@@ -269,8 +269,6 @@ def judge(chains: Chains, target_ess: int) -> Verdict:
 
     Parameters
     ----------
-    chains : Chains
-        Kept draws.
     target_ess : int
         Effective sample size wanted for every parameter.
 

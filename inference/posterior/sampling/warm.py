@@ -38,8 +38,6 @@ class Warm:
     ----------
     proposal : Proposal
         The last one.
-    draws : WeightedDraws
-        From it.
     dissent : float
         Share of the points from the prior at which the target exceeds the proposal by more than at
         any draw.
@@ -75,14 +73,10 @@ def warm_start(
 
     Parameters
     ----------
-    density : CollapsedDensity
-        Target.
     proposal : Proposal
         Of the first draws.
     others : ndarray, shape (m, d)
         Points that came from the prior and know nothing of the proposal.
-    rng : numpy.random.Generator
-        Source of randomness.
     n : int
         Draws of each round.
     """

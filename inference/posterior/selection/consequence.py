@@ -62,12 +62,8 @@ def reported(
 
     Parameters
     ----------
-    density : CollapsedDensity
-        The model's.
     weighed : Weighed
         Its evidence and draws.
-    rng : numpy.random.Generator
-        Source of randomness.
 
     Returns
     -------

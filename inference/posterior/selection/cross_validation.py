@@ -90,12 +90,8 @@ def cross_validate(
 
     Parameters
     ----------
-    density : CollapsedDensity
-        A model.
     weighed : Weighed
         Its posterior.
-    rng : numpy.random.Generator
-        Source of randomness.
 
     Returns
     -------

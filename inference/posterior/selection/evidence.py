@@ -66,8 +66,6 @@ class Weighed:
 
     Attributes
     ----------
-    evidence : Evidence
-        Its evidence.
     z : ndarray, shape (n, d)
         Draws.
     log_weights : ndarray, shape (n,)
@@ -90,8 +88,6 @@ def log_prior_mass(parameters: Parameters, rng: np.random.Generator) -> tuple[fl
 
     Parameters
     ----------
-    parameters : Parameters
-        The unknowns.
     rng : numpy.random.Generator
         Scrambles the points of the integral.
 
@@ -174,8 +170,6 @@ def resample(weighted: WeightedDraws, rng: np.random.Generator, n: int) -> NDArr
     ----------
     weighted : WeightedDraws
         Draws, at least one of positive density.
-    rng : numpy.random.Generator
-        Source of randomness.
     n : int
         How many.
 
@@ -197,10 +191,6 @@ def weigh(
 
     Parameters
     ----------
-    density : CollapsedDensity
-        Its collapsed density.
-    rng : numpy.random.Generator
-        Source of randomness.
     fitted : sequence of Optimum
         Maxima of the density that are known beforehand.
 

@@ -68,8 +68,6 @@ def reduced(scene: Scene, terms: Sequence[str]) -> Scene:
 
     Parameters
     ----------
-    scene : Scene
-        A scene.
     terms : sequence of str
         Optional terms that stay; they are not optional any more.
 
@@ -101,8 +99,6 @@ def assess(
         Which optional terms it keeps.
     density : CollapsedDensity
         Of the scene that `reduced` makes with them.
-    rng : numpy.random.Generator
-        Source of randomness.
     fitted : sequence of Optimum
         Maxima of the density that are known beforehand.
     """

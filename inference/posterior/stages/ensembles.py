@@ -27,8 +27,6 @@ def new_ensembles(
 
     Parameters
     ----------
-    density : CollapsedDensity
-        Target.
     proposal : Proposal
         In whose coordinates they walk; points that are wanting are drawn around its optima.
     starts : tuple of ndarray, shape (n, d) each

@@ -19,8 +19,6 @@ class AssessTask:
 
     Attributes
     ----------
-    job : Job
-        The job.
     index : int
         Of the candidate, in the order of `candidate_terms`.
     """

@@ -27,11 +27,6 @@ _LEAST_STEPS = 4  # of ensembles, from which on they speak for themselves
 def standing(stage: Drawing) -> Drawing:
     """Return what an answer is made of where a job stops at some stage.
 
-    Parameters
-    ----------
-    stage : Drawing
-        Where the job stands.
-
     Returns
     -------
     Drawing

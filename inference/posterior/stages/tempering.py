@@ -36,8 +36,6 @@ class TemperTask:
 
     Attributes
     ----------
-    job : Job
-        The job.
     population : Population or None
         None before it is drawn from the prior.
     index : int
@@ -73,8 +71,6 @@ class SetOutTask:
 
     Attributes
     ----------
-    job : Job
-        The job.
     stage : Tempering
         With populations of which at least one has arrived.
     """
@@ -106,10 +102,6 @@ def merge(
 
     Parameters
     ----------
-    job : Job
-        The job.
-    stage : Tempering
-        Where it stands.
     carried : sequence of Population
         In the order of `tasks`.
 

@@ -36,12 +36,8 @@ class WalkTask:
 
     Attributes
     ----------
-    job : Job
-        The job.
     proposal : Proposal
         Of the ensemble.
-    ensemble : Ensemble
-        Where it stands.
     steps : int
         How many.
     """
@@ -74,10 +70,6 @@ def merge(
 
     Parameters
     ----------
-    job : Job
-        The job.
-    stage : Walking
-        Where it stands.
     ensembles : sequence of Ensemble
         In the order of `tasks`.
 

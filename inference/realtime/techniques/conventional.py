@@ -70,8 +70,6 @@ def conventional_range(sensor: Sensor, frames: Frames, crosstalk: Pair = (0.0, 0
 
     Parameters
     ----------
-    sensor : Sensor
-        The sensor.
     frames : Frames
         The frames, n of them.
     crosstalk : (float, float)

@@ -132,8 +132,6 @@ def ranges_by_derivatives(task: Task, uneven_too: bool) -> TechniqueResult:
 
     Parameters
     ----------
-    task : Task
-        The request.
     uneven_too : bool
         As for `derivatives_of`.
     """

@@ -34,8 +34,6 @@ def range_from_light(
     ----------
     name : str
         The technique.
-    task : Task
-        The request.
     curve : Curve
         What the reading is of the range.
     high_m : float
