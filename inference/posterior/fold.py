@@ -81,7 +81,7 @@ def start(job: Job) -> Checkpoint:
     -------
     Checkpoint
     """
-    return Checkpoint(Selecting() if job.scene.optional_terms else Starting(), 0)
+    return Checkpoint(selecting.begun(job) if job.scene.optional_terms else Starting(), 0)
 
 
 def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float = 0.0) -> tuple[Task, ...]:
@@ -98,8 +98,8 @@ def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float = 0.0) -> tuple[Task, .
     if cpu_s >= job.settings.max_seconds:
         return ()
     match checkpoint.stage:
-        case Selecting():
-            return selecting.tasks(job)
+        case Selecting() as stage:
+            return selecting.tasks(job, stage)
         case Starting() as stage:
             return (StartTask(sampled(job, checkpoint), stage),)
         case Tempering() as stage:
@@ -138,9 +138,12 @@ def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoi
     """Take in the parts of a chunk, in the order of `tasks`, and judge the draws so far."""
     calls = checkpoint.calls
     match checkpoint.stage:
-        case Selecting():
-            selection, used = selecting.merge(job, _all(Candidate, pieces))
-            return Checkpoint(Starting(), calls + used, selection)
+        case Selecting() as stage if stage.looking:
+            found, used = selecting.looked(stage, _all(Checkpoint, pieces))
+            return Checkpoint(found, calls + used)
+        case Selecting() as stage:
+            selection, start, used = selecting.decided(job, stage, _all(Candidate, pieces))
+            return Checkpoint(start, calls + used, selection)
         case Starting():
             return _after(checkpoint, pieces)
         case Tempering() as stage if stage.arrived:

@@ -146,7 +146,8 @@ def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
     """Draw what the answer of a job is made of: the one place where its stream is begun."""
     job, stage, calls = sampled(job, checkpoint), checkpoint.stage, checkpoint.calls
     if isinstance(stage, Selecting | Starting):  # there was no time for more
-        begun = begin(job, stage if isinstance(stage, Starting) else Starting())
+        # of the choices the last keeps all optional terms
+        begun = begin(job, stage if isinstance(stage, Starting) else stage.starts[-1])
         stage, calls = begun.stage, calls + begun.calls
         job = dataclasses.replace(job, representatives=begun.representatives)
     assert not isinstance(stage, Selecting | Starting)  # noqa: S101  # sampling has begun

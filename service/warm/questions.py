@@ -85,12 +85,12 @@ def _posterior(sensor: Body, scene: Body, whole_start: bool, **data: bool) -> No
     """Ask for the first step of a posterior, or for its whole start and one step more."""
     from inference.posterior import fold
     from inference.posterior.settings import SamplerSettings
-    from inference.posterior.stages.stage import Starting
+    from inference.posterior.stages.stage import Selecting, Starting
 
     parsed, known, frames = _question(sensor, scene, **data)
     job = fold.prepare(parsed, known, frames, SamplerSettings(seed=1))
     checkpoint = fold.start(job)
-    while whole_start and isinstance(checkpoint.stage, Starting):
+    while whole_start and isinstance(checkpoint.stage, Selecting | Starting):
         pieces = [fold.run(task) for task in fold.tasks(job, checkpoint)]
         checkpoint = fold.merge(job, checkpoint, pieces)
     ahead = fold.tasks(job, checkpoint)

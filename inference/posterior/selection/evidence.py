@@ -185,14 +185,14 @@ def resample(weighted: WeightedDraws, rng: np.random.Generator, n: int) -> NDArr
 
 
 def weigh(
-    density: CollapsedDensity, rng: np.random.Generator, fitted: Sequence[Optimum] = ()
+    density: CollapsedDensity, rng: np.random.Generator, found: Sequence[Optimum] | None = None
 ) -> Weighed:
     """Estimate the evidence of a model.
 
     Parameters
     ----------
-    fitted : sequence of Optimum
-        Maxima of the density that are known beforehand.
+    found : sequence of Optimum or None
+        Maxima of the density; None: they are looked for.
 
     Returns
     -------
@@ -204,13 +204,13 @@ def weigh(
         value = float(density(np.empty((1, 0)))[0])
         return Weighed(Evidence(value, 0.0, None), np.empty((1, 0)), np.zeros(1), None, 1)
     constant, constant_error = _constant(density.parameters, rng)
-    optima = [*find_optima(density, rng), *fitted]
+    optima = find_optima(density, rng) if found is None else list(found)
     scouted = carried(density, rng, scouts(_SCOUTS))
     calls = scouted.calls
     if len(scouted.z):
         best = scouted.z[np.argmax(scouted.log_likelihood + scouted.log_prior)]
-        found = [refine(density, climb(density, best)[0]), refine(density, best)]
-        optima += [optimum for optimum in found if optimum is not None]
+        ends = [refine(density, climb(density, best)[0]), refine(density, best)]
+        optima += [optimum for optimum in ends if optimum is not None]
     optima = _distinct(optima)
     if not optima:
         nothing = Evidence(-math.inf, 0.0, None)

@@ -89,7 +89,7 @@ def assess(
     terms: tuple[str, ...],
     density: CollapsedDensity,
     rng: np.random.Generator,
-    fitted: Sequence[Optimum] = (),
+    found: Sequence[Optimum] | None = None,
 ) -> Candidate:
     """Assess one candidate.
 
@@ -99,10 +99,10 @@ def assess(
         Which optional terms it keeps.
     density : CollapsedDensity
         Of the scene that `reduced` makes with them.
-    fitted : sequence of Optimum
-        Maxima of the density that are known beforehand.
+    found : sequence of Optimum or None
+        Maxima of the density; None: they are looked for.
     """
-    weighed = weigh(density, rng, fitted)
+    weighed = weigh(density, rng, found)
     predicted, calls = cross_validate(density, weighed, rng)
     return Candidate(
         terms,

@@ -3,14 +3,16 @@
 import dataclasses
 from collections.abc import Sequence
 
-from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
+from inference.posterior.sampling.start import Optimum, refine
 from inference.posterior.selection.models import Candidate, assess, candidate_terms, reduced
 from inference.posterior.selection.selection import Selection, decide
 from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.stage import Selecting, Starting
+from inference.posterior.stages.starting import StartTask
 from inference.posterior.streams import Stream
 
-__all__ = ["AssessTask", "merge", "sampled", "tasks"]
+__all__ = ["AssessTask", "begun", "decided", "looked", "sampled", "tasks"]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -19,31 +21,90 @@ class AssessTask:
 
     Attributes
     ----------
+    job : Job
+        With the candidate's terms, none of them optional.
+    terms : tuple of str
+        Which optional terms it keeps.
     index : int
         Of the candidate, in the order of `candidate_terms`.
+    found : tuple of Optimum
+        Its optima; of a large job those of some of the frames.
     """
 
     job: Job
+    terms: tuple[str, ...]
     index: int
+    found: tuple[Optimum, ...]
 
     def run(self) -> Candidate:
         """Assess it."""
-        terms = candidate_terms(self.job.scene)[self.index]
-        job = dataclasses.replace(self.job, scene=reduced(self.job.scene, terms))
-        density = job.density()
-        fitted = fitted_optima(job, density) if len(density.parameters) else []
-        return assess(terms, density, job.stream(Stream.CANDIDATES, self.index), fitted)
+        density, found = self.job.density(), list(self.found)
+        if self.job.is_large:
+            refined = [refine(density, optimum.z) for optimum in found]
+            found = [optimum for optimum in refined if optimum is not None]
+        return assess(self.terms, density, self.job.stream(Stream.CANDIDATES, self.index), found)
 
 
-def tasks(job: Job) -> tuple[AssessTask, ...]:
-    """Return the candidates to be assessed."""
-    return tuple(AssessTask(job, k) for k in range(len(candidate_terms(job.scene))))
+def begun(job: Job) -> Selecting:
+    """Return the stage before its first step: no optima to be looked for where all is known."""
+    jobs = [_candidate(job, terms) for terms in candidate_terms(job.scene)]
+    done = Starting(optima=(), fitted=True)
+    return Selecting(tuple(Starting() if len(each.density().parameters) else done for each in jobs))
 
 
-def merge(job: Job, candidates: Sequence[Candidate]) -> tuple[Selection, int]:
-    """Decide which terms stay; return that and the density evaluations it took."""
+def _candidate(job: Job, terms: Sequence[str]) -> Job:
+    """Return the job with some of its optional terms, and without the others."""
+    return dataclasses.replace(job, scene=reduced(job.scene, terms))
+
+
+def tasks(job: Job, stage: Selecting) -> tuple[StartTask, ...] | tuple[AssessTask, ...]:
+    """Return the candidates whose optima are looked for, in the next way; then all, to be assessed.
+
+    Parameters
+    ----------
+    job : Job
+        With its optional terms.
+    stage : Selecting
+        How far each candidate is.
+    """
+    every = candidate_terms(job.scene)
+    jobs = [_candidate(job, terms) for terms in every]
+    looking = [StartTask(j, s) for j, s in zip(jobs, stage.starts, strict=True) if not s.fitted]
+    if looking:
+        return tuple(looking)
+    return tuple(
+        AssessTask(jobs[k], terms, k, stage.starts[k].optima or ()) for k, terms in enumerate(every)
+    )
+
+
+def looked(stage: Selecting, reached: Sequence[Checkpoint]) -> tuple[Selecting, int]:
+    """Take in the optima that candidates were found to have.
+
+    Parameters
+    ----------
+    stage : Selecting
+        Before.
+    reached : sequence of Checkpoint
+        Of the candidates that were looked at, in their order.
+
+    Returns
+    -------
+    (Selecting, int)
+        And the density evaluations on the way to it.
+    """
+    rest = iter(reached)
+    starts = [start if start.fitted else next(rest).stage for start in stage.starts]
+    found = tuple(start for start in starts if isinstance(start, Starting))
+    return Selecting(found), sum(each.calls for each in reached)
+
+
+def decided(
+    job: Job, stage: Selecting, candidates: Sequence[Candidate]
+) -> tuple[Selection, Starting, int]:
+    """Decide which terms stay; return that, the start of their scene and the evaluations."""
     selection = Selection(tuple(candidates), decide(job.scene, candidates))
-    return selection, sum(candidate.calls for candidate in candidates)
+    chosen = candidate_terms(job.scene).index(selection.chosen)
+    return selection, stage.starts[chosen], sum(candidate.calls for candidate in candidates)
 
 
 def sampled(job: Job, checkpoint: Checkpoint) -> Job:

@@ -49,11 +49,6 @@ class _NotBegun:
         return Progress(self.phase, 0, None, None, None, False)
 
 
-@dataclasses.dataclass(frozen=True)
-class Selecting(_NotBegun):
-    """It is being decided which optional terms stay."""
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class Starting(_NotBegun):
     """It is decided which optional terms stay; optima are looked for, in one way after the other.
@@ -71,6 +66,25 @@ class Starting(_NotBegun):
     ends: Ends | None = None
     optima: tuple[Optimum, ...] | None = None
     fitted: bool = False
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Selecting(_NotBegun):
+    """It is being decided which optional terms stay.
+
+    Attributes
+    ----------
+    starts : tuple of Starting
+        Of the scene with each choice of the terms, in the order of `candidate_terms`. With the
+        optima of all of them the choices are assessed; that of the best is where sampling starts.
+    """
+
+    starts: tuple[Starting, ...]
+
+    @property
+    def looking(self) -> bool:
+        """Whether optima are still looked for."""
+        return not all(start.fitted for start in self.starts)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

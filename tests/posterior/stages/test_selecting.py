@@ -1,0 +1,78 @@
+"""How optional terms are decided, chunk by chunk."""
+
+import math
+
+import numpy as np
+import pytest
+
+from inference.posterior import fold
+from inference.posterior import job as jobs
+from inference.posterior.selection.evidence import weigh
+from inference.posterior.selection.models import Candidate
+from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages.selecting import AssessTask
+from inference.posterior.stages.stage import Starting
+from inference.posterior.stages.starting import StartTask
+from simulator.scene import parse_scene
+from tests.posterior.scenes import OBJECT, UNKNOWN_CROSSTALK, data, sensor_of
+from tests.posterior.test_archive import same
+
+QUICK = SamplerSettings(seed=7, target_ess=50)
+OPTIONAL = {"values": UNKNOWN_CROSSTALK, "optional": True}
+
+
+def of_scene(scene: dict[str, object], frames: int = 12) -> fold.Job:
+    """Return a job about the light of an object and crosstalk."""
+    sensor = sensor_of("pulsed")
+    simulated = data(sensor, {"crosstalk": [0.002, 0.01]}, frames)
+    return fold.prepare(sensor, parse_scene(scene), simulated.frames, QUICK)
+
+
+def assessed(job: fold.Job) -> tuple[list[type], fold.Checkpoint, list[Candidate]]:
+    """Go on until terms are decided; return what the tasks were, where that is, and the choices."""
+    checkpoint, kinds = fold.start(job), []
+    while True:
+        tasks = fold.tasks(job, checkpoint)
+        kinds.append(type(tasks[0]))
+        pieces = [fold.run(task) for task in tasks]
+        checkpoint = fold.merge(job, checkpoint, pieces)
+        candidates = [piece for piece in pieces if isinstance(piece, Candidate)]
+        if candidates:
+            return kinds, checkpoint, candidates
+
+
+def test_a_posterior_with_optional_terms_starts_in_chunks_and_none_twice() -> None:
+    kinds, reached, _ = assessed(of_scene({"crosstalk": OPTIONAL}))
+    assert kinds == [StartTask] * 3 + [AssessTask]
+    stated = of_scene({"crosstalk": UNKNOWN_CROSSTALK})
+    start = fold.start(stated)
+    for _ in range(3):
+        (task,) = fold.tasks(stated, start)
+        start = fold.merge(stated, start, [fold.run(task)])
+    assert isinstance(reached.stage, Starting)
+    assert reached.stage.fitted
+    assert same(reached.stage, start.stage)  # not looked for again
+
+
+def test_a_choice_that_leaves_nothing_unknown_has_nothing_to_be_looked_for() -> None:
+    job = of_scene({"object": OBJECT, "crosstalk": OPTIONAL})
+    assert len(fold.tasks(job, fold.start(job))) == 1
+    _, reached, (without, with_it) = assessed(job)
+    assert without.terms == ()
+    assert without.log_evidence < with_it.log_evidence - 100
+    assert reached.selection is not None
+    assert reached.selection.chosen == ("crosstalk",)
+
+
+def test_optima_of_some_of_many_frames_serve_the_evidence_of_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    job = of_scene({"object": OBJECT, "crosstalk": OPTIONAL}, 280)
+    known = of_scene({"object": OBJECT, "crosstalk": UNKNOWN_CROSSTALK}, 280)
+    whole = weigh(known.density(), np.random.default_rng(8)).evidence
+    monkeypatch.setattr(jobs, "MOST_SAMPLED", 260)
+    assert job.is_large
+    _, _, (_, found) = assessed(job)
+    # two estimates of one integral: 5 standard errors, one alarm in 1.7 million
+    error = math.hypot(whole.error, found.log_evidence_error)
+    assert abs(whole.log_evidence - found.log_evidence) < 5 * error
