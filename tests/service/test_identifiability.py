@@ -11,7 +11,7 @@ import pytest
 from service.answers.identifiability import IdentifiabilityResponse
 from service.cli import main
 from tests.service.conftest import SENSOR
-from tests.service.test_http import assert_problem, changed
+from tests.service.problem_answers import assert_problem, changed
 
 BODY: dict[str, Any] = {
     "sensor": SENSOR,

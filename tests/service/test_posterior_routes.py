@@ -13,7 +13,7 @@ from service.answers.posteriors import PosteriorPage, PosteriorResponse
 from service.app import create_app
 from service.service_settings import ServiceSettings
 from tests.service import fake_fold
-from tests.service.test_http import assert_problem
+from tests.service.problem_answers import assert_problem
 
 pytestmark = pytest.mark.anyio
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from simulator import uncompiled
 from simulator.compiled import compiled
-from tests.simulator.test_compiled import DECORATORS, KERNELS
+from tests.simulator.kernel_files import DECORATORS, KERNELS
 
 Array = NDArray[np.float64]
 
