@@ -55,11 +55,6 @@ def known_of(scene: Scene, sensor: Sensor | None = None) -> Known:
         The scene; an optional term may be absent, so that none of its numbers counts as known.
     sensor : Sensor, optional
         Its timing offset cuts the support.
-
-    Returns
-    -------
-    Known
-        The numbers.
     """
     quantities: dict[str, Quantity | None] = {
         "object.c0": scene.object.c0,

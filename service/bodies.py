@@ -44,11 +44,6 @@ def parse_document(model: type[T], raw: bytes) -> T:
     raw : bytes
         JSON text.
 
-    Returns
-    -------
-    Validated
-        An instance of ``model``.
-
     Raises
     ------
     MalformedError
@@ -87,11 +82,6 @@ async def read_limited(
         Holds the bytes.
     client_s : float
         Time for the whole body [s], and a second more for every megabyte that is there.
-
-    Returns
-    -------
-    bytes
-        The whole body.
 
     Raises
     ------

@@ -101,11 +101,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     ----------
     arguments : sequence of str, optional
         Left out: those of the process.
-
-    Returns
-    -------
-    int
-        Exit code.
     """
     if arguments is None:
         _begin_quickly()

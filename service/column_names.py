@@ -32,10 +32,6 @@ def meant(name: str) -> list[str]:
     ----------
     name : str
         As it stands in a file.
-
-    Returns
-    -------
-    list of str
     """
     plain = _plain(name)
     same = [known for known in NAMES if _plain(known) == plain]

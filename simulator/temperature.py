@@ -90,10 +90,6 @@ def temperature_problems(of: Temperature | None, temperature_k: Array | None) ->
         The sensor's coefficients; without any the column is not used, whatever it holds.
     temperature_k : ndarray, shape (n,), or None
         The column, nan for null [K].
-
-    Returns
-    -------
-    list of Problem
     """
     if of is None:
         return []

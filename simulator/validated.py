@@ -131,11 +131,6 @@ def parse(model: type[T], data: Any) -> T:
     data : Any
         Decoded JSON (dict, list, str, int, float, bool, None).
 
-    Returns
-    -------
-    Validated
-        An instance of ``model``.
-
     Raises
     ------
     InvalidInputError

@@ -82,10 +82,6 @@ def read_keys(path: Path) -> tuple[Key, ...]:
     path : Path
         As `write_keys` left it.
 
-    Returns
-    -------
-    tuple of Key
-
     Raises
     ------
     InvalidInputError

@@ -76,11 +76,6 @@ def read_document(model: type[T], path: Path) -> T:
     model : type
         A subclass of `Validated`.
 
-    Returns
-    -------
-    Validated
-        An instance of ``model``.
-
     Raises
     ------
     InvalidInputError, MalformedError

@@ -75,10 +75,6 @@ def sets_of(
         How many.
     empty : int, optional
         Frames without the object; left out: those of the scene.
-
-    Returns
-    -------
-    list of Readings
     """
     without = scene.empty if empty is None else empty
     return [_made(scene, frames, _seed_of(scene, frames, seed, k), without) for k in range(count)]

@@ -108,12 +108,7 @@ def operations_of(action: Callable[[], object]) -> int:
 
 
 def term_costs() -> list[TermCost]:
-    """Return what each term costs, from the bare object on.
-
-    Returns
-    -------
-    list of TermCost
-    """
+    """Return what each term costs, from the bare object on."""
     by_name = {scene.name: scene for scene in SCENES}
     told = [
         ("object alone", by_name["Bare object"]),

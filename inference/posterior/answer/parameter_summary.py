@@ -38,10 +38,6 @@ def summaries_of_chains(
         The same with the errors of the model: what is reported.
     shares : ErrorParts of ndarray, shape (d,)
         Of the standard deviations.
-
-    Returns
-    -------
-    dict of str to ParameterSummary
     """
     ensembles, walkers, steps, _ = draws.shape
     result = {}

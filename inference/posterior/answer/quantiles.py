@@ -21,10 +21,6 @@ def quantiles(draws: Array, several_modes: bool) -> tuple[float, float, float]:
         Of any shape.
     several_modes : bool
         Whether the draws have several separate modes; a quantile is then one of the draws.
-
-    Returns
-    -------
-    (float, float, float)
     """
     method: Literal["inverted_cdf", "linear"] = "inverted_cdf" if several_modes else "linear"
     q05, q50, q95 = np.quantile(draws.ravel(), np.array(QUANTILES), method=method).tolist()
@@ -42,10 +38,6 @@ def weighted_quantiles(
         Draws, and their weights, which sum to one.
     several_modes : bool
         As for `quantiles`.
-
-    Returns
-    -------
-    (float, float, float)
     """
     order = np.argsort(draws)
     cumulative = np.cumsum(weights[order])

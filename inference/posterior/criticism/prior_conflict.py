@@ -118,11 +118,6 @@ def parameter_conflicts(
         Draws of equal weight.
     linearised : callable
         (d,) -> whitened residuals (k,) and their Jacobian (k, d).
-
-    Returns
-    -------
-    tuple of str
-        The reasons.
     """
     reasons = []
     middle = np.median(z, axis=0)  # beyond a point where more than half of the draws are
@@ -163,11 +158,6 @@ def range_conflicts(density: CollapsedDensity, z: Array, log_r: Array) -> tuple[
         Draws of equal weight.
     log_r : ndarray, shape (m, frames)
         Draws of the ranges; nan for a frame without object.
-
-    Returns
-    -------
-    tuple of str
-        The reasons.
     """
     distribution = _distribution(density.parameters.range_prior)
     with np.errstate(invalid="ignore"):

@@ -43,10 +43,6 @@ def mark_dark(
         Draws of equal weight.
     log_r : ndarray, shape (n, frames)
         Their ranges; nan for a frame without object.
-
-    Returns
-    -------
-    tuple of Identifiability
     """
     if not (len(density.parameters) and isinstance(density.parameters.range_prior, Reference)):
         return rows

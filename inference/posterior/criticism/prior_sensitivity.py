@@ -146,10 +146,6 @@ def mark_sensitive(
         As judged by the spread of the draws.
     sensitivity : PriorSensitivity or None
         From `prior_sensitivity`.
-
-    Returns
-    -------
-    tuple of Identifiability
     """
     if sensitivity is None:
         return rows

@@ -36,10 +36,6 @@ def new_ensembles(
     walkers : int
         Of every ensemble.
 
-    Returns
-    -------
-    tuple of Ensemble
-
     Raises
     ------
     RefusedError
