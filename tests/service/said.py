@@ -10,6 +10,7 @@ import pytest
 
 from service.cli import main
 
+SINE_WAVE = {"kind": "sine_wave", "frequency_hz": 5e6, "noise": {"read": [1e-3, 1e-3]}}
 CSV = "time_s,w1,w2\n0.0,0.021,1.71\n0.1,0.022,1.63\n0.2,0.023,1.55\n"
 
 

@@ -6,8 +6,12 @@ from pathlib import Path
 import pytest
 
 from tests.service.conftest import SCENE, SENSOR
-from tests.service.said import CSV, Said, given, written
-from tests.service.small_scenes import SINE_WAVE
+from tests.service.said import CSV, SINE_WAVE, Said, given, written
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    return written(tmp_path / "scene.json", {"sensor": SENSOR, "scene": SCENE})
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,12 @@ import pytest
 
 from service.commands import COMMANDS
 from tests.service.conftest import SCENE, SENSOR
-from tests.service.said import CSV, Said, written
-from tests.service.small_scenes import SINE_WAVE
+from tests.service.said import CSV, SINE_WAVE, Said, written
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    return written(tmp_path / "scene.json", {"sensor": SENSOR, "scene": SCENE})
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
