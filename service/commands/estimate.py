@@ -19,8 +19,10 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
         "estimate",
         _run,
         brief="estimate the range of every frame, at once",
-        description="Estimate the range of every frame and print the results as JSON. A row of a "
-        'file that cannot be read is a frame of status "none", with the reason.',
+        description="Estimate the range of every frame and print the results as JSON, with the "
+        "technique that the scene's plan chose (`chosen`) and why each other one cannot serve or "
+        "costs more (`left_out`). A row of a file that cannot be read is a frame of status "
+        '"none", with the reason.',
         examples="""
             hybridtof estimate frames.csv --scene scene.json
             hybridtof estimate frames.csv --scene scene.json --output ranges.csv

@@ -16,7 +16,8 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
         _run,
         brief="what frames at given ranges would tell of a scene",
         description="Rank, Cramer-Rao bounds and, for every unknown, whether it would be "
-        "identified and why not, before any frame is taken, as JSON.",
+        "identified and why not, before any frame is taken, as JSON. Which technique serves a "
+        "scene, and why the others do not, is in the answer of `hybridtof estimate`.",
         examples="""
             hybridtof identifiability --scene scene.json --ranges 0.3 0.6 1.2
             hybridtof identifiability --scene scene.json --ranges 0.3 0.6 --at object.c0=0.08
