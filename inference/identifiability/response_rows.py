@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import math
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -18,6 +19,15 @@ from simulator.sensor import instrument
 __all__ = ["FluxStep", "Rows", "flux_step"]
 
 Array = NDArray[np.float64]
+
+
+class _Derivatives(NamedTuple):
+    """Whitened, along the unknowns, the errors and log r; and rows of the priors."""
+
+    jacobian: Array
+    by_error: Array
+    along: Array
+    prior: Array
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -37,8 +47,7 @@ class Rows:
     range_error: float = 0.0
 
     @functools.cached_property
-    def _all(self) -> tuple[Array, Array, Array, Array]:
-        """Derivatives along the unknowns, the errors and log r, and rows of the priors."""
+    def _all(self) -> _Derivatives:
         e = self.experiment
         jacobian, along, extra = rows_of(e)
         d = len(e.parameters)
@@ -53,9 +62,10 @@ class Rows:
                 wide &= np.cumsum(present) == 1
             along[wide, 2] = limit
         if self.range_error > 0:
-            return jacobian, self._by_range_error(along.shape[1]), along, np.concatenate(extra)
+            late = self._by_range_error(along.shape[1])
+            return _Derivatives(jacobian, late, along, np.concatenate(extra))
         prior = np.concatenate([np.eye(d), *(rows[:, :d] for rows in extra[1:])])
-        return jacobian[:, :, :d], jacobian[:, :, d:], along, prior
+        return _Derivatives(jacobian[:, :, :d], jacobian[:, :, d:], along, prior)
 
     def _by_range_error(self, m: int) -> Array:
         """Return whitened derivatives along errors of the distance that an object seems to have."""
@@ -71,17 +81,17 @@ class Rows:
     @property
     def by_error(self) -> Array:
         """Whitened derivatives along the errors, shape (n, m, k); m as of `rows_of`."""
-        return self._all[1]
+        return self._all.by_error
 
     @property
     def jacobian(self) -> Array:
         """Whitened derivatives along the unknowns, shape (n, m, d)."""
-        return self._all[0]
+        return self._all.jacobian
 
     @property
     def along(self) -> Array:
         """Whitened derivatives along log r, shape (n, m)."""
-        return self._all[2]
+        return self._all.along
 
     def follow(self, errors: Array, of_prior: Array | None = None) -> tuple[Array, Array, Array]:
         """Return how z and log r follow errors of the readings, and what is left of these.
@@ -125,7 +135,7 @@ class Rows:
             The readings, and range and displacement [m] where they are known beside them.
         """
         e, law = self.experiment, self.experiment.range_prior
-        present, along = np.isfinite(e.log_r), self._all[2]
+        present, along = np.isfinite(e.log_r), self.along
         u = np.where(present, e.log_r, 0.0)
         off = np.zeros(along.shape)
         whitener = whiteners(e.sensor, e.readings)

@@ -95,7 +95,8 @@ def _fit(
         used = usable & np.isfinite(unit).all(axis=1) & (spread < _NARROW)
         if int((used & ~empty).sum()) <= int(free.sum()):
             return dataclasses.replace(fit, rank=0)
-        signal, error = x[2] * unit, x[2] * spread[:, None] * slope
+        *_, size = x
+        signal, error = size * unit, size * spread[:, None] * slope
         used &= (np.isfinite(readings) & np.isfinite(signal) & np.isfinite(error)).all(axis=1)
         # linear in the range about the fitted one
         expected = unit - shift[:, None] * slope
@@ -114,11 +115,12 @@ def _fit(
         fit = LinearFit(solution, factor, rank, residuals, used, np.where(used & ~empty, r, np.nan))
         if rank < solution.size:
             break
-        miss = readings - x[:2] - x[2] * expected
+        *crosstalk, size = x
+        miss = readings - crosstalk - size * expected
         pull = np.zeros((n, 2))
         white = np.einsum("nij,nj->ni", whitener, miss[used])
         pull[used] = np.einsum("nji,nj->ni", whitener, white)
-        gain = x[2] * spread**2 * np.einsum("ni,ni->n", slope, pull)
+        gain = size * spread**2 * np.einsum("ni,ni->n", slope, pull)
         shift = np.where(used, np.clip(gain, -3 * _NARROW, 3 * _NARROW), 0.0)
         better = _best_roots(task, roots, x)
         if not np.array_equal(better, index):
@@ -133,8 +135,9 @@ def _fit(
 def _best_roots(task: Task, roots: Array, x: Array) -> NDArray[np.intp]:
     """Return the index of the root of each frame whose readings lie nearest to the fit."""
     misses = []
+    *crosstalk, size = x
     for k in range(roots.shape[1]):
-        there = x[:2] + x[2] * _unit_signal(task, roots[:, k])[0]
+        there = crosstalk + size * _unit_signal(task, roots[:, k])[0]
         miss = np.abs(task.frames.readings - there).sum(axis=1)
         misses.append(np.where(np.isnan(miss), np.inf, miss))
     return np.asarray(np.argmin(np.stack(misses, axis=1), axis=1))

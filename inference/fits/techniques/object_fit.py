@@ -33,7 +33,7 @@ __all__ = ["OBJECT_FIT"]
 
 Array = NDArray[np.float64]
 
-_OBJECT = ("object.c0", "object.c1", "object.c2")
+_OBJECT = _C0, _C1, _C2 = ("object.c0", "object.c1", "object.c2")
 _BACKGROUND = (
     "background.strength",
     "background.distance_m",
@@ -98,8 +98,9 @@ def _open(
     x: Array, sd: Array, unknown: tuple[str, ...], reach: float, exponent: float
 ) -> dict[str, str]:
     """Return which members are not identified, and why."""
-    square = x[2] <= _SIGNIFICANT * sd[2] or x[2] * reach * reach <= 1e-12 * abs(x[0])
-    fourth = x[0] <= _SIGNIFICANT * sd[0]
+    (x1, x2, x3), (sd1, _, sd3) = x, sd
+    square = x3 <= _SIGNIFICANT * sd3 or x3 * reach * reach <= 1e-12 * abs(x1)
+    fourth = x1 <= _SIGNIFICANT * sd1
     missing: dict[str, str] = {}
     if (square and abs(exponent - 2) > _POWER_LAW) or (fourth and abs(exponent - 4) > _POWER_LAW):
         reason = (
@@ -109,23 +110,22 @@ def _open(
         return dict.fromkeys(unknown, reason)
     if square:
         reason = "the flux follows a square law over these ranges: c0 and c1 not identifiable"
-        missing |= {path: reason for path in _OBJECT[:2] if path in unknown}
+        missing |= {path: reason for path in (_C0, _C1) if path in unknown}
     if fourth:
         reason = "the flux follows a fourth law over these ranges: only c0 c2 is identifiable"
-        missing |= {path: reason for path in (_OBJECT[0], _OBJECT[2]) if path in unknown}
-    if not missing and not x[1] / x[2] > -2.0 * math.sqrt(x[0] / x[2]):
+        missing |= {path: reason for path in (_C0, _C2) if path in unknown}
+    if not missing and not x2 / x3 > -2.0 * math.sqrt(x1 / x3):
         reason = "the best fit has c1 <= -2 sqrt(c0), where the flux would have poles"
-        missing |= {path: reason for path in _OBJECT[:2] if path in unknown}
+        missing |= {path: reason for path in (_C0, _C1) if path in unknown}
     return missing
 
 
 def _natural(x: Array, factor: Array) -> dict[str, tuple[float, Array]]:
     """Values of c0, c1, c2 with gradients along the fit's coordinates; ``factor`` is dx/dy."""
-    c2, c1, c0 = 1.0 / x[0], x[1] / x[2], x[0] / x[2]
-    g0 = (factor[0] - c0 * factor[2]) / x[2]
-    g1 = (factor[1] - c1 * factor[2]) / x[2]
-    g2 = -c2 * c2 * factor[0]
-    return {"object.c0": (c0, g0), "object.c1": (c1, g1), "object.c2": (c2, g2)}
+    (x1, x2, x3), (f1, f2, f3) = x, factor
+    c2, c1, c0 = 1.0 / x1, x2 / x3, x1 / x3
+    g0, g1, g2 = (f1 - c0 * f3) / x3, (f2 - c1 * f3) / x3, -c2 * c2 * f1
+    return {_C0: (c0, g0), _C1: (c1, g1), _C2: (c2, g2)}
 
 
 def _solve(task: Task) -> TechniqueResult:

@@ -66,7 +66,8 @@ class Ensemble:
 
 def _stream(state: Any) -> Stream:
     """Return what matters of a RandomState's own tuple."""
-    return np.asarray(state[1], dtype=np.uint32), int(state[2]), int(state[3]), float(state[4])
+    _, keys, place, kept, normal = state
+    return np.asarray(keys, dtype=np.uint32), int(place), int(kept), float(normal)
 
 
 def warm_walkers(unknowns: int) -> int:

@@ -136,13 +136,13 @@ def consequence(larger: Reported | None, smaller: Reported | None) -> Consequenc
         return None
     names = tuple(name for name in smaller.names if name in larger.names)
     mean, sd, low, high = larger.of(names)
-    other = smaller.of(names)
+    other_mean, _, other_low, other_high = smaller.of(names)
     known = np.isfinite(mean) & (sd > 0)
     if not known.any():
         return None
     moved, shrunk = np.zeros(mean.size), np.zeros(mean.size)
-    np.divide(np.abs(other[0] - mean), sd, out=moved, where=known)
-    np.divide(other[3] - other[2], high - low, out=shrunk, where=known)
+    np.divide(np.abs(other_mean - mean), sd, out=moved, where=known)
+    np.divide(other_high - other_low, high - low, out=shrunk, where=known)
     shrunk = np.where(known, 1.0 - shrunk, -np.inf)
     labels = (*names, *(f"the range of usable frame {k}" for k in range(mean.size - len(names))))
     first, second = int(np.argmax(moved)), int(np.argmax(shrunk))
