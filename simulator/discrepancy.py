@@ -12,8 +12,9 @@ import functools
 import math
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
+
+from simulator.scipy_later import scipy
 
 __all__ = [
     "DISCREPANCY_LENGTH",

@@ -3,10 +3,10 @@
 import dataclasses
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from simulator.joint import Joint
+from simulator.scipy_later import scipy
 from simulator.unknowns import Unknown, Values
 
 __all__ = ["JointLaw", "joint_law"]

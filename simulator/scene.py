@@ -104,7 +104,7 @@ class Background(Validated):
         | Annotated[Shadow, pydantic.Tag("own")],
         pydantic.Discriminator(lambda v: "as_object" if isinstance(v, str) else "own"),
         pydantic.BeforeValidator(_no_other_word),
-    ] = Shadow()
+    ] = Shadow.model_construct()
     optional: bool = False
 
 
@@ -185,7 +185,7 @@ class Scene(Validated):
         Where that law comes from.
     """
 
-    object: ObjectTerm = ObjectTerm()
+    object: ObjectTerm = ObjectTerm.model_construct()
     crosstalk: (
         Annotated[
             Annotated[

@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import pydantic
-import scipy
 from numpy.typing import NDArray
 
 from simulator.priors.distribution import LEAST_LOG_MASS, Distribution, RangeForm
+from simulator.scipy_later import scipy
 from simulator.validated import Number, Positive, Validated
 
 __all__ = [

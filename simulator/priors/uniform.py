@@ -5,10 +5,10 @@ from typing import Literal
 
 import numpy as np
 import pydantic
-import scipy
 from numpy.typing import NDArray
 
 from simulator.priors.distribution import Distribution, RangeForm
+from simulator.scipy_later import scipy
 from simulator.validated import Number, Positive, Validated
 
 __all__ = ["LogUniform", "Uniform", "UniformDistribution"]

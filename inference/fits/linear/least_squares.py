@@ -3,8 +3,9 @@
 import dataclasses
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
+
+from simulator.scipy_later import scipy
 
 __all__ = ["LinearFit", "solve_weighted"]
 
