@@ -36,18 +36,33 @@ def accepted_type(accept: str, media_types: Iterable[str]) -> str | None:
 
 
 def _quality(accept: str, media_type: str) -> float:
-    """Return the quality that the most specific range gives a media type."""
-    kind = media_type.split("/")[0]
-    names = {media_type: 3, media_type.replace("/x-", "/"): 3, f"{kind}/*": 2, "*/*": 1}
+    """Return the quality that the most specific range gives a media type.
+
+    A range with a ``profile`` is of that profile alone. Other parameters, as ``charset``, are of no
+    consequence for what is sent here.
+    """
+    wanted, profile, _ = _read(media_type)
+    kind = wanted.split("/")[0]
+    names = {wanted: 3, wanted.replace("/x-", "/"): 3, f"{kind}/*": 2, "*/*": 1}
     best = (0, 0.0)
     for part in accept.split(","):
-        name, *parameters = (piece.strip().lower() for piece in part.split(";"))
-        quality = 1.0
-        for parameter in parameters:
-            if parameter.startswith("q="):
-                try:
-                    quality = min(max(float(parameter[2:]), 0.0), 1.0)
-                except ValueError:
-                    quality = 0.0
-        best = max(best, (names.get(name, 0), quality if name in names else 0.0))
+        name, asked, quality = _read(part)
+        if name in names and asked in (None, profile):
+            best = max(best, (names[name] + (asked is not None), quality))
     return best[1]
+
+
+def _read(media_range: str) -> tuple[str, str | None, float]:
+    """Return the name, the profile (None without one) and the quality of a media range."""
+    name, *parameters = (piece.strip().lower() for piece in media_range.split(";"))
+    quality, profile = 1.0, None
+    for parameter in parameters:
+        word, _, value = parameter.partition("=")
+        if word == "profile":
+            profile = value.strip('"')
+        elif word == "q":
+            try:
+                quality = min(max(float(value), 0.0), 1.0)
+            except ValueError:
+                quality = 0.0
+    return name, profile, quality

@@ -31,7 +31,6 @@ __all__ = [
 LINES = "application/x-ndjson"
 _HARDLY = 0.05  # probability of an object below which the scene is called empty
 _DOUBTED = 0.5  # probability that a frame has nothing to do with the scene
-_FORMS = (LINES, *(message.media_type for message in MESSAGES), "application/json")
 
 _SAID = frozenset(
     {"time_s", "range_m", "sd_m", "sd_parts_m", "hypotheses", "present", "outlier", "rate_m_s"}
@@ -53,10 +52,14 @@ def message_for(accept: str) -> Message | None:
     NotAcceptableError
         Where it takes neither.
     """
-    form = accepted_type(accept, _FORMS)
+    # lines with messages are asked for by the message, or as they are answered
+    by_message = {message.media_type: message for message in MESSAGES}
+    by_lines = {lines_type(message): message for message in MESSAGES}
+    forms = {LINES: None, **by_message, "application/json": None, **by_lines}
+    form = accepted_type(accept, forms)
     if form is None:
-        raise NotAcceptableError(f"answers to frames come as {listed(_FORMS)}")
-    return next((message for message in MESSAGES if message.media_type == form), None)
+        raise NotAcceptableError(f"answers to frames come as {listed(tuple(forms))}")
+    return forms[form]
 
 
 def lines_type(message: Message | None) -> str:

@@ -16,6 +16,7 @@ from inference.fits.techniques.registry import FITS
 from inference.realtime.registry import TECHNIQUES
 from inference.tracking.tracker import tracker
 from service.errors import NotAcceptableError
+from service.exports.negotiation import accepted_type
 from service.messages import MESSAGES
 from service.messages.answering import encode_messages
 from service.messages.measured import SIDES, Measured, total
@@ -294,5 +295,21 @@ def test_what_a_client_of_a_stream_accepts() -> None:
     assert message_for("") is message_for("*/*") is message_for("application/json") is None
     assert message_for(ROS.media_type) is ROS
     assert lines_type(MAVLINK).endswith(f'profile="{MAVLINK.media_type}"')
+    for message in (ROS, MAVLINK):  # as its lines are answered
+        assert message_for(lines_type(message)) is message
+        assert message_for(f"application/x-ndjson; q=0.5, {lines_type(message)}") is message
+        assert message_for(f"application/ndjson;profile={message.media_type}") is message
+    assert message_for("application/x-ndjson; charset=utf-8") is None
+    assert message_for(f"{lines_type(ROS)}; q=0, application/x-ndjson") is None
     with pytest.raises(NotAcceptableError):
         message_for("text/html")
+    with pytest.raises(NotAcceptableError, match='profile="application'):
+        message_for('application/x-ndjson; profile="urn:example:unknown"')
+    # one that takes less is told what else there is, or answered by that
+    assert message_for('application/x-ndjson; profile="urn:example:unknown", */*;q=0.1') is None
+
+
+def test_a_profile_that_no_answer_has_is_not_acceptable() -> None:
+    forms = ("application/json", "application/x-ndjson")
+    assert accepted_type('application/json; profile="urn:x"', forms) is None
+    assert accepted_type("application/json; charset=utf-8", forms) == "application/json"
