@@ -216,10 +216,13 @@ def long_files(tree: Tree) -> list[str]:
 def shared_names(tree: Tree) -> list[str]:
     """Public functions and classes of inference whose name stands in several of its files.
 
-    A name that three files of one folder share is the template of that folder, and no accident.
+    A name that three files of one folder share is the template of that folder, and no accident;
+    nor is one of a file beside which another has the same by arrays.
     """
     places: dict[str, set[str]] = defaultdict(set)
     for name, module in tree.below("inference"):
+        if name.endswith("_by_arrays.py"):
+            continue
         for node in module.body:
             if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
                 places[node.name].add(name)

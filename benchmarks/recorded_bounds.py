@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from inference.identifiability.before_data import Foresight, identifiability
 from inference.identifiability.range_response import range_response
-from inference.identifiability.response_rows import Rows
+from inference.identifiability.response_rows import ResponseRows
 from simulator.discrepancy import DISCREPANCY_SD
 from simulator.frames import Frames
 from simulator.model_error import RANGE_ERROR_SD
@@ -139,7 +139,7 @@ def demanded(truth: Truth, frames: Frames) -> float:
     here = np.isfinite(truth.range_m)
     known = [_KNOWN_M if there else None for there in here.tolist()]
     experiment = _foresight(truth, 1.0, known, None).experiment
-    rows = Rows(experiment, RANGE_ERROR_SD)
+    rows = ResponseRows(experiment, RANGE_ERROR_SD)
     (n, m, d), k = rows.jacobian.shape, rows.by_error.shape[2]
     system = np.zeros((n * m + d + k, d + k + n))
     system[: n * m, :d] = rows.jacobian.reshape(-1, d)

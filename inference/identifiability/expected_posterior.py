@@ -15,10 +15,10 @@ from simulator.scene import Reference, Stroke
 __all__ = [
     "STEP",
     "ExpectedPosterior",
+    "eliminated",
     "expected_posterior",
     "log_range_spread",
-    "rows_of",
-    "without_ranges",
+    "told_rows",
 ]
 
 Array = NDArray[np.float64]
@@ -90,8 +90,8 @@ def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
     law = experiment.range_prior
     curved = law.inverse_sd > 0 or law.log_inverse_sd > 0
     curved = curved and not isinstance(p.range_prior, Stroke)  # whose support is no row
-    jacobian, along, extra = rows_of(experiment)
-    across, response, variance = without_ranges(experiment, jacobian, along)
+    jacobian, along, extra = told_rows(experiment)
+    across, response, variance = eliminated(experiment, jacobian, along)
     independent = 1 if experiment.common_range else int(present.sum())
     room = _room(experiment)
     if math.isfinite(room):
@@ -116,7 +116,7 @@ def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
     return ExpectedPosterior(factor[:d], sd, range_sd, float(_limited(scale, limit, curved)[0]))
 
 
-def rows_of(experiment: Experiment) -> tuple[Array, Array, list[Array]]:
+def told_rows(experiment: Experiment) -> tuple[Array, Array, list[Array]]:
     """Return what readings and priors tell.
 
     Of every frame two whitened readings and the prior of its range, and where something is known of
@@ -164,9 +164,7 @@ def rows_of(experiment: Experiment) -> tuple[Array, Array, list[Array]]:
     return jacobian, along, extra
 
 
-def without_ranges(
-    experiment: Experiment, jacobian: Array, along: Array
-) -> tuple[Array, Array, Array]:
+def eliminated(experiment: Experiment, jacobian: Array, along: Array) -> tuple[Array, Array, Array]:
     """Eliminate the ranges: what is across them, how log r responds, and its own variance."""
     n, _, unknowns = jacobian.shape
     length = np.linalg.norm(along, axis=1)

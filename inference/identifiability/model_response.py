@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from inference.frame.sensitivity import whiteners
 from inference.identifiability.experiment import Experiment
-from inference.identifiability.response_rows import FluxStep, Rows, flux_step
+from inference.identifiability.response_rows import FluxStep, ResponseRows, flux_step
 
-__all__ = ["FluxError", "ModelResponse", "common_pull", "curvature_of_response", "model_response"]
+__all__ = ["FluxTold", "ModelResponse", "common_pull", "curvature_of_response", "model_response"]
 
 Array = NDArray[np.float64]
 _STEPS = 10
@@ -47,7 +47,7 @@ class _Point(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class FluxError:
+class FluxTold:
     """What the readings tell of the error of the flux.
 
     Attributes
@@ -75,7 +75,7 @@ class ModelResponse:
         Change of log r with them; zero for a frame without object.
     shift : (ndarray, ndarray)
         Change of z and of log r with what the readings tell of the error, shape (d,) and (n,).
-    error : FluxError
+    error : FluxTold
         What is known of the error.
     told : ndarray, shape (n,)
         Share of the information on log r that is the readings', not its prior's.
@@ -95,7 +95,7 @@ class ModelResponse:
     parameters: Array
     log_r: Array
     shift: tuple[Array, Array]
-    error: FluxError
+    error: FluxTold
     told: Array
     own: Array
     alone: Array
@@ -123,7 +123,7 @@ def model_response(
     -------
     ModelResponse
     """
-    rows = Rows(experiment)
+    rows = ResponseRows(experiment)
     step = flux_step(rows, rows.residual(readings), -experiment.z)
     k = step.across.shape[1]
     mean = step.coefficients(np.zeros(k))
@@ -139,7 +139,7 @@ def model_response(
         told[~np.isfinite(experiment.log_r)] = 0.0
     else:
         told = np.divide(along[:, :2].sum(axis=1), whole, out=np.zeros(whole.size), where=whole > 0)
-    error = FluxError(point.error, spread)
+    error = FluxTold(point.error, spread)
     follow = step.by_error[0] @ spread, step.by_error[1] @ spread
     return ModelResponse(*follow, (point.z, point.log_r), error, told, *rows.spreads(), followed)
 
@@ -168,7 +168,9 @@ def _means(experiment: Experiment) -> Array:
     return mean if experiment.rates is None else np.concatenate([mean, experiment.told], axis=1)
 
 
-def _settled(rows: Rows, first: FluxStep, point: _Point, pull: Array) -> tuple[_Point, FluxStep]:
+def _settled(
+    rows: ResponseRows, first: FluxStep, point: _Point, pull: Array
+) -> tuple[_Point, FluxStep]:
     """Repeat steps until they settle: where they lead, and the last one's derivatives.
 
     A draw of the exact model's posterior lies beside its mode by what noise lets it. That stays as
@@ -204,7 +206,7 @@ def _settled(rows: Rows, first: FluxStep, point: _Point, pull: Array) -> tuple[_
     else:
         last = cost(point)
     for _ in range(_STEPS):
-        here = Rows(_moved(e, point))
+        here = ResponseRows(_moved(e, point))
         off = here.residual(readings)
         off[:, 2] = left[:, 2] - rows.along[:, 2] * point.log_r
         tried = flux_step(here, off, of_prior - point.z)
@@ -247,7 +249,7 @@ def curvature_of_response(experiment: Experiment, response: ModelResponse, norma
         Root mean square over the frames of what the next Gauss-Newton step would still move log r
         by; inf where it leads beyond what numbers hold.
     """
-    e, rows = experiment, Rows(experiment)
+    e, rows = experiment, ResponseRows(experiment)
     present = np.isfinite(e.log_r)
     if e.discrepancy is None or not present.any():
         return 0.0

@@ -5,8 +5,8 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.identifiability.experiment import Experiment
-from inference.identifiability.model_response import FluxError
-from inference.identifiability.response_rows import Rows, flux_step
+from inference.identifiability.model_response import FluxTold
+from inference.identifiability.response_rows import ResponseRows, flux_step
 
 __all__ = ["range_response"]
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 def range_response(
     experiment: Experiment, readings: Array, size: float
-) -> tuple[Array, Array, FluxError]:
+) -> tuple[Array, Array, FluxTold]:
     """Return the response of a posterior that takes its clock for exact.
 
     A range that is known beside the readings cannot follow an error of the effective distance: all
@@ -34,12 +34,12 @@ def range_response(
 
     Returns
     -------
-    (ndarray, ndarray, FluxError)
+    (ndarray, ndarray, FluxTold)
         Change of z and of log r, shape (d, 1 + k) and (n, 1 + k): with what the readings tell of
         the error, and with each of k independent standard normal variates, as far as they leave it
         open; and what they tell, of its coefficients.
     """
-    rows = Rows(experiment, size)
+    rows = ResponseRows(experiment, size)
     d, known = experiment.z.size, np.zeros(rows.jacobian.shape[2])
     known[:d] = experiment.z
     if experiment.error is not None:
@@ -47,6 +47,6 @@ def range_response(
     step = flux_step(rows, rows.residual(readings), -known)
     k = step.across.shape[1]
     spread = np.asarray(scipy.linalg.solve_triangular(step.triangle, np.eye(k)))
-    told = FluxError(step.coefficients(np.zeros(k)), spread)
+    told = FluxTold(step.coefficients(np.zeros(k)), spread)
     of = np.column_stack([told.mean, spread])
     return step.by_error[0][:d] @ of, step.by_error[1] @ of, told

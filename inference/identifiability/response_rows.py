@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from inference.frame.delayed import delayed
 from inference.frame.sensitivity import whiteners
-from inference.identifiability.expected_posterior import rows_of, without_ranges
+from inference.identifiability.expected_posterior import eliminated, told_rows
 from inference.identifiability.experiment import Experiment
 from simulator.discrepancy import discrepancy_basis
 from simulator.sensor import instrument
 
-__all__ = ["FluxStep", "Rows", "flux_step"]
+__all__ = ["FluxStep", "ResponseRows", "flux_step"]
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ class _Derivatives(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Rows:
+class ResponseRows:
     """What readings and priors tell at one point, its ranges eliminated on demand.
 
     Attributes
@@ -49,7 +49,7 @@ class Rows:
     @functools.cached_property
     def _all(self) -> _Derivatives:
         e = self.experiment
-        jacobian, along, extra = rows_of(e)
+        jacobian, along, extra = told_rows(e)
         d = len(e.parameters)
         present = np.isfinite(e.log_r)
         # a range that the readings do not tell stays within its prior's support
@@ -80,7 +80,7 @@ class Rows:
 
     @property
     def by_error(self) -> Array:
-        """Whitened derivatives along the errors, shape (n, m, k); m as of `rows_of`."""
+        """Whitened derivatives along the errors, shape (n, m, k); m as of `told_rows`."""
         return self._all.by_error
 
     @property
@@ -111,7 +111,7 @@ class Rows:
         jacobian, _, along, prior = self._all
         d, k = jacobian.shape[2], errors.shape[2]
         both = np.concatenate([jacobian, errors], axis=2)
-        across, response, _ = without_ranges(self.experiment, both, along)
+        across, response, _ = eliminated(self.experiment, both, along)
         rows = across.reshape(-1, d + k)
         seen = np.concatenate([rows[:, d:], np.zeros((len(prior), k))])
         if of_prior is not None:
@@ -150,7 +150,7 @@ class Rows:
     def spreads(self) -> tuple[Array, Array, Array, Array]:
         """Return ``own``, ``alone``, ``sd`` and ``shared`` of `ModelResponse`."""
         jacobian, _, along, prior = self._all
-        across, response, variance = without_ranges(self.experiment, jacobian, along)
+        across, response, variance = eliminated(self.experiment, jacobian, along)
         present = np.isfinite(self.experiment.log_r)
         own = np.where(present, np.sqrt(np.where(present, variance, 0.0)), 0.0)
         d = jacobian.shape[2]
@@ -195,7 +195,7 @@ class FluxStep:
         return np.asarray(scipy.linalg.solve_triangular(self.triangle, told))
 
 
-def flux_step(rows: Rows, off: Array, of_prior: Array) -> FluxStep:
+def flux_step(rows: ResponseRows, off: Array, of_prior: Array) -> FluxStep:
     """Return the step from what readings, shape (n, m), and priors of z, shape (d,), are off."""
     k = rows.by_error.shape[2]
     prior = np.zeros((of_prior.size, k + 1))

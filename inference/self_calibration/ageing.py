@@ -9,7 +9,7 @@ from inference.self_calibration.calibration import Asked
 from inference.self_calibration.change import has_changed
 from inference.self_calibration.drift import (
     Drift,
-    Means,
+    EmptyMeans,
     aged,
     conditioned,
     crosstalk_of,
@@ -202,7 +202,7 @@ def in_force(plan: Plan, state: CalibrationState, drift: Drift) -> CalibrationSt
     return dataclasses.replace(state, track=settled(plan, state))
 
 
-def _conditioned(plan: Plan, drift: Drift, means: Means) -> tuple[Drift, bool]:
+def _conditioned(plan: Plan, drift: Drift, means: EmptyMeans) -> tuple[Drift, bool]:
     """Return a law that has learnt from frames without the object, and whether it had to jump."""
     limit = scipy.stats.chi2.isf(_FALSE_ALARM, int(np.isfinite(means.sd).sum()))
     wide = drift
@@ -230,7 +230,7 @@ def last_time(state: CalibrationState) -> float:
     return float(frames.time_s[-1])
 
 
-def _without_object(plan: Plan, state: CalibrationState, looked_at: int) -> Means | None:
+def _without_object(plan: Plan, state: CalibrationState, looked_at: int) -> EmptyMeans | None:
     """Return the mean reading of the last frames without the object, where there are enough."""
     new = state.recent.select(slice(-looked_at, None))
     empty = new.kind == EMPTY
@@ -240,7 +240,7 @@ def _without_object(plan: Plan, state: CalibrationState, looked_at: int) -> Mean
     observed = plan.tracker(state.scene).observed
     read = np.asarray(plan.sensor.noise.read)
     variance = np.maximum(frames.readings.var(axis=0, ddof=1), read**2) / len(frames)
-    return Means(
+    return EmptyMeans(
         frames.readings.mean(axis=0),
         np.where(observed.used, np.sqrt(variance), np.inf),
         1.0 if frames.gain is None else float(frames.gain.mean()),

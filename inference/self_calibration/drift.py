@@ -22,7 +22,7 @@ from simulator.parameters import Parameters, parameters_of
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
-__all__ = ["Drift", "Means", "aged", "conditioned", "crosstalk_of", "drift_sd", "walked"]
+__all__ = ["Drift", "EmptyMeans", "aged", "conditioned", "crosstalk_of", "drift_sd", "walked"]
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ class Drift(NamedTuple):
         return math.sqrt(self.square / self.counted)
 
 
-class Means(NamedTuple):
+class EmptyMeans(NamedTuple):
     """Readings of the empty scene.
 
     Attributes
@@ -209,14 +209,14 @@ def aged(scene: Scene, names: tuple[str, ...], sd: Array) -> Scene:
     return with_modes(scene, modes)
 
 
-def conditioned(sensor: Sensor, scene: Scene, means: Means) -> tuple[Scene, float]:
+def conditioned(sensor: Sensor, scene: Scene, means: EmptyMeans) -> tuple[Scene, float]:
     """Return a scene that has learnt from readings without the object.
 
     Parameters
     ----------
     sensor, scene : Sensor, Scene
         The scene, with a joint law of all that is unknown.
-    means : Means
+    means : EmptyMeans
         The readings; those with an infinite standard deviation tell nothing.
 
     Returns

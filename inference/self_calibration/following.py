@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from inference.self_calibration.calibration import Asked, Outcome
-from inference.self_calibration.gathering import Kept, joined, kinds_of, surprising
+from inference.self_calibration.gathering import Kept, in_order, kinds_of, surprising
 from inference.self_calibration.handing_over import hand_over
 from inference.self_calibration.looking import EVERY, look
 from inference.self_calibration.plan import Plan
@@ -111,7 +111,7 @@ def _tracked(
     if state.calibrated:
         track = withheld(model, frames, track)
     kinds = kinds_of(plan.sensor, frames, track, state.trusts_empty)
-    recent = joined(state.recent, Kept(frames, numbers, kinds)).select(slice(-_RECENT, None))
+    recent = in_order(state.recent, Kept(frames, numbers, kinds)).select(slice(-_RECENT, None))
     changed = dataclasses.replace(
         state,
         track=after,

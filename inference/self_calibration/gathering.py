@@ -18,7 +18,7 @@ __all__ = [
     "UNUSED",
     "Kept",
     "Worth",
-    "joined",
+    "in_order",
     "kinds_of",
     "nothing_kept",
     "surprising",
@@ -99,7 +99,7 @@ def nothing_kept() -> Kept:
     return Kept(None, none, none)
 
 
-def joined(first: Kept, second: Kept) -> Kept:
+def in_order(first: Kept, second: Kept) -> Kept:
     """Return frames one after another; a column that only some have says nothing in the others."""
     sequence = np.concatenate([first.sequence, second.sequence])
     kind = np.concatenate([first.kind, second.kind])

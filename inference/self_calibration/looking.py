@@ -14,9 +14,9 @@ from inference.self_calibration.ageing import (
     worn,
 )
 from inference.self_calibration.calibration import Asked, seed_of
-from inference.self_calibration.gathering import EMPTY, Worth, joined, nothing_kept, thinned
+from inference.self_calibration.gathering import EMPTY, Worth, in_order, nothing_kept, thinned
 from inference.self_calibration.plan import Plan
-from inference.self_calibration.scenes import about_object, prior_scene, unknowns_of
+from inference.self_calibration.scenes import about_object, open_names, prior_scene
 from inference.self_calibration.state import CalibrationState, Switch
 
 __all__ = ["EVERY", "look"]
@@ -48,7 +48,7 @@ def look(plan: Plan, state: CalibrationState, sequence: int) -> CalibrationState
     """
     surprised = state.surprised + 1 if state.surprises > EVERY // 2 else 0
     new = state.recent.select(slice(-EVERY, None))
-    gathered = thinned(joined(state.gathered, new), sequence - _OLDEST)
+    gathered = thinned(in_order(state.gathered, new), sequence - _OLDEST)
     steps = gathered.worth.steps
     state = dataclasses.replace(
         state,
@@ -146,7 +146,7 @@ def _promising(plan: Plan, state: CalibrationState, worth: Worth) -> bool:
     still = state.count - state.grew_at >= _STILL
     joint = state.before.joint
     told = () if joint is None else joint.unknowns
-    unknowns = unknowns_of(plan.sensor, state.before)
+    unknowns = open_names(plan.sensor, state.before)
     shaped = [name for name in unknowns if name.startswith("object.")]
     if set(shaped) <= set(told):
         if worth.empty >= EMPTY_ENOUGH:

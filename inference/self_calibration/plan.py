@@ -8,9 +8,9 @@ import numpy as np
 from inference.self_calibration.gathering import nothing_kept
 from inference.self_calibration.scenes import (
     check_unknown,
+    open_names,
     prior_scene,
     trackable,
-    unknowns_of,
 )
 from inference.self_calibration.state import CalibrationState
 from inference.tracking.settings import TrackingSettings
@@ -148,7 +148,7 @@ def begin(plan: Plan) -> CalibrationState:
     tracked with all that its priors leave open.
     """
     told = () if plan.stated.joint is None else plan.stated.joint.unknowns
-    known = set(unknowns_of(plan.sensor, plan.stated)) <= set(told)
+    known = set(open_names(plan.sensor, plan.stated)) <= set(told)
     scene = trackable(plan.sensor, plan.stated)
     return CalibrationState(
         track=plan.tracker(scene).first,

@@ -11,12 +11,12 @@ from simulator.parameters import parameters_of
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor
 
-__all__ = ["about_object", "check_unknown", "knowledge", "prior_scene", "trackable", "unknowns_of"]
+__all__ = ["about_object", "check_unknown", "knowledge", "open_names", "prior_scene", "trackable"]
 
 _DRAWS = 1000
 
 
-def unknowns_of(sensor: Sensor, scene: Scene) -> tuple[str, ...]:
+def open_names(sensor: Sensor, scene: Scene) -> tuple[str, ...]:
     """Return the names of a scene's unknowns, without those of the law of ranges."""
     names = parameters_of(sensor, scene).names
     return tuple(name for name in names if not name.startswith("range_m."))
@@ -30,7 +30,7 @@ def check_unknown(sensor: Sensor, scene: Scene) -> None:
     InvalidInputError
         At "/calibrate".
     """
-    if not unknowns_of(sensor, prior_scene(scene)):
+    if not open_names(sensor, prior_scene(scene)):
         raise InvalidInputError.at(
             "/calibrate",
             "nothing of the scene is unknown, so there is nothing to learn: state priors for what "
@@ -82,7 +82,7 @@ def trackable(sensor: Sensor, scene: Scene) -> Scene:
         The scene; optional terms stay.
     """
     whole = reduced(scene, scene.optional_terms)
-    names = unknowns_of(sensor, whole)
+    names = open_names(sensor, whole)
     told = () if whole.joint is None else whole.joint.unknowns
     missing = [name for name in names if name not in told]
     if not missing:
@@ -124,5 +124,5 @@ def knowledge(sensor: Sensor, scene: Scene) -> dict[str, dict[str, float]]:
     draws = parameters.natural(parameters.sample(np.random.default_rng(0), _DRAWS))
     quantiles = np.quantile(draws, [0.05, 0.5, 0.95], axis=0).T.tolist()
     rows = dict(zip(parameters.names, quantiles, strict=True))
-    kept = unknowns_of(sensor, scene)
+    kept = open_names(sensor, scene)
     return {name: dict(zip(("q05", "q50", "q95"), rows[name], strict=True)) for name in kept}

@@ -12,7 +12,7 @@ from scipy import special
 from inference.estimate import estimate
 from inference.estimates import Status, TechniqueResult
 from inference.fits.answer.ranges import MISFIT
-from inference.fits.techniques.crosstalk_fit import with_error
+from inference.fits.techniques.crosstalk_fit import noisier
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
 from simulator.sensor import Sensor, parse_sensor
@@ -340,7 +340,7 @@ def test_weights_where_the_range_is_far_less_certain_than_the_readings(noise: fl
     rng = np.random.default_rng(1)
     own = noise**2 * np.array([[[1.0, 0.3], [0.3, 2.0]]])
     common = rng.standard_normal((2, 1, 2)) * np.array([noise, 1e-3])[:, None, None]
-    found = with_error(with_error(np.linalg.inv(np.linalg.cholesky(own)), common[0]), common[1])[0]
+    found = noisier(noisier(np.linalg.inv(np.linalg.cholesky(own)), common[0]), common[1])[0]
     with mpmath.workdps(50):
         total = mpmath.matrix(own[0].tolist())
         for part in common[:, 0]:

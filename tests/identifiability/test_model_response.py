@@ -12,7 +12,7 @@ from inference.frame.sensitivity import whiteners
 from inference.identifiability.expected_posterior import expected_posterior
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.model_response import (
-    FluxError,
+    FluxTold,
     ModelResponse,
     common_pull,
     curvature_of_response,
@@ -86,7 +86,7 @@ def test_a_small_error_is_followed_to_second_order() -> None:
     at, rng = experiment("pulsed", 1000.0), np.random.default_rng(5)
     found = model_response(at, at.readings.mean)
     still = np.zeros(found.error.mean.size)
-    none = FluxError(still, np.eye(still.size))
+    none = FluxTold(still, np.eye(still.size))
     follow = _by_coefficients(found)
     found = dataclasses.replace(found, shift=(0 * at.z, 0 * at.log_r), error=none, **follow)
     coefficients = rng.standard_normal(still.size)

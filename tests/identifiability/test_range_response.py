@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from inference.frame.delayed import delayed
 from inference.frame.sensitivity import whiteners
-from inference.identifiability.expected_posterior import rows_of
+from inference.identifiability.expected_posterior import told_rows
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.range_response import range_response
 from simulator.discrepancy import discrepancy_basis
@@ -61,7 +61,7 @@ def test_all_follow_a_wrong_clock_as_if_all_were_solved_at_once(kind: str, what:
     late = SIZE * np.einsum("nij,nj->ni", whiteners(at.sensor, at.readings), late)
     clock = np.zeros((11, 5, basis.size))
     clock[:, :2] = late[:, :, None] * values[:, None]
-    jacobian, along, _ = rows_of(at)
+    jacobian, along, _ = told_rows(at)
     d, j, k = at.z.size, jacobian.shape[2], basis.size
     along[:, 2] = 0.0  # the support of the prior: below 1e-4 of what is told
     ranges = np.zeros((11, 5, 11))

@@ -9,7 +9,7 @@ from inference.estimates import Status
 from inference.self_calibration.ageing import wide_enough, widened
 from inference.self_calibration.drift import (
     Drift,
-    Means,
+    EmptyMeans,
     aged,
     conditioned,
     crosstalk_of,
@@ -94,7 +94,7 @@ def test_empty_frames_condition_a_law_as_gaussians_are(unit: float) -> None:
         }
     )
     read, sd = np.array([0.0011, 0.0065]) * unit, np.array([3e-5, 9e-5]) * unit
-    after, surprise = conditioned(sensor, scene, Means(read, sd, 1.0, 0.0))
+    after, surprise = conditioned(sensor, scene, EmptyMeans(read, sd, 1.0, 0.0))
     assert after.joint is not None
     precision = np.linalg.inv(covariance) + np.diag(np.square(prior / sd))
     wanted = np.linalg.solve(
@@ -110,7 +110,7 @@ def test_empty_frames_condition_a_law_as_gaussians_are(unit: float) -> None:
 
 
 def test_a_reading_that_is_not_used_tells_nothing() -> None:
-    means = Means(np.array([0.5, 0.0061]), np.array([np.inf, 1e-5]), 1.0, 0.0)
+    means = EmptyMeans(np.array([0.5, 0.0061]), np.array([np.inf, 1e-5]), 1.0, 0.0)
     after, _ = conditioned(SENSOR, known(TRUTH, 1e-4), means)
     found = crosstalk_of(SENSOR, after)
     assert found is not None

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from inference.posterior.settings import SamplerSettings
 from inference.self_calibration.calibration import Asked, Outcome, outcome_of, sampler_of
 from inference.self_calibration.following import Conclude, conclude, follow
-from inference.self_calibration.gathering import EMPTY, joined, thinned
+from inference.self_calibration.gathering import EMPTY, in_order, thinned
 from inference.self_calibration.looking import EVERY
 from inference.self_calibration.plan import Plan, begin, plan_of
-from inference.self_calibration.scenes import trackable, unknowns_of
+from inference.self_calibration.scenes import open_names, trackable
 from inference.self_calibration.state import (
     CalibrationState,
     calibration_from_bytes,
@@ -252,7 +252,7 @@ def test_gathered_frames_are_few_of_each_amplitude() -> None:
     assert (kinds == EMPTY).sum() == 24
     # the same, however they come
     whole = state.recent
-    halves = joined(thinned(whole.select(slice(0, 60)), 0), whole.select(slice(60, None)))
+    halves = in_order(thinned(whole.select(slice(0, 60)), 0), whole.select(slice(60, None)))
     assert np.array_equal(thinned(halves, 0).sequence, thinned(whole, 0).sequence)
 
 
@@ -300,7 +300,7 @@ def test_a_calibrated_scene_is_known_from_the_start() -> None:
 def test_what_no_law_names_has_its_prior() -> None:
     scene = trackable(SENSOR, STATED)
     assert scene.joint is not None
-    assert scene.joint.unknowns == unknowns_of(SENSOR, STATED)
+    assert scene.joint.unknowns == open_names(SENSOR, STATED)
     assert trackable(SENSOR, known(TRUTH)) == known(TRUTH)
     assert isinstance(PLAN, Plan)
     with pytest.raises(InvalidInputError, match="/state"):

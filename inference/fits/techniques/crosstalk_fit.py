@@ -29,7 +29,7 @@ from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
-__all__ = ["CROSSTALK_FIT", "with_error"]
+__all__ = ["CROSSTALK_FIT", "noisier"]
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ _PASSES = 50
 _NARROW = 0.1  # relative standard deviation of a range up to which first order describes it
 
 
-def with_error(whitener: Array, along: Array) -> Array:
+def noisier(whitener: Array, along: Array) -> Array:
     """Return whiteners of covariances to which one more error is added.
 
     Parameters
@@ -103,7 +103,7 @@ def _fit(
         design = np.zeros((n, 2, 3))
         design[:, 0, 0] = design[:, 1, 1] = 1.0
         design[:, :, 2] = expected
-        whitener = with_error(whiteners(instrument, readings[used], signal[used]), error[used])
+        whitener = noisier(whiteners(instrument, readings[used], signal[used]), error[used])
         matrix = np.einsum("nij,njk->nik", whitener, design[used])
         target = np.einsum("nij,nj->ni", whitener, readings[used])
         target = target - matrix[:, :, ~free] @ x[~free]
