@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from inference.estimates import SdParts, Status, TechniqueResult, status_of_counts
 from inference.fits.likelihood.erring import Erring
 from inference.fits.likelihood.erring_point import moved_by_errors
-from inference.fits.likelihood.frame_modes import MOST, frame_modes
+from inference.fits.likelihood.frame_modes import MOST, frame_reaches
 from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.problem import FitProblem
 from inference.realtime.net import ABSENT, COMMON_REASONS, SATURATED
@@ -29,6 +29,8 @@ DECIDED = 9.0  # deviance by which something must be worse to be decided against
 # deviance that intervals of 95 % reach, 1.96 sd squared: of chi-square, one degree, 5 %
 WITHIN = 3.8414588206941285
 _IMPOSSIBLE = 36.0  # chi-square of a single frame that nothing explains
+# of the range, below which the tangent holds as far as noise reaches
+_SMALL = 0.005
 _ONE = 1.0  # standard deviations below which two modes are one
 
 # why a fit that does not explain the frames gives no range
@@ -106,9 +108,10 @@ def _modes(problem: FitProblem, answers: Sequence[Answer]) -> tuple[_Modes, Arra
     chi_square = np.empty(0)
     for answer in answers:
         erring, factor = answer.erring, answer.covariance_factor
-        u, deviance = frame_modes(problem if erring is None else erring.clean, answer.x)
+        u, deviance, reach = frame_reaches(problem if erring is None else erring.clean, answer.x)
         if erring is not None and erring.clean.known is not None:
             u = np.column_stack([erring.with_known(column) for column in u.T])
+            reach[(erring.clean.known.rates > 0).any(axis=1)] = 0.0  # more than readings tell it
         noise, told, model, squares = np.full((4, *u.shape), np.nan)
         for k in range(MOST):
             if k > 0 and not np.isfinite(u[:, k]).any():
@@ -133,6 +136,8 @@ def _modes(problem: FitProblem, answers: Sequence[Answer]) -> tuple[_Modes, Arra
                 shared = answer.wider * shared
                 model[:, k] *= answer.wider
                 deviance[:, k] = np.where(np.isfinite(u[:, k]), square, np.inf)
+            bent = noise[:, k] > _SMALL
+            noise[bent, k] = np.fmax(noise[bent, k], reach[bent, k])
             told[:, k] = np.hypot(noise[:, k], shared)
             squares[:, k] = square
         if erring is not None:  # another mode may be the best once the errors are allowed for
