@@ -43,8 +43,8 @@ _START_S, _LOAD_S = 0.4, 0.04
 _LOOK_S = 0.05
 # share of the time of making machine code for which the interpreter may try what is called often
 _HOT = 0.1
-# more elements than the interpreter gets through in such times
-_MANY = 100_000
+# elements beyond which it is not worth trying: less may be a table, of which few rows are asked
+_MANY = 1_000_000
 _AT_ONCE = "KERNELS_COMPILE"
 _lock = threading.RLock()
 _waiting: list[Callable[[], None]] = []

@@ -109,6 +109,18 @@ def test_what_takes_longer_than_compiling_is_compiled_and_nothing_is_done_twice(
     assert counted(out, 10) == 20.0 + 10**8
 
 
+@compiled
+def looked_up(table: Array, row: int) -> float:
+    return float(table[row, 1])
+
+
+def test_a_large_table_is_no_reason_to_compile() -> None:
+    """That of a tracker has 2,049 rows and up to 76 columns; most rows are never asked."""
+    assert looked_up(np.ones((2049, 76)), 7) == 1.0
+    kernel: Any = looked_up
+    assert kernel._dispatcher is None
+
+
 def test_what_would_take_too_long_is_given_up_after_a_few_turns(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
