@@ -252,7 +252,7 @@ MEASURES: dict[str, Callable[[Tree], list[str]]] = {
     "whitening (named so, with a root or an inverse)": whiteners,
     "Jacobian of the readings (slope kernels, or 2 r + c1)": jacobians,
     "opening rows of parameters (crosstalks, backgrounds)": row_loops,
-    "sequential Monte Carlo (files that define *temper*)": _files_defining("temper"),
+    "sequential Monte Carlo (files that define *temper*)": _files_defining("temper(?!ature)"),
     "multistart (files that define find_optima or find_maxima)": _files_defining(
         "^find_(optima|maxima)$"
     ),
