@@ -33,7 +33,7 @@ def simulation() -> Simulation:
             },
         }
     )
-    path = RadialTrajectory(from_m=0.1, to_m=2.0, frames=12, spacing="log")
+    path = RadialTrajectory(from_m=0.1, to_m=2.0, frames=6, spacing="log")
     return simulate(sensor, truth, path, 5)
 
 

@@ -112,7 +112,7 @@ def test_the_bias_of_many_frames_is_measured() -> None:
 def test_ranges_of_all_frames_are_answered(monkeypatch: pytest.MonkeyPatch) -> None:
     """In parts; and a job that was stored in between goes on to the same last bit."""
     sensor = sensor_of("pulsed")
-    n, most = 450, 350  # instead of 600, from which on some hundred stand for all
+    n, most = 300, 240  # instead of 600, from which on some hundred stand for all
     monkeypatch.setattr("inference.posterior.job.MOST_SAMPLED", most)
     monkeypatch.setattr("inference.posterior.job.MOST_AT_ONCE", n // 2)
     frames, ranges = frames_of(sensor, n)

@@ -11,7 +11,7 @@ from tests.posterior.scenes import OBJECT, data, sensor_of
 
 SETTINGS = SamplerSettings(seed=1, method="importance")
 KNOWN = {"c0": OBJECT["c0"], "c1": OBJECT["c1"]}
-FRAMES = data(sensor_of("pulsed", 1e5), frames=12, seed=2, span=(0.3, 1.2)).frames
+FRAMES = data(sensor_of("pulsed", 1e5), frames=6, seed=2, span=(0.3, 1.2)).frames
 
 
 def answer(discrepancy: object, **more: object) -> Posterior:

@@ -353,7 +353,7 @@ def test_a_prior_that_excludes_the_truth_is_named_as_a_misfit(
 ) -> None:
     sensor = sensor_of(kind)
     settings = SamplerSettings(seed=7, target_ess=50)
-    posterior = infer(sensor, parse_scene(scene), data(sensor).frames, settings)
+    posterior = infer(sensor, parse_scene(scene), data(sensor, frames=8).frames, settings)
     assert posterior.drawn
     assert posterior.fit.misfit
     assert any(words in reason and "widen" in reason for reason in posterior.fit.reasons)
