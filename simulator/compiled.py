@@ -202,6 +202,7 @@ class Kernel:
                     self._answer_calls(made)
                     self._below = made
                 compile_at_once = made._compile_for_args
+                from simulator.uncompiled import kind_of
 
                 def compile_now(*args: Any, **kwargs: Any) -> Any:
                     answered = compile_at_once(*args, **kwargs)
@@ -212,7 +213,8 @@ class Kernel:
                 def found(*args: Any) -> Any:
                     if _in_a_hurry():
                         return self._answer_at_once
-                    return self._answer if self._may_try(args) else compile_now(*args)
+                    tried = self._may_try(args, kind_of(args))
+                    return self._answer if tried else compile_now(*args)
 
                 made._compile_for_args = found
                 self._dispatcher = made
@@ -286,15 +288,15 @@ class Kernel:
         cost_s = start_s + make_s
         return cost_s - self._spent_s.get(kind, 0.0)
 
-    def _may_try(self, args: tuple[Any, ...]) -> bool:
-        """Tell whether the interpreter may answer a call."""
+    def _may_try(self, args: tuple[Any, ...], kind: object) -> bool:
+        """Tell whether the interpreter may answer a call of a kind."""
         from simulator import uncompiled
 
         if os.environ.get(_AT_ONCE) == "always" or self in _at_once():
             return False
         if uncompiled.size(args) > _MANY:
             return False
-        return self._left_s(uncompiled.kind_of(args)) > 0.0
+        return self._left_s(kind) > 0.0
 
     def _answer(self, *args: Any, **kwargs: Any) -> Any:
         """Answer a call for which there is no machine code, as far as is known."""
@@ -302,9 +304,9 @@ class Kernel:
 
         if _in_a_hurry():
             return self._answer_at_once(*args, **kwargs)
-        if kwargs or not self._may_try(args):
-            return self.dispatcher(*args, **kwargs)
         kind = uncompiled.kind_of(args)
+        if kwargs or not self._may_try(args, kind):
+            return self.dispatcher(*args, **kwargs)
         spent_s, began = self._spent_s.get(kind, 0.0), time.thread_time()
         try:
             answer, took_s = uncompiled.run(self._function, args, self._left_s(kind))
@@ -322,7 +324,7 @@ class Kernel:
 
         kind = uncompiled.kind_of(args)
         known = kind in self._spent_s and kind not in self._long
-        if kwargs or not known or not uncompiled.free() or not self._may_try(args):
+        if kwargs or not known or not uncompiled.free() or not self._may_try(args, kind):
             raise NotReadyError
         try:
             answer, took_s = uncompiled.run(self._function, args, _QUICK_S)

@@ -211,19 +211,24 @@ def twin(function: Any) -> Callable[..., Any]:
 
 def kind_of(value: Any) -> Any:
     """Return what decides which machine code an argument needs."""
+    kind = type(value)
+    if kind is float:  # nearly all are
+        return kind
+    if isinstance(value, tuple):
+        return kind, *map(kind_of, value)
     if isinstance(value, np.ndarray):
         return value.dtype.char, value.ndim, value.flags.c_contiguous, value.flags.writeable
-    if isinstance(value, tuple):
-        return type(value), *map(kind_of, value)
-    return type(value)
+    return kind
 
 
-def _arrays(values: Any) -> Iterator[np.ndarray[Any, Any]]:
+def _arrays(values: Any) -> list[np.ndarray[Any, Any]]:
+    found: list[np.ndarray[Any, Any]] = []
     for value in values:
-        if isinstance(value, np.ndarray):
-            yield value
-        elif isinstance(value, tuple):
-            yield from _arrays(value)
+        if isinstance(value, tuple):
+            found += _arrays(value)
+        elif isinstance(value, np.ndarray):
+            found.append(value)
+    return found
 
 
 def size(arguments: tuple[Any, ...]) -> int:
