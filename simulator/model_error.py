@@ -41,7 +41,7 @@ class ErrorSizes(Validated):
         Of a smooth error of the effective distance along log r [m].
     shadow : float
         Of the shadow on a background, in units of `simulator.shadow_error.shadow_errors`; single
-        frames and tracks have it, fits, posteriors and simulations do not.
+        frames, tracks and fits have it, posteriors and simulations do not.
     """
 
     flux: NonNegative = 0.0

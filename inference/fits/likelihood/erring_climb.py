@@ -15,9 +15,9 @@ from inference.fits.likelihood.erring_point import (
     standard,
 )
 from inference.fits.likelihood.frame_modes import frame_modes
-from inference.fits.likelihood.model_error import errors_of_readings, left_at_places
+from inference.fits.likelihood.model_error import number_of_errors
 from inference.fits.likelihood.problem import FitProblem
-from inference.fits.likelihood.told import eliminated, with_column
+from inference.fits.likelihood.told import eliminated
 from inference.identifiability.information import Information
 
 __all__ = ["FEW", "begun", "climbed", "held_within_priors", "with_other_ranges"]
@@ -84,10 +84,8 @@ def begun(problem: FitProblem, x: Array, positions: Array) -> Point:
     if problem.known is not None:
         value = np.clip(problem.known.values[:, 0], *problem.support)
         u = np.where(problem.known.rates[:, 0] > 0, np.log(value), u)
-    light = np.ones((u.size, 2))
-    errors = errors_of_readings(problem, light, u), left_at_places(problem, light, u)
-    k = with_column(problem.known, np.concatenate(errors, axis=2)).shape[2]
-    return _settled(problem, _settled(problem, point_at(problem, x, u, np.zeros(k))))
+    none = np.zeros(number_of_errors(problem))
+    return _settled(problem, _settled(problem, point_at(problem, x, u, none)))
 
 
 def climbed(

@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 
 from inference.fits.likelihood.arguments import CROSSTALK, SLOTS
 from inference.fits.likelihood.linearisation import whitened_slopes
-from inference.fits.likelihood.model_error import errors_of_readings, left_at_places, own_share_left
+from inference.fits.likelihood.model_error import (
+    errors_of_readings,
+    left_at_places,
+    own_share_left,
+    shadow_of,
+)
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import Told, told_at, with_column
 from inference.frame.delayed import delayed
@@ -135,9 +140,12 @@ def linearised(
     whitener = by_value[:, :, list(CROSSTALK)]
     signal = by_value[:, :, Value.C2] * values[Value.C2]
     light = np.linalg.solve(whitener, signal[:, :, None])[:, :, 0]
-    errors = errors_of_readings(problem, light, u)
-    smooth = errors.shape[2]
-    errors = whitener @ np.concatenate([errors, left_at_places(problem, light, u)], axis=2)
+    parts = [errors_of_readings(problem, light, u)]
+    smooth = parts[0].shape[2]
+    shadow = shadow_of(problem, values, u)
+    if shadow is not None:
+        parts.append(shadow.columns)
+    errors = whitener @ np.concatenate([*parts, left_at_places(problem, light, u)], axis=2)
     errors = np.where(np.isnan(errors), 0.0, errors)
     if a is not None:
         erring = _Erring(problem, u, a[:smooth], whitener)
@@ -145,6 +153,10 @@ def linearised(
             bare = np.linalg.solve(whitener, by_value[:, :, column, None])
             by_value[:, :, column] += erring.change(np.asarray(bare[:, :, 0], np.float64))
         along = along + erring.change(light, _slope_of_light(problem, values, light, u))
+        if shadow is not None:
+            more, further = shadow.changes(a[smooth : smooth + parts[1].shape[2]])
+            by_value += whitener @ np.nan_to_num(more)
+            along = along + (whitener @ np.nan_to_num(further)[:, :, None])[:, :, 0]
     return (
         residual,
         by_value @ problem.chain(x),

@@ -6,9 +6,18 @@ from numpy.typing import NDArray
 
 from inference.fits.likelihood.problem import FitProblem
 from inference.frame.delayed import delayed
+from inference.frame.shadow_error import ShadowError, shadow_basis, shadow_error
 from simulator.discrepancy import NEGLECTED, discrepancy_basis
 
-__all__ = ["errors_of_readings", "left_at_places", "own_share_left", "share_left", "unexplained"]
+__all__ = [
+    "errors_of_readings",
+    "left_at_places",
+    "number_of_errors",
+    "own_share_left",
+    "shadow_of",
+    "share_left",
+    "unexplained",
+]
 
 Array = NDArray[np.float64]
 
@@ -73,6 +82,34 @@ def _moved(problem: FitProblem, light: Array, positions: Array, functions: Array
     late = delayed(light, positions, problem.instrument.r0, problem.instrument.wave)
     parts = [problem.error.flux * light, problem.error.range_m * late]
     return np.concatenate([part[:, :, None] * functions[:, None, :] for part in parts], axis=2)
+
+
+def shadow_of(problem: FitProblem, values: Array, positions: Array) -> ShadowError | None:
+    """Return the background as errors of its shadow act on it; None where there are none.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem.
+    values : ndarray, shape (SLOTS,)
+        Physical values, readings in the problem's unit.
+    positions : ndarray, shape (n,)
+        log r; nan without an object.
+    """
+    if not problem.shadow_errs:
+        return None
+    at, reach = problem.instrument, problem.parameters.reach_m
+    return shadow_error(values, positions, problem.frames[:, 2], at, reach, problem.error.shadow)
+
+
+def number_of_errors(problem: FitProblem) -> int:
+    """Return how many errors a fit has."""
+    reach = problem.parameters.reach_m
+    own = 2 * discrepancy_basis(*reach).size
+    of_shadow = 2 * shadow_basis(*reach).size if problem.shadow_errs else 0
+    at_places = 0 if problem.places is None else 2 * problem.places.number
+    offset = problem.known is not None and problem.known.offset_sd > 0.0
+    return own + of_shadow + at_places + int(offset)
 
 
 def share_left(problem: FitProblem, positions: Array) -> float:

@@ -99,8 +99,13 @@ class FitProblem:
     @property
     def erring(self) -> bool:
         """Whether an object's model errs, or something is known of it or of ranges."""
-        errs = self.error.flux > 0 or self.error.range_m > 0
+        errs = self.error.flux > 0 or self.error.range_m > 0 or self.shadow_errs
         return bool(self.present.any()) and (errs or self.law or self.known is not None)
+
+    @property
+    def shadow_errs(self) -> bool:
+        """Whether there is a background whose shadow errs."""
+        return self.background is not None and self.error.shadow > 0
 
     @property
     def logarithms(self) -> NDArray[np.bool_]:

@@ -7,10 +7,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inference.fits.likelihood.model_error import errors_of_readings, share_left
+from inference.fits.likelihood.model_error import errors_of_readings, shadow_of, share_left
 from inference.fits.likelihood.problem import fit_problem
 from inference.technique import Task
-from simulator.discrepancy import discrepancy_basis
+from simulator.discrepancy import DiscrepancyBasis, discrepancy_basis
 from simulator.errors import RefusedError
 
 __all__ = ["Follow"]
@@ -19,6 +19,13 @@ Array = NDArray[np.float64]
 
 _NEGLECTED = 1e-3  # of the largest error that the frames show
 _STEP = 1e-3  # standard deviations of an error by which readings are moved
+
+
+def _shown(basis: DiscrepancyBasis, log_r: Array) -> Array:
+    """Return as many errors as the ranges of frames show, two of a kind, as columns of all."""
+    values = basis.values(log_r[np.isfinite(log_r)])
+    _, sizes, turn = scipy.linalg.svd(values, full_matrices=False)
+    return np.asarray(np.kron(np.eye(2), turn[sizes > _NEGLECTED * sizes[0]].T))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -55,16 +62,13 @@ class Follow:
             Where the moved readings are fitted with other frames.
         """
         problem, log_r = fit_problem(task.sensor, task.scene, task.frames), np.log(self.ranges)
-        none = task.exact or problem.error.flux == problem.error.range_m == 0.0
+        none = task.exact or not problem.erring
         if none or np.isnan(log_r).all():
             values, residuals = self.fit(task)
             return np.empty((values.size, 0)), np.empty((residuals.size, 0)), 0.0
         at = np.isfinite(log_r)[:, None]
         light, slopes = np.where(at, self.light, 0.0), np.where(at, self.slopes, 0.0)
-        # as many errors as the ranges of the frames show, of each kind
-        basis = discrepancy_basis(*problem.parameters.reach_m)
-        _, sizes, turn = scipy.linalg.svd(basis.values(log_r[at[:, 0]]), full_matrices=False)
-        turn = np.kron(np.eye(2), turn[sizes > _NEGLECTED * sizes[0]].T)
+        turn = _shown(discrepancy_basis(*problem.parameters.reach_m), log_r)
         steps = _STEP * errors_of_readings(problem, light, log_r) @ turn
         seen = task.frames.derivatives
         rates = np.zeros_like(steps)
@@ -73,6 +77,13 @@ class Follow:
             rate = np.einsum("ni,ni->n", slopes, seen) / np.where(size > 0, size, 1.0)
             moved = errors_of_readings(problem, light, log_r, slopes)
             rates = _STEP * rate[:, None, None] * moved @ turn
+        shadow = shadow_of(problem, problem.layout.known, log_r)
+        if shadow is not None:  # before a known background
+            more = _shown(shadow.basis, log_r)
+            moved = _STEP * problem.unit * shadow.columns @ more
+            steps = np.concatenate([steps, moved], axis=2)
+            rates = np.concatenate([rates, np.zeros_like(moved)], axis=2)
+            turn = scipy.linalg.block_diag(turn, more)
         found: list[list[Array]] = []
         for k in range(steps.shape[2]):
             ends = []

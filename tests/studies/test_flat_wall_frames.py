@@ -1,0 +1,32 @@
+"""Fits over many frames before flat walls are right by default, and not without the shadow's error.
+
+Errors are the disks' own, so that nothing is left to chance but the noise.
+"""
+
+import pytest
+
+from benchmarks.flat_wall_frames import Set, answered, set_of
+from simulator.discrepancy import DISCREPANCY_SD
+from simulator.model_error import RANGE_ERROR_SD
+
+OTHERS = {"flux": DISCREPANCY_SD, "range_m": RANGE_ERROR_SD}
+
+
+def stating(given: Set, discrepancy: object) -> Set:
+    return given._replace(scene={**given.scene, "discrepancy": discrepancy})
+
+
+@pytest.mark.parametrize("number", [2, 6])
+def test_fits_before_a_flat_wall_hold_only_with_the_error_of_its_shadow(number: int) -> None:
+    given = set_of(number, "numbers")
+    default = answered(given, "joint_fit", number)
+    assert default is not None
+    assert not default.flagged
+    assert default.held.mean() > 0.9
+    assert default.off.max() < 3.0
+    without = answered(stating(given, OTHERS), "joint_fit", number)
+    assert without is not None
+    assert without.flagged
+    stated = answered(stating(given, {**OTHERS, "shadow": 0.2}), "joint_fit", number)
+    assert stated is not None
+    assert not stated.flagged
