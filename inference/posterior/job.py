@@ -201,5 +201,5 @@ def _with_error_integrated(scene: Scene, frames: Frames) -> Scene:
     few = len(frames) <= MOST_SAMPLED and scene.motion == "radial"
     if not (few and error.flux > 0) or error.integrated or columns_of(frames).shape[1] <= RANGE:
         return scene
-    sizes = ErrorSizes(flux=error.flux, range_m=error.range_m)
+    sizes = ErrorSizes(flux=error.flux, range_m=error.range_m, shadow=error.shadow)
     return scene.model_copy(update={"discrepancy": sizes})

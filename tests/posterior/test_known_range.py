@@ -10,7 +10,7 @@ from inference.identifiability.before_data import identifiability
 from inference.posterior import fold
 from inference.posterior.calibrated import calibrated_scene
 from inference.posterior.infer import infer
-from inference.posterior.job import Job
+from inference.posterior.job import Job, prepare
 from inference.posterior.sampling.start import climb
 from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames
@@ -37,6 +37,15 @@ def frames(known: dict[int, float], sd: float = 3e-4) -> Frames:
     told = np.full(RANGES.size, np.nan)
     told[list(known)] = list(known.values())
     return dataclasses.replace(seen, known_range_m=told, known_range_sd_m=np.full(told.size, sd))
+
+
+def test_known_ranges_do_not_leave_out_the_shadows_error() -> None:
+    """A scene calibrated with them keeps it for trackers and single frames before the wall."""
+    wall = {"strength": 0.002, "distance_m": 2.5}
+    scene = parse_scene({"crosstalk": SCENE["crosstalk"], "background": wall})
+    ran = prepare(SENSOR, scene, frames({0: 0.3, 8: 0.6}), SETTINGS).scene.model_error
+    assert ran == dataclasses.replace(scene.model_error, integrated=True)
+    assert ran.shadow > 0
 
 
 def foreseen(**known: Any) -> np.ndarray:
