@@ -11,9 +11,9 @@ from benchmarks.samplers.outcome import Outcome, enough, equal, judged
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior import fold
 from inference.posterior.job import Job
+from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.importance import draw_weighted
 from inference.posterior.sampling.proposal import Proposal, mixture_of
-from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.start import Optimum
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.stages.stage import Walking
@@ -56,7 +56,7 @@ def reference(
     pilot = outcome.z[rng.integers(0, len(outcome.z), 20_000)]
     weighted = draw_weighted(
         density,
-        Proposal(mixture_of(optima), fit_map(pilot, reparametrisation_of(density)), 1.0),
+        Proposal(mixture_of(optima), fit_map(pilot, coordinates_of(density)), 1.0),
         rng,
         30_000,
     )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from inference.density.representatives import Representatives
 from inference.posterior.sampling.ensemble import Ensemble
+from inference.posterior.sampling.flux_coordinate import FluxCoordinate
 from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.proposal import Local, Mixture, Proposal
@@ -128,6 +129,7 @@ _PARTS = {
         Decision,
         Ends,
         Ensemble,
+        FluxCoordinate,
         Frames,
         Settled,
         Local,

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.aliases import Aliases, aliases_of
 from inference.posterior.sampling.effort import Effort, Move
-from inference.posterior.sampling.reparametrisation import reparametrisation_of
+from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.transport import TriangularMap, fit_map, straight_map
 
 __all__ = ["Population", "carried", "first_population", "temper"]
@@ -197,7 +197,7 @@ def temper(
     Population
         Its power is 1 when it has arrived.
     """
-    coordinates = reparametrisation_of(density) if effort.unbends else None
+    coordinates = coordinates_of(density) if effort.unbends else None
     population = _resampled(population, effort.size, rng)
     wanted = 1.0 if population.power < _HOT else effort.wanted
     if population.power == 1.0:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy import linalg, optimize, special
 
 from inference.density.collapsed import CollapsedDensity
+from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.importance import (
     MAX_K_HAT,
     Law,
@@ -27,7 +28,6 @@ from inference.posterior.sampling.importance import (
     pareto_k_hat,
 )
 from inference.posterior.sampling.proposal import Local, Mixture, Proposal, completed
-from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.transport import fit_map
 
 __all__ = ["Blend", "Rounds", "in_rounds"]
@@ -227,7 +227,7 @@ def _mixed(each: Array, counts: tuple[int, ...]) -> Array:
 
 
 def _fitted(proposal: Proposal, sample: Array, density: CollapsedDensity) -> Proposal:
-    return dataclasses.replace(proposal, transport=fit_map(sample, reparametrisation_of(density)))
+    return dataclasses.replace(proposal, transport=fit_map(sample, coordinates_of(density)))
 
 
 def _flatter(log_weights: Array, target: Array) -> Array:

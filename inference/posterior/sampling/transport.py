@@ -14,12 +14,14 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.density.triangular import update_factor
+from inference.posterior.sampling.flux_coordinate import FluxCoordinate
 from inference.posterior.sampling.reparametrisation import Reparametrisation
 from simulator.compiled import compiled
 
 __all__ = ["TriangularMap", "fit_map", "straight_map"]
 
 Array = NDArray[np.float64]
+Coordinates = FluxCoordinate | Reparametrisation
 
 _POINTS = 6  # of the sample for every term of a polynomial
 _BEYOND = 1.5  # times the reach of the sample: held to it, moves never widen a sheet too short
@@ -112,8 +114,8 @@ class TriangularMap:
         Coefficients of each coordinate's log scale, at most quadratic.
     cubic : int
         Widest coordinates that have cubic terms in the means.
-    reparametrisation : Reparametrisation or None
-        Applied before all of this; None where nothing is confounded.
+    coordinates : FluxCoordinate, Reparametrisation or None
+        Applied before all of this; None for z itself.
     """
 
     centre: Array
@@ -122,7 +124,7 @@ class TriangularMap:
     means: Array
     scales: Array
     cubic: int
-    reparametrisation: Reparametrisation | None = None
+    coordinates: Coordinates | None = None
 
     @property
     def _log_volume(self) -> float:
@@ -130,8 +132,8 @@ class TriangularMap:
 
     def unbend(self, z: Array) -> tuple[Array, Array]:
         """Return x of shape (n, d) and log |dx/dz| of shape (n,)."""
-        if self.reparametrisation is not None:
-            z = self.reparametrisation.forward(z)
+        if self.coordinates is not None:
+            z = self.coordinates.forward(z)
         # the axes are orthogonal: their inverse is their transpose, rescaled
         inverse = self.axes / np.einsum("ij,ij->j", self.axes, self.axes)
         whitened = np.einsum("nj,jk->nk", z - self.centre, inverse)
@@ -154,9 +156,7 @@ class TriangularMap:
             self.cubic,
         )
         z = self.centre + np.einsum("nk,jk->nj", whitened, self.axes)
-        return (
-            z if self.reparametrisation is None else self.reparametrisation.backward(z)
-        ), log_det
+        return (z if self.coordinates is None else self.coordinates.backward(z)), log_det
 
 
 def _features(w: Array, k: int, quadratic: bool, cubic: int) -> Array:
@@ -212,23 +212,25 @@ def straight_map(draws: Array) -> TriangularMap:
     return TriangularMap(centre, axes, np.zeros((2, d)), nothing, nothing, 0, None)
 
 
-def fit_map(draws: Array, reparametrisation: Reparametrisation | None = None) -> TriangularMap:
+def fit_map(draws: Array, coordinates: Coordinates | None = None) -> TriangularMap:
     """Fit the map that makes a sample nearly standard normal.
 
     Parameters
     ----------
     draws : ndarray, shape (n, d)
         n > d, not all equal; duplicates count as often as they stand there.
-    reparametrisation : Reparametrisation, optional
-        Coordinates that the map starts from.
+    coordinates : FluxCoordinate or Reparametrisation, optional
+        That the map starts from; of a flux, at the range at which the sample tells it best.
 
     Returns
     -------
     TriangularMap
     """
     n, d = draws.shape
-    if reparametrisation is not None:
-        draws = reparametrisation.forward(draws)
+    if isinstance(coordinates, FluxCoordinate):
+        coordinates = coordinates.fitted(draws)
+    if coordinates is not None:
+        draws = coordinates.forward(draws)
     centre, axes = _principal_axes(draws)
     whitened = (draws - centre) @ (axes / np.einsum("ij,ij->j", axes, axes))
     rest = n // _POINTS - math.comb(d + 1, 2)
@@ -251,4 +253,4 @@ def fit_map(draws: Array, reparametrisation: Reparametrisation | None = None) ->
         means[k, : mean.size] = mean
         scales[k, : scale.size] = scale
     bounds = _BEYOND * np.array([whitened.min(axis=0), whitened.max(axis=0)])
-    return TriangularMap(centre, axes, bounds, means, scales, cubic, reparametrisation)
+    return TriangularMap(centre, axes, bounds, means, scales, cubic, coordinates)

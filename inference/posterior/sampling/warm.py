@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
+from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
 from inference.posterior.sampling.proposal import Proposal
-from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.transport import fit_map
 
 __all__ = ["MAP_SHARE", "Warm", "warm_start"]
@@ -89,7 +89,7 @@ def warm_start(
         if even or draws.ess < _LEAST_ESS or turn == _ROUNDS - 1:
             break
         kept = draws.z[rng.choice(n, size=n, p=draws.weights)]
-        transport = fit_map(kept, reparametrisation_of(density))
+        transport = fit_map(kept, coordinates_of(density))
         proposal = dataclasses.replace(proposal, transport=transport, share=MAP_SHARE)
     if draws.ess > _EVEN * n:
         proposal = dataclasses.replace(proposal, share=_FITTING_SHARE)

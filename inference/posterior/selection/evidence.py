@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.effort import effort_of, scouts
+from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.importance import WeightedDraws, draw_weighted
 from inference.posterior.sampling.population import Population, carried
 from inference.posterior.sampling.proposal import Mixture, Proposal, mixture_of
-from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.start import Optimum, climb, find_optima, refine
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.selection.bridge import bridge
@@ -160,7 +160,7 @@ def adapt(laplace: Mixture, pilot: Array, density: CollapsedDensity) -> Mixture 
     """
     if len(np.unique(pilot, axis=0)) < 10 * (pilot.shape[1] + 1):
         return laplace
-    return Proposal(laplace, fit_map(pilot, reparametrisation_of(density)), 1.0)
+    return Proposal(laplace, fit_map(pilot, coordinates_of(density)), 1.0)
 
 
 def resample(weighted: WeightedDraws, rng: np.random.Generator, n: int) -> NDArray[np.intp]:

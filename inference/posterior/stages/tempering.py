@@ -12,8 +12,8 @@ import numpy as np
 from inference.posterior.job import Job
 from inference.posterior.sampling.effort import effort_of
 from inference.posterior.sampling.ensemble import WALKERS
+from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.population import Population, first_population, temper
-from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.rounds import Rounds, in_rounds
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.sampling.verdict import Verdict
@@ -158,7 +158,7 @@ def _walking(
     starts = [np.empty((0, len(density.parameters)))] * count
     if arrived:
         members = [population.z for population in arrived]
-        transport = fit_map(np.concatenate(members), reparametrisation_of(density))
+        transport = fit_map(np.concatenate(members), coordinates_of(density))
         proposal = dataclasses.replace(proposal, transport=transport, share=MAP_SHARE)
         orders = [job.stream(Stream.MEMBERS, k).permutation(len(z)) for k, z in enumerate(members)]
         sharing = -(-(count - 1) // len(members))

@@ -14,8 +14,8 @@ from inference.posterior.sampling.diagnostics import (
     split_r_hat,
 )
 from inference.posterior.sampling.ensemble import Ensemble, advance, restart
+from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.proposal import Proposal
-from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.sampling.verdict import Chains, Verdict, judge
 from inference.posterior.sampling.warm import MAP_SHARE
@@ -122,7 +122,7 @@ def _adapted(job: Job, stage: Walking, kept: Chains) -> Tempering | Walking:
         return Tempering(old, (None,) * POPULATIONS, pending)
     flat = kept.z.reshape(-1, kept.z.shape[-1])
     pilot = flat[np.linspace(0, len(flat) - 1, min(len(flat), _PILOT_DRAWS)).astype(int)]
-    transport = fit_map(pilot, reparametrisation_of(job.density()))
+    transport = fit_map(pilot, coordinates_of(job.density()))
     new = dataclasses.replace(old, transport=transport, share=MAP_SHARE)
     restarted = tuple(restart(ensemble, old, new) for ensemble in stage.ensembles)
     return Walking(new, restarted, pending, stage.adaptations + 1)

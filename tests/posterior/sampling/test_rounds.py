@@ -47,7 +47,7 @@ def _found(share: float, most: int = 12_000, seed: int = 4) -> Rounds:
 
 @pytest.fixture(autouse=True)
 def straight(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rounds, "reparametrisation_of", lambda _: None)
+    monkeypatch.setattr(rounds, "coordinates_of", lambda _: None)
 
 
 def test_a_narrow_second_mode_is_held_by_its_share() -> None:

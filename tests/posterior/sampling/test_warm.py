@@ -42,7 +42,7 @@ def _others(share: float) -> np.ndarray:
 
 @pytest.fixture(autouse=True)
 def straight(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(warm, "reparametrisation_of", lambda _: None)
+    monkeypatch.setattr(warm, "coordinates_of", lambda _: None)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3])
