@@ -21,7 +21,7 @@ from inference.tracking.readings_table import (
     nuisance_root,
     object_at,
 )
-from inference.tracking.roots import UNIT, Root, add_factor, add_root
+from inference.tracking.roots import UNIT, Root, add_factor, add_root, slope_of
 from simulator.compiled import compiled
 
 __all__ = [
@@ -201,10 +201,21 @@ def spread_at(
         As for `_felt_at`, at u.
     """
     i, t = cell_of(u, table)
-    for j in range(X.shape[1] - X.shape[0]):
+    count = X.shape[1] - X.shape[0]
+    square, product = root.r11 * root.r11, root.r11 * root.r21
+    for j in range(count):
         f1, f2 = _felt_at(j, i, t, gain, slopes, X, table)
-        root = add_factor(root, f1, f2)
-    return root
+        square += f1 * f1
+        product += f1 * f2
+    ratio = slope_of(product, square)
+    off = root.r21 - ratio * root.r11
+    rest = root.r22 * root.r22 + off * off
+    for j in range(count):
+        f1, f2 = _felt_at(j, i, t, gain, slopes, X, table)
+        off = f2 - ratio * f1
+        rest += off * off
+    length = math.sqrt(square)
+    return Root(length, ratio * length, math.sqrt(rest))
 
 
 @compiled

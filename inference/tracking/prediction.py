@@ -29,7 +29,7 @@ from inference.tracking.shared_error import certainty, shared_part
 from inference.tracking.square_root import move
 from simulator.compiled import compiled
 
-__all__ = ["born_prior", "predict", "prior_of"]
+__all__ = ["born_prior", "own_prior", "predict", "prior_of"]
 
 Array = NDArray[np.float64]
 
@@ -128,21 +128,12 @@ def _rate_given_u(of: Hypotheses, row: int, precision: float) -> Rate:
 
 @borrowed
 @compiled
-def prior_of(
+def own_prior(
     of: Hypotheses, row: int, gain: float, log_weight: float, table: ReadingsTable
 ) -> Prior:
-    """Return what a hypothesis says of the next frame, as a density of u and the rest given u.
+    """Return what a hypothesis says of the next frame, as `prior_of`, nuisance parameters left out.
 
-    Parameters
-    ----------
-    of, row : Hypotheses, int
-        The hypothesis.
-    gain : float
-        The frame's factor on the sensor's gain.
-    log_weight : float
-        Log of what the density integrates to.
-    table : ReadingsTable
-        The scene.
+    A frame is learnt beside them, so that whoever learns asks for no more.
     """
     x = of.x
     precision = 1.0 / max(variance_of(of, row, U), 1e-300)
@@ -159,15 +150,51 @@ def prior_of(
     rate = Rate(x[row, V], 0.0, 0.0)
     if table.by_rate:
         rate = _rate_given_u(of, row, precision)
-    own = root
-    if of.X.shape[-1] > of.X.shape[1]:
-        _, _, d1, d2 = mean_at(x[row, U], table)
-        root = spread_at(root, x[row, U], gain, (d1, d2), of.X[row], table)
     return Prior(
         Position(False, False, x[row, U], precision, log_scale),
-        Added(offset1, offset2, slope1, slope2, own, root, of.X[row]),
+        Added(offset1, offset2, slope1, slope2, root, root, of.X[row]),
         rate,
         share,
+    )
+
+
+@borrowed
+@compiled
+def prior_of(
+    of: Hypotheses, row: int, gain: float, log_weight: float, table: ReadingsTable
+) -> Prior:
+    """Return what a hypothesis says of the next frame, as a density of u and the rest given u.
+
+    Parameters
+    ----------
+    of, row : Hypotheses, int
+        The hypothesis.
+    gain : float
+        The frame's factor on the sensor's gain.
+    log_weight : float
+        Log of what the density integrates to.
+    table : ReadingsTable
+        The scene.
+    """
+    prior = own_prior(of, row, gain, log_weight, table)
+    if of.X.shape[-1] == of.X.shape[1]:
+        return prior
+    u, added = prior.position.centre, prior.added
+    _, _, d1, d2 = mean_at(u, table)
+    root = spread_at(added.own, u, gain, (d1, d2), of.X[row], table)
+    return Prior(
+        prior.position,
+        Added(
+            added.offset1,
+            added.offset2,
+            added.slope1,
+            added.slope2,
+            added.own,
+            root,
+            added.spread,
+        ),
+        prior.rate,
+        prior.share,
     )
 
 

@@ -14,7 +14,7 @@ from inference.tracking.borrowed import borrowed
 from inference.tracking.hypotheses import CROSSTALK1, CROSSTALK2, Hypotheses, Scratch, U, V
 from inference.tracking.motion import Motion
 from inference.tracking.readings_table import FIRST, SECOND
-from inference.tracking.roots import Root, add_factor, rotation, solve
+from inference.tracking.roots import Root, add_factor, add_factors, rotation, solve
 from simulator.compiled import compiled
 
 __all__ = ["Linear", "move", "triangularise", "update", "update_range"]
@@ -126,7 +126,9 @@ def update(of: Hypotheses, row: int, readings: Linear, scratch: Scratch) -> floa
             f1 = f1 + scratch.nuisance[FIRST, j - n]
             f2 = f2 + scratch.nuisance[SECOND, j - n]
         factors[FIRST, j], factors[SECOND, j] = f1, f2
-        root = add_factor(root, f1, f2)
+        if j < n:
+            root = add_factor(root, f1, f2)
+    root = add_factors(root, factors, n)
     pull1, pull2 = solve(root, residual1, residual2)
     for j in range(m):
         pulls[FIRST, j], pulls[SECOND, j] = solve(root, factors[FIRST, j], factors[SECOND, j])

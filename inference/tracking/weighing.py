@@ -49,7 +49,7 @@ from inference.tracking.merging import prune
 from inference.tracking.modes import Scanned, find_candidates, scanned_for
 from inference.tracking.motion import Rules
 from inference.tracking.places import Places, mass_bound
-from inference.tracking.prediction import born_prior, prior_of
+from inference.tracking.prediction import born_prior, own_prior, prior_of
 from inference.tracking.readings_table import ReadingsTable
 from inference.tracking.unread import add_unread, learn_unread, odd_weight
 from simulator.compiled import compiled
@@ -162,7 +162,7 @@ def _learnt(
     if candidate.parent == NEW:
         prior = born_prior(of, 0.0, model.rules.rate_sd, model.table)
     else:
-        prior = prior_of(of, candidate.parent, frame.gain, 0.0, model.table)
+        prior = own_prior(of, candidate.parent, frame.gain, 0.0, model.table)
     return learn(room.after, row, candidate, frame, prior, model.table, room.scratch)
 
 

@@ -15,7 +15,7 @@ from inference.tracking.motion import Motion, motion_over, presence_over
 from inference.tracking.outliers import log_outlier
 from inference.tracking.places import mass_bound
 from inference.tracking.readings_table import mean_at
-from inference.tracking.roots import Root, add_factor
+from inference.tracking.roots import Root, add_factor, add_factors
 from inference.tracking.settings import Observables, TrackingSettings
 from inference.tracking.square_root import Linear, move, update
 from inference.tracking.tracker import tracker
@@ -40,6 +40,36 @@ def test_add_factor_is_a_root_of_the_sum(
     wanted = lower @ lower.T + np.outer(vector, vector)
     # rounding of squares: relative to the largest of them
     assert np.abs(made @ made.T - wanted).max() <= 1e-14 * max(wanted.max(), 1e-300)
+
+
+@settings(deadline=None)  # the first call compiles
+@given(
+    st.tuples(finite, finite, finite),
+    st.lists(st.tuples(finite, finite), max_size=6),
+    st.integers(0, 2),
+)
+@example((0.0, 0.0, 0.0), [(1e-160, 1.0), (0.0, 1e-160)], 0)  # no square of the first row is left
+@example((1.0, 0.0, 1.0), [(1e6, 1e6), (1e6, -1e6)], 0)
+@example((1.0, 0.0, 1.0), [(1e6, 1e6), (1e6, 1e6)], 0)  # of which one row is the other, nearly
+def test_add_factors_is_the_root_that_rotations_give(
+    root: tuple[float, float, float], columns: list[tuple[float, float]], first: int
+) -> None:
+    factors = np.array(columns).reshape(-1, 2).T.copy()
+    first = min(first, len(columns))
+    new = add_factors(Root(*root), factors, first)
+    one = Root(*root)
+    for a, b in columns[first:]:
+        one = add_factor(one, a, b)
+    # the sign of a row is free where nothing is added
+    made, wanted = (
+        np.array([[r.r11, 0.0], [r.r21, r.r22]]) @ np.array([[r.r11, r.r21], [0.0, r.r22]])
+        for r in (new, one)
+    )
+    assert np.abs(made - wanted).max() <= 1e-14 * max(wanted.max(), 1e-280)
+    if abs(one.r11) > 1e-140:
+        # what of the second row is no multiple of the first: to rounding of the row
+        size = math.hypot(*root[1:], *factors[1, first:])
+        assert abs(abs(new.r22) - abs(one.r22)) <= 1e-14 * max(size, 1e-140)
 
 
 @pytest.mark.parametrize("x", [1e-9, 1e-3, 0.099, 0.101, 1.0, 5.0])
