@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.density.frame_integrals import fill_log_likelihoods
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor, parse_sensor
+from simulator.uncompiled import kind_of
 from tests.posterior.scenes import KINDS, OBJECT, UNKNOWN_CROSSTALK, data, sensor_of
 
 NOTHING = np.empty((1, 0))
@@ -151,3 +153,19 @@ def test_an_absent_term_is_a_term_of_zeros(sensor: Sensor) -> None:
     absent = of(sensor, {}, frames).frame_log_likelihoods(z)
     zeros = of(sensor, {"crosstalk": [0.0, 0.0]}, frames).frame_log_likelihoods(z)
     assert absent == pytest.approx(zeros, rel=1e-12)
+
+
+def test_scenes_with_and_without_crosstalk_share_machine_code(sensor: Sensor) -> None:
+    frames, found = data(sensor).frames, []
+    for scene in ({}, {"crosstalk": UNKNOWN_CROSSTALK}):
+        density = of(sensor, scene, frames)
+        found.append(density.rows(density.parameters.terms(np.zeros((1, len(density.parameters))))))
+    absent, unknown = found
+    assert kind_of(absent) == kind_of(unknown)
+    # and zeros change no bit of what a density without crosstalk says
+    density, z = of(sensor, {}, frames), np.zeros((1, 3))
+    none = absent._replace(crosstalks=None)
+    out = np.empty((1, density.data.blocks))
+    fill_log_likelihoods(out, none, density.data, density.instrument)
+    assert np.array_equal(out[0], density._of_rows(absent, density.data)[0])
+    assert np.isfinite(density.frame_log_likelihoods(z)).all()
