@@ -125,7 +125,7 @@ def estimate_planned(
             refused = found if reason is None else refused
         else:
             served.append(found)
-    chosen = cheapest(result.technique for result in served)
+    chosen = cheapest((result.technique for result in served), sensor, scene)
     todo = None if served else first_step(sensor, scene, frames, choice, refused)
     return Estimates(chosen, tuple(served), tuple(left_out.values()), supposed, todo)
 

@@ -139,7 +139,8 @@ class Estimates:
     Attributes
     ----------
     chosen : str or None
-        Of the techniques that have a result the one of least cost; None if none has one.
+        Of the techniques that have a result the one of least cost (`inference.plan.cheapest`); None
+        if none has one.
     results : tuple of TechniqueResult
         In the order asked for.
     left_out : tuple of LeftOut

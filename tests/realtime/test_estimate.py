@@ -15,8 +15,10 @@ from inference.realtime.registry import TECHNIQUES
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.errors import InvalidInputError
 from simulator.frames import Frames
+from simulator.parameters import parameters_of
 from simulator.scene import parse_scene
 from simulator.sensor import Sensor
+from simulator.simulate import mean_readings
 from tests.realtime.small_scenes import FAR, OBJECT, PRIOR, PULSED, SINE, UNKNOWN, frame, sensor_of
 
 
@@ -37,6 +39,7 @@ from tests.realtime.small_scenes import FAR, OBJECT, PRIOR, PULSED, SINE, UNKNOW
             {"object": OBJECT, "background": FAR, "crosstalk": UNKNOWN},
             "background_cancelling_differential",
         ),
+        ({"background": FAR, "object": OBJECT}, "background_cancelling"),
         ({"background": FAR | {"distance_m": PRIOR}, "object": OBJECT}, "joint_fit"),
         ({"background": FAR | {"shadow": "object"}, "object": OBJECT}, "background_"),
     ],
@@ -52,6 +55,24 @@ def test_plan(scene: dict[str, Any], chosen: str | None) -> None:
         named = {item.name for item in found.left_out} | {found.chosen} - {None}
         assert named == {*ALL_TECHNIQUES, *ELSEWHERE}
         assert all(item.reason for item in found.left_out)
+
+
+@pytest.mark.parametrize(("distance", "chosen"), [(3.0, "cancelling"), (4.5, "intensity")])
+def test_of_two_that_serve_a_wall_the_sharper_is_chosen_where_it_has_one_root(
+    distance: float, chosen: str
+) -> None:
+    scene = parse_scene({"object": OBJECT, "background": FAR | {"distance_m": distance}})
+    terms = parameters_of(SINE, scene).terms(np.zeros((1, 0)))
+    frames = Frames(mean_readings(SINE, terms, np.array([0.8, 1.2, 1.6])))
+    found = estimate(SINE, scene, frames)
+    assert found.chosen == f"background_{chosen}"
+    both = ["background_intensity", "background_cancelling"]
+    named = estimate(SINE, scene, frames, both)
+    assert named.chosen == found.chosen
+    wide, sharp = (result.roots_sd_m[:, 0] for result in named.results)
+    if distance < 4.0:
+        assert (sharp < 0.9 * wide).all()
+        assert {item.name: item.reason for item in found.left_out}[both[0]].endswith("less error")
 
 
 def test_immunity_is_that_of_table_4_1() -> None:
