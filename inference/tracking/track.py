@@ -10,6 +10,7 @@ from inference.posterior.answer.posterior import Posterior
 from inference.tracking.filter import EMPTY, EMPTY_SATURATED, SATURATED, run_filter
 from inference.tracking.hypotheses import TIME, copied
 from inference.tracking.known_range import beyond_support
+from inference.tracking.reasons import REASONS, reason_codes
 from inference.tracking.report import (
     BEST,
     CROSSTALK,
@@ -107,6 +108,13 @@ class Track:
     def sd_m(self) -> Array:
         """Standard deviation of the unique range, else nan; shape (n,) [m]."""
         return np.where(self.status == Status.UNIQUE, self.best_sd_m, np.nan)
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why a frame has the status none, in words; empty where it has another; n of them."""
+        count = np.isfinite(self.hypotheses_m).sum(axis=1, dtype=np.uint8)
+        codes = reason_codes(self.status, self.present, self.outlier, count)
+        return [REASONS[code] for code in codes.tolist()]
 
 
 def step(

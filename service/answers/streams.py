@@ -129,6 +129,7 @@ class StreamLine(pydantic.BaseModel):
     rate_m_s: float | None = None
     misfit: bool | None = None
     latency_s: float | None = None
+    reason: str | None = None
     calibration: CalibrationEvent | None = None
     assumptions: list[str] | None = None
     error: _Error | None = None

@@ -11,6 +11,7 @@ import orjson
 from numpy.typing import NDArray
 
 from inference.estimates import Status
+from inference.tracking.reasons import REASONS, reason_codes
 from service.problems import describe
 from service.streams.laying import Column, json_of, laid
 from service.streams.lines import lines_in
@@ -20,6 +21,10 @@ from simulator.errors import HybridTofError
 __all__ = ["answers_in", "encoded", "error_of", "more_of", "text_of"]
 
 _STATUS = {int(status): status.name.lower().encode() for status in Status}
+_REASON = {
+    code: b',"reason":%b' % orjson.dumps(text) if text else b"" for code, text in enumerate(REASONS)
+}
+_PRESENT, _OUTLIER = 5, 6  # rows of `Said.table`: an object is there, the frame is an outlier
 _FLAGS: dict[int, bytes] = {False: b"false", True: b"true"}
 _HERE = b"%b"  # in what answers have in common, where each has a text of its own
 
@@ -32,9 +37,12 @@ def text_of(said: Said) -> bytes:
         *(said.sequence, said.time_s, _texts_of(said.status, _STATUS), *own[:5], *hypotheses),
         *(*own[5:8], _texts_of(said.misfit, _FLAGS), own[8]),
     ]
+    codes = reason_codes(said.status, said.table[_PRESENT], said.table[_OUTLIER], said.hypotheses)
+    if codes.any():
+        columns.append(_texts_of(codes, _REASON))
     if said.more:
         columns.append([text.encode() for text in said.more])
-    return laid(_fixed(form, bool(said.more)), columns, len(said.sequence))
+    return laid(_fixed(form, bool(codes.any()) + bool(said.more)), columns, len(said.sequence))
 
 
 def _column(row: NDArray[np.float64]) -> Column:
@@ -76,14 +84,15 @@ def _list_of(count: int) -> bytes:
 
 
 @functools.cache
-def _fixed(hypotheses: bytes, more: bool) -> list[bytes]:
+def _fixed(hypotheses: bytes, more: int) -> list[bytes]:
     """Return what answers have in common, before, between and after their own texts."""
     form = (
         b'{"sequence":%b,"time_s":%b,"status":"%b","range_m":%b,"sd_m":%b,'
         b'"sd_parts_m":{"noise":%b,"scene":%b,"model":%b},'
         b'"hypotheses":' + hypotheses + b","
         b'"present":%b,"outlier":%b,"rate_m_s":%b,"misfit":%b,"latency_s":%b'
-        + (b"%b}\n" if more else b"}\n")
+        + _HERE * more
+        + b"}\n"
     )
     return form.split(_HERE)
 

@@ -21,7 +21,7 @@ ANSWERED = frozenset(
     {
         "sequence", "time_s", "status", "range_m", "sd_m", "sd_parts_m", "hypotheses", "present",
         "outlier", "rate_m_s", "misfit", "latency_s", "error", "gap", "dropped",
-        "calibration", "assumptions",
+        "calibration", "assumptions", "reason",
     }
 )  # fmt: skip
 """Members of answers: what comes under these names is not passed through."""

@@ -13,6 +13,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from inference.estimates import Status
+from inference.tracking.reasons import REASONS, reason_codes
 from service.errors import MalformedError
 from service.streams import laying
 from service.streams.answered import answers_in, more_of, text_of
@@ -105,6 +106,10 @@ def obvious(said: Said, at: int) -> bytes:
         "misfit": bool(said.misfit[at]),
         "latency_s": latency,
     }
+    if said.status[at] == Status.NONE:
+        counted = said.hypotheses[at : at + 1]
+        told = np.array([present]), np.array([outlier])
+        answer["reason"] = REASONS[reason_codes(said.status[at : at + 1], *told, counted)[0]]
     text = orjson.dumps(answer, option=orjson.OPT_SERIALIZE_NUMPY)
     return text[:-1] + said.more[at].encode() + b"}" if said.more else text
 
