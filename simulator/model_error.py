@@ -40,8 +40,8 @@ class ErrorSizes(Validated):
     range_m : float
         Of a smooth error of the effective distance along log r [m].
     shadow : float
-        Of the shadow on a background, in units of `simulator.shadow_error.shadow_errors`; single
-        frames, tracks and fits have it, posteriors and simulations do not.
+        Of the shadow on a background, in units of `simulator.shadow_error.shadow_errors`; all
+        answers have it, simulations do not.
     """
 
     flux: NonNegative = 0.0

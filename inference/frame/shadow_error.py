@@ -10,15 +10,19 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.frame.arguments import Instrument
+from inference.frame.arguments import Instrument, instrument_of
 from inference.frame.delayed import delayed
-from inference.frame.sensitivity import Value
+from inference.frame.sensitivity import Sensitivity, Value
+from inference.frame.warmth import circuits
 from simulator.discrepancy import DiscrepancyBasis, discrepancy_basis
 from simulator.object_arrays import quadratics
+from simulator.parameters import Terms
 from simulator.readings import late_share
+from simulator.sensor import Sensor
+from simulator.sensor_unknowns import sensor_at
 from simulator.shadow_error import shadow_errors
 
-__all__ = ["ShadowError", "shadow_basis", "shadow_error"]
+__all__ = ["ShadowError", "shadow_at", "shadow_basis", "shadow_error", "with_shadow_error"]
 
 Array = NDArray[np.float64]
 
@@ -171,3 +175,41 @@ def shadow_error(
         shadow_basis(*reach_m),
         size,
     )
+
+
+def shadow_at(
+    sensor: Sensor,
+    terms: Terms,
+    log_r: Array,
+    gain: Array | None,
+    reach_m: tuple[float, float],
+    size: float,
+) -> ShadowError:
+    """Put the background of a scene behind an object.
+
+    Parameters
+    ----------
+    sensor, terms, log_r, gain
+        As for `inference.frame.sensitivity.sensitivity`; what a delay drifts by is left out.
+    reach_m, size
+        As for `shadow_error`.
+    """
+    assert terms.background is not None  # noqa: S101  # what has a size has a background
+    sensor = sensor_at(sensor, terms)
+    factors, warm = circuits(log_r.size, gain)
+    if terms.drift is not None:
+        factors = factors * (1.0 + terms.drift[0, 0] * warm)
+    values = np.zeros(Value.LOG_RANGE)
+    values[Value.STRENGTH :] = terms.background[0]
+    return shadow_error(values, log_r, factors, instrument_of(sensor), reach_m, size)
+
+
+def with_shadow_error(of: Sensitivity, shadow: ShadowError, a: Array) -> Sensitivity:
+    """Return readings and derivatives with given errors of the shadow, shape (2 functions,)."""
+    by_value, along = shadow.changes(a)
+    scales = shadow.values.copy()
+    scales[Value.SHADOW_C1] = math.sqrt(scales[Value.SHADOW_C0])
+    by_term = of.by_term.copy()
+    by_term[:, :, : Value.LOG_RANGE] += by_value * scales
+    mean = of.mean + shadow.columns @ a
+    return dataclasses.replace(of, mean=mean, by_term=by_term, by_range=of.by_range + along)

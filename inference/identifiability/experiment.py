@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from inference.frame.arguments import Background, RangePrior
 from inference.frame.coordinates import coordinate_slopes
 from inference.frame.sensitivity import Sensitivity, sensitivity, whiteners
+from inference.frame.shadow_error import ShadowError, shadow_at, with_shadow_error
 from inference.identifiability.elimination import eliminate
 from inference.identifiability.information import Information
 from inference.identifiability.scaled_unknowns import ScaledUnknowns
@@ -42,8 +43,11 @@ class Experiment:
         Standard deviation of a smooth error of the object's log flux along log r.
     common_range : bool
         Whether all frames have one unknown range: an object that is known not to move.
+    shadow : float
+        Standard deviation of the errors of a shadow (`inference.frame.shadow_error`); 0: none.
     error : ndarray, shape (k,), optional
-        Coefficients of the flux's error that the readings have; left out: none.
+        Coefficients of the flux's error, and then of the shadow's, that the readings have; left
+        out: none.
     rates : ndarray, shape (n, 2), optional
         One over the standard deviations of what is known of range and displacement of each frame
         beside its readings [1/m], 0 where nothing is; left out: of no frame.
@@ -57,6 +61,7 @@ class Experiment:
     known: tuple[str, ...] = ()
     discrepancy: float | None = None
     common_range: bool = False
+    shadow: float = 0.0
     error: Array | None = None
     rates: Array | None = None
 
@@ -85,7 +90,23 @@ class Experiment:
     @functools.cached_property
     def readings(self) -> Sensitivity:
         """Mean readings and their derivatives."""
-        return sensitivity(self.sensor, self.terms, self.log_r, self.gain, self._flux_error)
+        of = sensitivity(self.sensor, self.terms, self.log_r, self.gain, self._flux_error)
+        if self._wall is None or self.error is None:
+            return of
+        return with_shadow_error(of, self._wall, self.error[self.flux_errors :])
+
+    @functools.cached_property
+    def _wall(self) -> ShadowError | None:
+        """The background as errors of its shadow act on it; None where there are none."""
+        if not self.shadow > 0:
+            return None
+        reach = self.parameters.reach_m
+        return shadow_at(self.sensor, self.terms, self.log_r, self.gain, reach, self.shadow)
+
+    @property
+    def flux_errors(self) -> int:
+        """How many coefficients the flux's error has."""
+        return 0 if self.discrepancy is None else discrepancy_basis(*self.parameters.reach_m).size
 
     @property
     def _flux_error(self) -> tuple[Array, Array] | None:
@@ -95,7 +116,8 @@ class Experiment:
         basis = discrepancy_basis(*self.parameters.reach_m)
         present = np.isfinite(self.log_r)
         at, size = np.where(present, self.log_r, basis.first), self.discrepancy * present
-        return size * (basis.values(at) @ self.error), size * (basis.slopes(at) @ self.error)
+        error = self.error[: basis.size]
+        return size * (basis.values(at) @ error), size * (basis.slopes(at) @ error)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -132,10 +154,16 @@ class Experiment:
 
     @functools.cached_property
     def by_error(self) -> Array:
-        """Derivatives of the readings along the coefficients of the flux's error, (n, 2, k).
+        """Derivatives of the readings along the coefficients of flux's and shadow's error.
 
-        The coefficients are independent and standard normal; there are none without discrepancy.
+        Shape (n, 2, k). The coefficients are independent and standard normal.
         """
+        if self._wall is None:
+            return self._by_flux_error
+        return np.concatenate([self._by_flux_error, self._wall.columns], axis=2)
+
+    @property
+    def _by_flux_error(self) -> Array:
         n = self.log_r.size
         if self.discrepancy is None:
             return np.empty((n, 2, 0))
@@ -161,7 +189,7 @@ class Experiment:
         ndarray, shape (n, 2)
             Along log r; nan for a frame without object.
         ndarray, shape (n, 2, k)
-            Along the coefficients of the flux's error.
+            Along the coefficients of the errors of flux and shadow.
         """
         of = self.readings
         with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):

@@ -112,7 +112,8 @@ def model_response(
     Parameters
     ----------
     experiment : Experiment
-        A draw with its ranges; its ``discrepancy`` is the size of the flux's error.
+        A draw with its ranges; its ``discrepancy`` is the size of the flux's error, its ``shadow``
+        that of the shadow's.
     readings : ndarray, shape (n, 2 or 4)
         Of the frames, and range and displacement [m] where they are known beside them.
     pull : ndarray, shape (rows,), optional
@@ -251,7 +252,7 @@ def curvature_of_response(experiment: Experiment, response: ModelResponse, norma
     """
     e, rows = experiment, ResponseRows(experiment)
     present = np.isfinite(e.log_r)
-    if e.discrepancy is None or not present.any():
+    if not e.by_error.shape[2] or not present.any():
         return 0.0
     of = response
     by = _Point(

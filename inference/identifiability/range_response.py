@@ -1,4 +1,4 @@
-"""How a posterior moves with errors of the effective distance where ranges are known."""
+"""How a posterior moves with an error of its model, others being unknowns as z is."""
 
 import numpy as np
 import scipy
@@ -8,7 +8,7 @@ from inference.identifiability.experiment import Experiment
 from inference.identifiability.model_response import FluxTold
 from inference.identifiability.response_rows import ResponseRows, flux_step
 
-__all__ = ["range_response"]
+__all__ = ["range_response", "shadow_response"]
 
 Array = NDArray[np.float64]
 
@@ -39,11 +39,34 @@ def range_response(
         the error, and with each of k independent standard normal variates, as far as they leave it
         open; and what they tell, of its coefficients.
     """
-    rows = ResponseRows(experiment, size)
+    return _response(ResponseRows(experiment, size), readings)
+
+
+def shadow_response(experiment: Experiment, readings: Array) -> tuple[Array, Array, FluxTold]:
+    """Return the response of a posterior that takes shadows for exact, and the flux for erring.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        A draw with its ranges; its ``discrepancy`` is the size of the flux's error, its ``shadow``
+        that of the shadow's, its ``error`` both at the draw.
+    readings : ndarray, shape (n, 2 or 4)
+        As for `range_response`.
+
+    Returns
+    -------
+    (ndarray, ndarray, FluxTold)
+        As of `range_response`.
+    """
+    return _response(ResponseRows(experiment, followed=experiment.flux_errors), readings)
+
+
+def _response(rows: ResponseRows, readings: Array) -> tuple[Array, Array, FluxTold]:
+    experiment = rows.experiment
     d, known = experiment.z.size, np.zeros(rows.jacobian.shape[2])
     known[:d] = experiment.z
     if experiment.error is not None:
-        known[d:] = experiment.error
+        known[d:] = experiment.error[: known.size - d]
     step = flux_step(rows, rows.residual(readings), -known)
     k = step.across.shape[1]
     spread = np.asarray(scipy.linalg.solve_triangular(step.triangle, np.eye(k)))

@@ -41,10 +41,13 @@ class ResponseRows:
     range_error : float
         Where positive, the errors are those of the effective distance, of this standard deviation
         [m], and the flux's, if there are any, are unknowns behind z.
+    followed : int
+        How many of the experiment's errors, the first, are unknowns behind z.
     """
 
     experiment: Experiment
     range_error: float = 0.0
+    followed: int = 0
 
     @functools.cached_property
     def _all(self) -> _Derivatives:
@@ -64,6 +67,7 @@ class ResponseRows:
         if self.range_error > 0:
             late = self._by_range_error(along.shape[1])
             return _Derivatives(jacobian, late, along, np.concatenate(extra))
+        d += self.followed
         prior = np.concatenate([np.eye(d), *(rows[:, :d] for rows in extra[1:])])
         return _Derivatives(jacobian[:, :, :d], jacobian[:, :, d:], along, prior)
 

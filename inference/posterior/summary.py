@@ -71,7 +71,8 @@ def _left_out(job: Job, selection: Selection | None) -> tuple[LeftOutTerm, ...]:
     if taken_for_crosstalk(scene, job.frames):
         none["background"] += f"; {TAKEN_FOR_CROSSTALK}"
     rows = [LeftOutTerm(term, none[term]) for term, value in absent.items() if value is None]
-    if scene.model_error.flux == scene.model_error.range_m == 0:
+    error = scene.model_error
+    if error.flux == error.range_m == error.shadow == 0:
         rows.append(LeftOutTerm("discrepancy", "the scene states none"))
     if job.sensor.temperature is None and job.frames.temperature_k is not None:
         reason = "temperature_k is given and not used: the sensor states no coefficients"

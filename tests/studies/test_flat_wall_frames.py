@@ -1,4 +1,4 @@
-"""Fits over many frames before flat walls are right by default, and not without the shadow's error.
+"""Fits and posteriors before flat walls are right by default, and not without the shadow's error.
 
 Errors are the disks' own, so that nothing is left to chance but the noise.
 """
@@ -30,3 +30,16 @@ def test_fits_before_a_flat_wall_hold_only_with_the_error_of_its_shadow(number: 
     stated = answered(stating(given, {**OTHERS, "shadow": 0.2}), "joint_fit", number)
     assert stated is not None
     assert not stated.flagged
+
+
+def test_a_posterior_before_a_flat_wall_holds_only_with_the_error_of_its_shadow() -> None:
+    given = set_of(2, "numbers")
+    default = answered(given, "infer", 2)
+    assert default is not None
+    assert not default.flagged
+    assert default.held.mean() > 0.9
+    assert default.off.max() < 3.0
+    exact = answered(stating(given, 0), "infer", 2)
+    assert exact is not None
+    assert exact.off.max() > 10.0
+    assert exact.flagged

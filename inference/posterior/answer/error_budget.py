@@ -1,12 +1,14 @@
 """The error budget of an answer: its draws moved by what the model may be wrong by, and its parts.
 
 A posterior whose scene states no size for the model's error is sampled as if there were none. Then
-every draw is moved by an error of the flux, drawn from what the readings leave of it and followed
-linearly from draws near it (`inference.identifiability.model_response`), and every range by a
-random smooth error of the effective distance; where ranges are known, all by it
+every draw is moved by errors of the flux and of a shadow on a background, drawn from what the
+readings leave of them and followed linearly from draws near it
+(`inference.identifiability.model_response`), and every range by a random smooth error of the
+effective distance; where ranges are known, all by it
 (`inference.posterior.answer.where_known`). Where sizes are stated, the flux's error is
 integrated out already; draws are moved by that of the distance, and by what a flux error twice as
-large would move them.
+large would move them; an error of the shadow moves them with the flux's free to follow
+(`inference.posterior.answer.shadow_beside`).
 """
 
 import dataclasses
@@ -18,6 +20,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
+from inference.density.discrepant import DiscrepantDensity
 from inference.frame.blocks import DISPLACEMENT, RANGE
 from inference.frame.known_range import rates_of
 from inference.frame.warmth import gains_of
@@ -30,6 +33,7 @@ from inference.identifiability.model_response import (
 )
 from inference.posterior.answer.error_parts import ErrorParts
 from inference.posterior.answer.error_shares import error_shares
+from inference.posterior.answer.shadow_beside import shadow_beside
 from inference.posterior.answer.where_known import where_known
 from inference.posterior.criticism.discrepancy_check import LargerDiscrepancy
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
@@ -68,8 +72,8 @@ class ErrorBudget:
     of_z, of_log_r : ErrorParts of ndarray, shape (d,) and (frames,)
         Shares of the standard deviation; their squares add up to one.
     curvature : float
-        What the next order would add to the response to the flux's error, as a share of it, root
-        mean square over ranges and draws; 0 where it was integrated out.
+        What the next order would add to the response to the errors of flux and shadow, as a share
+        of it, root mean square over ranges and draws; 0 where the flux's was integrated out.
     """
 
     z: Array
@@ -168,6 +172,8 @@ def error_budget(
     chosen = np.linspace(0, len(z) - 1, min(count, len(z))).astype(np.intp)
     flux = 0.0 if error.integrated else error.flux
     rates = rates_of(density.frames)
+    shadow = error.shadow if density.parameters.has_background else 0.0
+    integrated = isinstance(density, DiscrepantDensity)
     experiments = [
         Experiment(
             density.sensor,
@@ -176,6 +182,7 @@ def error_budget(
             log_r[i],
             gains_of(density.frames),
             discrepancy=flux or None,
+            shadow=0.0 if integrated else shadow,
             common_range=job.scene.motion == "static",
             rates=rates,
         )
@@ -183,9 +190,10 @@ def error_budget(
     ]
     readings = density.frames[:, [0, 1] if rates is None else [0, 1, RANGE, DISPLACEMENT]]
     responses = [model_response(each, readings) for each in experiments]
-    curvature = _curvature(experiments, responses, rng) if flux > 0 else 0.0
+    erring = responses[0].parameters.shape[1] > 0
+    curvature = _curvature(experiments, responses, rng) if erring else 0.0
     pull = common_pull(responses)
-    further = flux > 0 and job.scene.motion != "static"
+    further = erring and job.scene.motion != "static"
     if further and (curvature > _STRAIGHT or pull.any()):
         fewer = slice(None, None, _THINNED)
         chosen, experiments = chosen[fewer], experiments[fewer]
@@ -212,6 +220,11 @@ def error_budget(
         moved = _range_error(density, log_r[chosen], responses, error.range_m)
         by_z.append(np.zeros((*z[chosen].shape, moved.shape[2])))
         by_log_r.append(moved)
+    if isinstance(density, DiscrepantDensity) and shadow > 0:
+        follow = shadow_beside(density, experiments, readings, shadow)
+        for by, moved in zip((by_z, by_log_r), follow, strict=True):
+            by[0] = by[0] + moved[:, :, :1]
+            by.append(moved[:, :, 1:])
     if sensitivity is not None:
         by_z.append(np.broadcast_to(sensitivity.of_z[:, None], (*z[chosen].shape, 1)))
         moved = np.broadcast_to(sensitivity.of_log_r[:, None], (*log_r[chosen].shape, 1))

@@ -22,7 +22,7 @@ class ErrorParts:
     scene : ndarray, shape (n,)
         Of what all frames share and is not known, and of what rests on the law of the ranges.
     model : ndarray, shape (n,)
-        Of the errors of flux and effective distance that the scene allows for.
+        Of the errors of flux, effective distance and shadow that the scene allows for.
     """
 
     noise: Array

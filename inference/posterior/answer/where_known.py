@@ -53,7 +53,7 @@ def where_known(
     if isinstance(density, DiscrepantDensity):
         centres, factors = density.expansions(z)
         experiments = [
-            dataclasses.replace(each, discrepancy=density.discrepancy, error=of)
+            dataclasses.replace(each, discrepancy=density.discrepancy, error=of, shadow=0.0)
             for each, of in zip(experiments, centres, strict=True)
         ]
         square += float(np.square(centres).sum())

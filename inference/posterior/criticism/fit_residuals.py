@@ -11,6 +11,8 @@ from inference.density.discrepant import DiscrepantDensity, with_discrepancy
 from inference.density.static import StaticDensity
 from inference.density.whitened import Whitened, whitened
 from inference.frame.known_range import beside, free_of_range, rates_of
+from inference.frame.shadow_error import shadow_at
+from inference.frame.warmth import gains_of
 from inference.posterior.answer.replicate import replicate_frames
 from inference.posterior.job import Job
 
@@ -100,8 +102,8 @@ def fit_residuals(
 
     Replicates are made at the parameters z and the best ranges for them. Frames and replicates
     alike get their best ranges, and z moves by one Gauss-Newton step towards each of them, held by
-    the prior's unit scale: what parameters can follow is no misfit, nor is an error of the flux
-    that the scene allows for.
+    the prior's unit scale: what parameters can follow is no misfit, nor is an error of flux or
+    shadow that the scene allows for.
 
     Parameters
     ----------
@@ -134,7 +136,14 @@ def fit_residuals(
         # the error's coefficients, whose prior has unit scale too, are fitted like parameters
         functions = density.functions_at(seen)[0]
         own = np.concatenate([own, at.signal[:n, :, None] * functions[:, None, :]], axis=2)
-        d = own.shape[2]
+    of_flux = own.shape[2]
+    shadow = job.scene.model_error.shadow
+    if density.parameters.has_background and shadow > 0:
+        gains, reach = gains_of(density.frames), density.parameters.reach_m
+        terms = density.parameters.terms(z[None])
+        behind = shadow_at(density.sensor, terms, seen, gains, reach, shadow)
+        own = np.concatenate([own, at.whitener[:n] @ behind.columns], axis=2)
+    d = own.shape[2]
     rows = np.concatenate(
         [
             np.einsum("ni,nid->nd", at.across[:n], own)[present],
@@ -156,7 +165,7 @@ def fit_residuals(
     squared[:, ~present] = rest[:, : n - count]
     squared[:, told] += rest[:, n - count :]
     order = np.argsort(seen[present])
-    error = np.square(found[:, of_z:]).sum(axis=1)
+    error = np.square(found[:, of_z:of_flux]).sum(axis=1)
     return FitResiduals(fitted[:, :count][:, order], squared, seen[present][order], error)
 
 
