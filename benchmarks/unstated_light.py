@@ -1,4 +1,4 @@
-"""Light that a scene does not state: crosstalk that drifts, a second object that rests, a wall.
+"""Light that a scene does not state: crosstalk that drifts, a second object, a wall, a tilt.
 
 Five empty frames come first, or come first and last, of 30 frames of a disk of 15 cm radius from
 0.25 to 1.8 m behind unknown crosstalk; the noise is 1/300 of the median light. A table says how far
@@ -55,6 +55,8 @@ def one(
     last: bool = False,
     second: bool = False,
     wall: bool = False,
+    tilt: float = 0.0,
+    relative: float = 0.0,
 ) -> Outcome:
     """Fit one set.
 
@@ -72,10 +74,17 @@ def one(
         Whether a disk of 10 cm radius rests at 1.5 m wherever the object is there.
     wall : bool
         Whether a wall of 3 m radius stands at 3 m, which empty frames show.
+    tilt : float
+        By how much the disk turns to and fro, half a time on its way [degrees]: of a small diffuse
+        surface the light follows the square of the cosine.
+    relative : float
+        Error of the signal that is stated.
     """
     rng = np.random.default_rng(seed)
     z = np.geomspace(0.25, 1.8, _FRAMES)
     r, flux = disk(z, 0.15, 0.6)
+    turned = np.radians(tilt) * np.sin(np.linspace(0.0, np.pi, _FRAMES) + seed)
+    flux = flux * np.cos(turned) ** 2
     light = readings(kind, r, flux)
     if second:
         light = light + readings(kind, *disk(np.array([1.5]), 0.1, 0.5))
@@ -98,7 +107,9 @@ def one(
     timing: dict[str, Any] = (
         {"pulse_width_s": _PULSE_S} if kind == "pulsed" else {"frequency_hz": _FREQUENCY_HZ}
     )
-    sensor = parse_sensor({"kind": kind, **timing, "noise": {"read": [sd, sd]}})
+    sensor = parse_sensor(
+        {"kind": kind, **timing, "noise": {"read": [sd, sd], "relative": relative}}
+    )
     prior = {"prior": "halfnormal", "sd": 3 * median}
     if kind != "pulsed":
         prior = {"prior": "normal", "mean": 0.0, "sd": 3 * median}
@@ -133,6 +144,11 @@ def main() -> None:
         print(row(f"second object, {kind}", found), flush=True)
         found = [one(kind, seed, wall=True) for seed in sets]
         print(row(f"a wall at 3 m, {kind}", found), flush=True)
+        for relative in (0.0, 0.2):
+            for tilt in (25.0, 40.0):
+                found = [one(kind, seed, tilt=tilt, relative=relative) for seed in sets]
+                told = f", noise.relative {relative:g}" if relative else ""
+                print(row(f"tilts by {tilt:g} degrees, {kind}{told}", found), flush=True)
 
 
 if __name__ == "__main__":
