@@ -24,7 +24,8 @@ _DIGITS = 15
 # a rounding has the standard deviation of its step over sqrt(12); noise below a tenth of that is
 # nothing beside it
 _SMALL = 0.1 / math.sqrt(12.0)
-_SLOW_S = 10.0  # whole numbers in such steps are milliseconds, or nobody is in a hurry
+_SLOW_S = 10.0  # whole numbers in such steps are milliseconds, or nobody is in a hurry;
+_MINUTE_S = 60.0  # in whole minutes it is the latter
 _EPOCH_S = 1e11  # the year 5138
 
 
@@ -100,5 +101,5 @@ def _of_times(time_s: Array) -> Iterator[str]:
         yield f"time_s holds {time_s[0]:.15g}: are these milliseconds?"
     elif time_s.size >= _FEWEST and np.array_equal(time_s, np.round(time_s)):
         step = float(np.median(np.abs(np.diff(time_s))))
-        if step >= _SLOW_S:
+        if step >= _SLOW_S and step % _MINUTE_S:
             yield f"time_s holds whole numbers in steps of {step:g}: are these milliseconds?"

@@ -57,10 +57,15 @@ def nuisance_of(
     origin = np.zeros(len(names))
     if posterior is None:
         if free:
+            differs = (
+                "; of objects that differ, state the numbers of one and as `discrepancy.flux` how "
+                "far others are from it (0.7: half to twice the light)"
+            )
             raise RefusedError(
                 f"{', '.join(free)} unknown: a tracker needs numbers or a posterior; calibrate the "
                 "scene first (hybridtof calibrate, or a posterior of frames of this scene), or "
                 "let the stream learn it (--calibrate, over HTTP `calibrate`)"
+                + (differs if "object.c2" in free else "")
             )
         steps = np.eye(len(names))[[names.index(name) for name in told]]
         near = parameters.natural(np.concatenate([origin[None], steps, -steps]))

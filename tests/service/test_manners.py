@@ -212,6 +212,16 @@ def test_doubts(
     assert Said(capsys, "estimate", path, "--scene", scene, "--quiet").err == ""
 
 
+def test_frames_in_steps_of_minutes_are_not_doubted(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """A sensor in a tank, that reads once a minute."""
+    columns = {"i": [0.41, 0.42, 0.44, 0.45, 0.47, 0.48], "q": [0.11, 0.12, 0.13, 0.14, 0.15, 0.16]}
+    path = written(tmp_path / "f.json", columns | {"time_s": [60 * k for k in range(6)]})
+    scene = written(tmp_path / "s.json", {"sensor": SINE_WAVE, "scene": SCENE})
+    assert Said(capsys, "estimate", path, "--scene", scene).err == ""
+
+
 def test_a_pulse_of_100_s_is_doubted(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     system = {"sensor": SENSOR | {"pulse_width_s": 100.0}, "scene": SCENE}
     said = Said(capsys, "identifiability", "--scene", written(tmp_path / "s.json", system),

@@ -73,7 +73,7 @@ def test_a_state_belongs_to_its_tracker() -> None:
     ("scene", "settings", "match"),
     [
         ({}, {}, "object.c0"),
-        ({"object": {"c0": 0.1, "c1": 0.0}}, {}, "object.c2"),
+        ({"object": {"c0": 0.1, "c1": 0.0}}, {}, "object.c2 unknown.*discrepancy.flux"),
         ({**PLATE, "motion": "tangential"}, {}, "tangential"),
         ({**PLATE, "crosstalk": {"values": [0.0, 0.0], "optional": True}}, {}, "optional"),
         ({"object": PLATE["object"], "background": {**FOLDED["background"], "shadow": {
