@@ -17,7 +17,7 @@ def test_stated_differences_keep_tracks_right() -> None:
     for number in range(TRACKS):
         rng = np.random.default_rng([1, number])
         off, _, _ = frames_off(random_visit(rng, KINDS[number % 2], 0.3), 0.7)
-        answered += np.count_nonzero(np.isfinite(off))
-        lost += np.count_nonzero(np.abs(off) > 5.0) > 2
+        answered += int(np.count_nonzero(np.isfinite(off)))
+        lost += int(np.count_nonzero(np.abs(off) > 5.0) > 2)
     assert lost <= 1
     assert answered > 0.95 * TRACKS * 300
