@@ -51,6 +51,11 @@ def wrong(rows: Rows) -> list[dict[str, str]]:
     ]
 
 
+def random_tables(folder: Path) -> list[Path]:
+    """Return the tables of random scenes; not those of random walks."""
+    return sorted(folder.glob("random-[0-9]*.csv"))
+
+
 HEAD = (
     "| class | sets | converged | ranges | parameters, identified | parameters, all "
     f"| ranges, unconverged too | beyond {FAR:g} sd |\n|---|---|---|---|---|---|---|---|"
@@ -102,7 +107,7 @@ def main() -> None:
             if rows:
                 print(summary(f"before: {light}", rows))
         print(summary("all", [row for rows in of_law.values() for row in rows]))
-    for table in sorted(TABLES.glob("random-*.csv")):
+    for table in random_tables(TABLES):
         rows = rows_of(table)
         print(f"\nRandom scenes of {table.stem}\n", HEAD, summary("random", rows), sep="\n")
         for row in wrong(rows):

@@ -1,10 +1,12 @@
 """Coverage over classes of paths: data sets, rows and tables of the study."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from benchmarks.coverage.path_rows import COLUMNS, row_of
-from benchmarks.coverage.path_study import summary, wrong
+from benchmarks.coverage.path_study import random_tables, summary, wrong
 from benchmarks.coverage.paths import LIGHT, PATHS, TOLD, draw_path, random_scene
 from inference.posterior.settings import SamplerSettings
 from simulator.parameters import parameters_of
@@ -60,3 +62,9 @@ def test_a_row_holds_what_the_posterior_says() -> None:
     assert wrong([far, far | {"misfit": "1"}, far | {"converged": "0"}]) == [far]
     lost = dict.fromkeys(COLUMNS, "") | {"converged": "0"}
     assert summary("all", [far, lost]).startswith("| all | 2 | 1 |")
+
+
+def test_a_random_walk_is_no_table_of_random_scenes(tmp_path: Path) -> None:
+    for name in ("random-17.csv", "random-walk-crosstalk-nothing.csv"):
+        (tmp_path / name).touch()
+    assert random_tables(tmp_path) == [tmp_path / "random-17.csv"]
