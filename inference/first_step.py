@@ -102,6 +102,9 @@ def _more_frames(
             return f"{step}, send them along, and {_POSTERIOR}"
         if needed > objects:
             return f"{step} and {more}, and send them together: {_FIT} then serves"
+        if refused is not None:  # of its own accord: nothing says that light was all it lacked
+            again = f"ask {_FIT} again" if refused.name == _FIT else f"ask {_FIT}"
+            return f"{step}, send them along and {again}: {refused.name} says that {refused.reason}"
         return f"{step} and send them along: {_FIT} then serves"
     if served and needed > objects:
         return f"take {more}, and send them together: {_FIT} then serves"

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from inference.estimate import estimate
+from inference.estimates import LeftOut
+from inference.first_step import first_step
 from inference.plan import plan
 from simulator.frames import Frames
 from simulator.scene import parse_scene
@@ -76,6 +78,19 @@ def test_what_else_there_is_to_do(
     if "time_s" in words:
         timed = Frames(np.full((3, 2), 0.01), time_s=np.arange(3.0))
         assert plan(sensor, parsed, timed).chosen == "differential"
+
+
+def test_no_success_is_promised_of_a_fit_that_has_refused() -> None:
+    """Crosstalk that drifts in a tank, say: with empty frames it refuses as before."""
+    sensor, scene, of = (
+        parse_sensor(SENSORS["pulsed"]),
+        parse_scene({"crosstalk": LEAK}),
+        frames(12),
+    )
+    refused = LeftOut("joint_fit", "the search stopped")
+    found = first_step(sensor, scene, of, plan(sensor, scene, of), refused)
+    assert found.startswith("take 5 frames without the object")
+    assert found.endswith("ask joint_fit again: joint_fit says that the search stopped")
 
 
 def test_a_sensor_that_is_not_calibrated_is_to_be_calibrated() -> None:
