@@ -36,6 +36,8 @@ __all__ = [
 Array = NDArray[np.float64]
 
 OWN = len(reasons_of())
+# zeta of objects with c1 >= -0.648 sqrt(c0), all of Appendix B (docs/model.md, eq-4-19)
+_LEAST, _MOST = 0.485, 0.754
 _REASONS = reasons_of(
     *DERIVATIVE_REASONS,
     "the readings do not change",
@@ -197,15 +199,15 @@ def _without_folds(roots: Array, sd: Array) -> Candidates:
 
 
 def _bounds(task: Task, targets: Targets, high: float) -> tuple[Array, Array]:
-    """Bounds of the range for a power law between -2 and -4 (zeta in [1/2, 3/4]), each (n,)."""
+    """Bounds of the range for objects whose zeta lies within `_LEAST` and `_MOST`, each (n,)."""
     with np.errstate(all="ignore"):
         if isinstance(task.sensor, PulsedSensor):
             q = targets.top / targets.bottom
-            near, far = q / 0.75, q / 0.5
+            near, far = q / _MOST, q / _LEAST
         else:
-            # exactly: psi = k r - atan(k r / N) with N between 2 and 4
+            # exactly: psi = k r - atan(k r / N) with N = 1 / (1 - zeta)
             k = task.sensor.wave_number
-            near, far = _turn_of(targets.top, 4.0) / k, _turn_of(targets.top, 2.0) / k
+            near, far = (_turn_of(targets.top, 1.0 / (1.0 - z)) / k for z in (_MOST, _LEAST))
         far = np.minimum(far, high)
         good = (near > 0) & (near <= far)
         if task.physical:
