@@ -13,9 +13,11 @@ from inference.tracking.state import TrackState
 from inference.tracking.unsteady import first_unsteady
 from simulator.scene import Scene
 
-__all__ = ["first_state"]
+__all__ = ["crosstalk_bounds", "first_state"]
 
 Array = NDArray[np.float64]
+
+_BEYOND = 4.0  # standard deviations, beyond which crosstalk lies once in 16,000
 
 
 def first_state(
@@ -71,6 +73,37 @@ def first_state(
     if steady:
         numbers += first_unsteady(directions)
     return TrackState(Hypotheses(x, X, weight, np.array(numbers)))
+
+
+def crosstalk_bounds(
+    scene: Scene, settings: TrackingSettings, untold: tuple[bool, bool]
+) -> Array | None:
+    """Return between what learnt crosstalk is as its prior says, but for once in 16,000.
+
+    Of a law that is not normal, also as far as the normal law reaches by which it is learnt.
+
+    Parameters
+    ----------
+    scene, settings, untold : Scene, TrackingSettings, (bool, bool)
+        As for `first_state`.
+
+    Returns
+    -------
+    ndarray, shape (2, 2), or None
+        Least and largest of either reading [reading units], infinite where no prior tells it; None
+        where none does, and where the crosstalk is stated to drift: it may then go anywhere.
+    """
+    values = scene.crosstalk_values
+    if values is None or not any(untold) or settings.crosstalk_drift is not None:
+        return None
+    bounds = np.tile([-math.inf, math.inf], (2, 1))
+    for k, value in enumerate(values):
+        if untold[k] and not isinstance(value, float | int):
+            from_normal = value.distribution().from_normal
+            mean, sd = _moments(from_normal)
+            low, high = from_normal(np.array([-_BEYOND, _BEYOND])).tolist()
+            bounds[k] = min(low, mean - _BEYOND * sd), max(high, mean + _BEYOND * sd)
+    return bounds
 
 
 def _moments(from_normal: Any) -> tuple[float, float]:

@@ -10,13 +10,13 @@ from inference.posterior.answer.posterior import Posterior
 from inference.tracking.filter import EMPTY, EMPTY_SATURATED, SATURATED, run_filter
 from inference.tracking.hypotheses import TIME, copied
 from inference.tracking.known_range import beyond_support
+from inference.tracking.misfit import misfits
 from inference.tracking.reasons import REASONS, reason_codes
 from inference.tracking.report import (
     BEST,
     CROSSTALK,
     HYPOTHESES,
     HYPOTHESIS_COLUMNS,
-    LASTING,
     MODEL_SD,
     OUTLIER,
     POSITION,
@@ -28,7 +28,6 @@ from inference.tracking.report import (
     SD,
     STATUS,
     SURPRISE,
-    UNSTEADY_MEAN,
     WEIGHT,
 )
 from inference.tracking.settings import TrackingSettings
@@ -71,8 +70,8 @@ class Track:
     surprise : ndarray, shape (n,)
         Running mean of the normalised innovation squared per reading: 1 where all is as modelled.
     misfit : ndarray of bool, shape (n,)
-        Whether it, jumps or what lasts beside the curve are above what chance allows: scene, noise
-        or motion are not as stated.
+        Whether it, jumps or what lasts beside the curve are above what chance allows, or learnt
+        crosstalk is far from its prior: scene, noise or motion are not as stated.
     hypotheses_m, hypotheses_sd_m, hypotheses_weight : ndarray, shape (n, k)
         All ranges by ascending order, padded with nan [m].
     crosstalk, crosstalk_sd : ndarray, shape (n, 2), optional
@@ -275,7 +274,6 @@ def _track(model: Tracker, out: Array, rows: Array) -> Track:
     range_m, ranges = np.exp(out[:, BEST + POSITION]), np.exp(rows[:, :, POSITION])
     sd, scene, error = (out[:, BEST + column] for column in (SD, SCENE_SD, MODEL_SD))
     added = model.added(out[:, BEST + POSITION])
-    limits = model.limits
     return Track(
         status=out[:, STATUS].astype(np.uint8),
         present=out[:, PRESENT].copy(),
@@ -291,9 +289,7 @@ def _track(model: Tracker, out: Array, rows: Array) -> Track:
         weight=out[:, BEST + WEIGHT].copy(),
         outlier=out[:, OUTLIER].copy(),
         surprise=out[:, SURPRISE].copy(),
-        misfit=(out[:, SURPRISE] > limits.surprise)
-        | (out[:, UNSTEADY_MEAN] > limits.unsteady)
-        | (out[:, LASTING] > limits.lasting),
+        misfit=misfits(out, model.limits, crosstalk, model.crosstalk_bounds),
         hypotheses_m=ranges,
         hypotheses_sd_m=ranges * np.hypot(rows[:, :, SD], model.added(rows[:, :, POSITION])),
         hypotheses_weight=rows[:, :, WEIGHT].copy(),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from inference.frame.arguments import prior_of
 from inference.posterior.answer.posterior import Posterior
-from inference.tracking.first_state import first_state
+from inference.tracking.first_state import crosstalk_bounds, first_state
 from inference.tracking.hypotheses import WITHOUT_CROSSTALK, Hypotheses
 from inference.tracking.model_error import sd_by_derivatives, sd_by_table
 from inference.tracking.motion import Rules
@@ -66,6 +66,8 @@ class Tracker:
     crosstalk : (float, float)
         Its best value before any frame [reading units]: what is not turned with the light where the
         sensor's delay follows its temperature.
+    crosstalk_bounds : ndarray, shape (2, 2), optional
+        Least and largest that learnt crosstalk is as its prior says [reading units].
     """
 
     sensor: Sensor
@@ -76,6 +78,7 @@ class Tracker:
     first: TrackState
     added_sd: Array | None = None
     crosstalk: tuple[float, float] = (0.0, 0.0)
+    crosstalk_bounds: Array | None = None
 
     def added(self, positions: Array) -> Array:
         """Return that standard deviation at given log r; 0 where the filter carries everything."""
@@ -197,7 +200,8 @@ def tracker(
     by_table = sd_by_table(knots, observed.by_rate)
     if by_table is not None:
         added = by_table if added is None else np.hypot(added, by_table)
-    return Tracker(sensor, settings, observed, model, limits, first, added, static)
+    bounds = crosstalk_bounds(scene, settings, by_prior) if learns else None
+    return Tracker(sensor, settings, observed, model, limits, first, added, static, bounds)
 
 
 def _check(sensor: Sensor, scene: Scene, settings: TrackingSettings) -> None:

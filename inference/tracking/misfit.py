@@ -1,0 +1,34 @@
+"""Which frames say that scene, noise or motion are not as stated."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.tracking.report import LASTING, SURPRISE, UNSTEADY_MEAN
+from inference.tracking.rules import MisfitLimits
+
+__all__ = ["misfits"]
+
+Array = NDArray[np.float64]
+
+
+def misfits(
+    out: Array, limits: MisfitLimits, crosstalk: Array | None, bounds: Array | None
+) -> NDArray[np.bool_]:
+    """Tell of each frame whether a running mean, or learnt crosstalk, is beyond what may be.
+
+    Parameters
+    ----------
+    out : ndarray, shape (n, `REPORT_COLUMNS`)
+        The kernel's report.
+    limits : MisfitLimits
+        Of its running means.
+    crosstalk : ndarray, shape (n, 2), or None
+        What was learnt [reading units].
+    bounds : ndarray, shape (2, 2), or None
+        Least and largest that it is as its prior says [reading units].
+    """
+    misfit = out[:, SURPRISE] > limits.surprise
+    misfit |= (out[:, UNSTEADY_MEAN] > limits.unsteady) | (out[:, LASTING] > limits.lasting)
+    if crosstalk is not None and bounds is not None:
+        misfit |= ((crosstalk < bounds[:, 0]) | (crosstalk > bounds[:, 1])).any(axis=1)
+    return misfit
