@@ -37,7 +37,7 @@ KINDS: tuple[dict[str, Any], ...] = (
     {"kind": "sine_wave", "frequency_hz": 2e7},
 )
 STEP_S, COUNT = 0.04, 300
-SPREADS = (0.1, 0.3, 0.5)
+SPREADS = (0.0, 0.1, 0.3, 0.5)
 FLUXES = (None, 0.3, 0.5, 0.7)
 FAR = 5.0
 
