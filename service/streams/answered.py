@@ -37,12 +37,14 @@ def text_of(said: Said) -> bytes:
         *(said.sequence, said.time_s, _texts_of(said.status, _STATUS), *own[:5], *hypotheses),
         *(*own[5:8], _texts_of(said.misfit, _FLAGS), own[8]),
     ]
-    codes = reason_codes(said.status, said.table[_PRESENT], said.table[_OUTLIER], said.hypotheses)
-    if codes.any():
+    none = Status.NONE in said.status.tolist()  # few batches need reasons
+    if none:
+        present, outlier = said.table[_PRESENT], said.table[_OUTLIER]
+        codes = reason_codes(said.status, present, outlier, said.hypotheses)
         columns.append(_texts_of(codes, _REASON))
     if said.more:
         columns.append([text.encode() for text in said.more])
-    return laid(_fixed(form, bool(codes.any()) + bool(said.more)), columns, len(said.sequence))
+    return laid(_fixed(form, none + bool(said.more)), columns, len(said.sequence))
 
 
 def _column(row: NDArray[np.float64]) -> Column:
