@@ -52,6 +52,7 @@ class Expected(NamedTuple):
     # expected readings
     mean1: float
     mean2: float
+    spread: float  # root of the determinant of their covariance
     noise: Root  # of their noise's covariance
 
 
@@ -99,7 +100,7 @@ def expect_empty(
     pull1, pull2 = solve(root, e1, e2)
     surprise = e1 * pull1 + e2 * pull2
     log_density = -0.5 * surprise - math.log(root.r11 * root.r22)
-    return Expected(log_density, surprise, m1, m2, noise)
+    return Expected(log_density, surprise, m1, m2, root.r11 * root.r22, noise)
 
 
 @borrowed
@@ -153,7 +154,7 @@ def weigh_empty(
         Overwritten.
     """
     expected = expect_empty(of, frame, table, empty, scratch.nuisance)
-    strange = log_outlier(frame, expected.mean1, expected.mean2, table, rules)
+    strange = log_outlier(frame, (expected.mean1, expected.mean2, expected.spread), table, rules)
     if frame.known_rate > 0.0:
         return Empty(NEVER, NEVER, NEVER, strange, expected.surprise)
     log_usual, log_odd = math.log1p(-rules.outlier), math.log(rules.outlier)

@@ -26,8 +26,8 @@ class Rules(NamedTuple):
     drift1: float
     drift2: float
     outlier: float  # probability that a frame's readings have nothing to do with the scene
-    # width of the Cauchy law that such readings follow around what was expected, in units of the
-    # noise
+    # least width of the Cauchy law that such readings follow around what was expected, in units of
+    # the noise
     breadth: float
     log_negligible: float  # log weight below which a hypothesis is dropped
     # information lost, in nats per weight of the lighter one, below which two hypotheses merge

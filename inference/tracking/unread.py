@@ -83,14 +83,14 @@ def add_unread(
     """
     log_odd = 0.0 if saturated else math.log(rules.outlier)
     for h in range(1, int(of.numbers[COUNT]) + 1):
-        # a bound first: the density of a reading just as expected
+        # a bound first: the density of a reading just as expected, spread by noise alone
         log_mass, u = log_of(of.weight[h]) + log_odd, 0.0
-        most = log_mass if saturated else log_mass - math.log(rules.breadth)
+        most = log_mass if saturated else log_mass - table.channels * math.log(rules.breadth)
         if most < best + _ODD:
             continue
         if not saturated:
-            mean1, mean2 = expected_readings(of, h, frame.gain, table)
-            log_mass += log_outlier(frame, mean1, mean2, table, rules)
+            expected = expected_readings(of, h, frame.gain, table)
+            log_mass += log_outlier(frame, expected, table, rules)
         if frame.known_rate > 0.0:
             beside, u = known_of_hypothesis(of, h, frame)
             log_mass += beside
@@ -120,10 +120,10 @@ def odd_weight(
     weight = 0.0
     for h in range(1, int(of.numbers[COUNT]) + 1):
         log_mass = log_of(of.weight[h]) + math.log(rules.outlier)
-        if log_mass - math.log(rules.breadth) < best + _ODD:
+        if log_mass - table.channels * math.log(rules.breadth) < best + _ODD:
             continue
-        mean1, mean2 = expected_readings(of, h, frame.gain, table)
-        if log_mass + log_outlier(frame, mean1, mean2, table, rules) > best + _ODD:
+        expected = expected_readings(of, h, frame.gain, table)
+        if log_mass + log_outlier(frame, expected, table, rules) > best + _ODD:
             weight += of.weight[h]
     return weight
 

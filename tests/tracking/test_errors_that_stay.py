@@ -192,3 +192,17 @@ def test_noise_that_grows_with_the_signal(kind: str, noise: dict[str, float]) ->
         errors.append(off(result, u)[-1])
     low, high = stats.binom.interval(1 - 1e-4, count, 0.9)
     assert low <= np.sum(np.abs(errors) < stats.norm.isf(0.05)) <= high
+
+
+@pytest.mark.parametrize(("kind", "snr"), [("sine_wave", 1e5), ("pulsed", 1e6)])
+def test_an_object_exactly_as_stated_is_no_outlier(kind: str, snr: float) -> None:
+    """Its readings are as expected to a noise, where errors of the model may be thousands of it."""
+    r = np.full(60, 0.158)
+    scene = parse_scene({"object": PLATE["object"]})
+    light = read(sensor_of(1e-4, kind), scene, r, np.random.default_rng(1)).max()
+    sensor = sensor_of(float(light / snr), kind)
+    frames = frames_of(read(sensor, scene, r, np.random.default_rng(2)))
+    found = track(sensor, scene, frames)
+    assert found.outlier.max() < 0.01
+    assert not found.misfit.any()
+    assert np.abs((found.range_m - r) / found.sd_m).max() < 5.0

@@ -256,22 +256,23 @@ def test_the_mass_of_a_new_object_is_bounded_where_the_model_errs(
             assert bound < 1000 * exact
 
 
+@pytest.mark.parametrize("spread", [1.0, 3e6])
 @pytest.mark.parametrize(("observables", "channels"), [("readings", 2), ("w2", 1)])
 def test_readings_that_have_nothing_to_do_with_the_scene_have_a_law(
-    observables: Observables, channels: int
+    observables: Observables, channels: int, spread: float
 ) -> None:
     """A density, and its probabilities sum to one: else outliers weigh more or less than stated."""
     settings = TrackingSettings(observables=observables)
     model = tracker(sensor_of(1e-4), scene_of(FOLDED), settings).model
     assert model.table.channels == channels
-    breadth = model.rules.breadth
+    breadth = max(model.rules.breadth, float(spread ** (1 / channels)))
 
     def density(away: float, angle: float = 0.3) -> float:
         first, second = math.cos(angle) * away, math.sin(angle) * away
         frame = TrackedFrame(2.0 + first, -3.0 + second, 1.0)
         if channels == 1:
             frame = TrackedFrame(2.0 + away, -3.0, 1.0)
-        log = log_outlier(frame, 2.0, -3.0, model.table, model.rules)
+        log = log_outlier(frame, (2.0, -3.0, spread), model.table, model.rules)
         return math.exp(log - 0.5 * channels * math.log(2 * math.pi))
 
     assert density(1.7 * breadth, 2.0) == pytest.approx(density(1.7 * breadth))
