@@ -91,7 +91,7 @@ def parts() -> list[Any]:
     mixture = Mixture(rng.standard_normal((1, 2)), np.ones((1, 2, 2)), np.ones(1))
     proposal = Proposal(mixture, fit_map(rng.standard_normal((50, 2))), 0.5)
     assert proposal.transport is not None
-    local = dataclasses.replace(proposal, local=(Local(proposal.transport, mixture),))
+    local = dataclasses.replace(proposal, more=(Local(proposal.transport, mixture),))
     start = rng.standard_normal((4, 2))
     ensemble = new_ensemble(proposal, start, np.zeros(4), np.random.SeedSequence(7))
     return [

@@ -31,7 +31,7 @@ _EQUAL = 1e-9  # of the largest weight, by which equal ones differ through round
 class Law(Protocol):
     """What draws come from: a mixture, a proposal, a blend of proposals."""
 
-    def draw(self, rng: np.random.Generator, n: int, /) -> Array:
+    def draw(self, rng: np.random.Generator | np.random.RandomState, n: int, /) -> Array:
         """Draw n points, shape (n, d)."""
         ...
 

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inference.posterior.sampling.importance import WeightedDraws
+from inference.posterior.sampling.importance import Law, WeightedDraws
 from inference.posterior.sampling.start import Optimum
 from inference.posterior.sampling.transport import TriangularMap
 
@@ -26,8 +26,8 @@ __all__ = [
 Array = NDArray[np.float64]
 
 _LAPLACE_SHARE = 0.15  # of a proposal with a map that stays with the optima
-_LOCAL_SHARE = 0.2  # of a proposal with laws around single places, that is theirs
-_MOST_LOCAL = 4  # of them
+_MORE_SHARE = 0.2  # of a proposal with more laws, that is theirs
+_MOST_MORE = 4  # of them
 _LONG = 10.0  # jumps until one is taken, above which a place gets a law
 _MAP_DEGREES = 6.0  # of freedom in a map's coordinates, where the posterior is nearly normal
 _DEGREES = 5.0  # of freedom: heavier tails than any posterior that the Laplace shape fits
@@ -156,14 +156,14 @@ class Proposal:
         weight, and ensembles walk in these coordinates.
     share : float
         Of the steps of an ensemble that propose from it.
-    local : tuple of Local
-        Laws around places of which the others hold too little.
+    more : tuple of Law
+        Laws of places of which the others hold too little.
     """
 
     optima: Mixture
     transport: TriangularMap | None
     share: float
-    local: tuple[Local, ...] = ()
+    more: tuple[Law, ...] = ()
 
     def unbend(self, z: Array) -> tuple[Array, Array]:
         """Return the walkers' coordinates of z, and log |dx/dz|."""
@@ -180,11 +180,9 @@ class Proposal:
     def log_density(self, z: Array) -> Array:
         """Return the log density at z of shape (n, d), shape (n,)."""
         most = self._log_density_of_most(z)
-        if not self.local:
+        if not self.more:
             return most
-        share = math.log(_LOCAL_SHARE / len(self.local))
-        each = [share + law.log_density(z) for law in self.local]
-        return np.asarray(np.logaddexp.reduce([math.log1p(-_LOCAL_SHARE) + most, *each], axis=0))
+        return _with_more(most, np.array([law.log_density(z) for law in self.more]))
 
     def _log_density_of_most(self, z: Array) -> Array:
         laplace = self.optima.log_density(z)
@@ -197,11 +195,11 @@ class Proposal:
     def draw(self, random: np.random.Generator | np.random.RandomState, n: int) -> Array:
         """Draw n points z, shape (n, d); emcee brings a RandomState."""
         z = self._draw_of_most(random, n)
-        if not self.local:
+        if not self.more:
             return z
-        own = random.uniform(size=n) < _LOCAL_SHARE
-        which = np.where(own, (len(self.local) * random.uniform(size=n)).astype(int), -1)
-        for k, law in enumerate(self.local):
+        own = random.uniform(size=n) < _MORE_SHARE
+        which = np.where(own, (len(self.more) * random.uniform(size=n)).astype(int), -1)
+        for k, law in enumerate(self.more):
             z[which == k] = law.draw(random, int(np.count_nonzero(which == k)))
         return z
 
@@ -222,8 +220,8 @@ class Proposal:
         return x, self.log_density(old) + old_det - self.log_density(new) + new_det
 
 
-def completed(proposal: Proposal, laws: Sequence[Local], draws: WeightedDraws) -> Proposal:
-    """Add laws around single places to a proposal, where it holds too little.
+def completed(proposal: Proposal, laws: Sequence[Law], draws: WeightedDraws) -> Proposal:
+    """Add laws to a proposal, of places where it holds too little.
 
     A walker leaves a place by a jump as seldom as the density there exceeds that of the proposal:
     a branch that a map does not follow is hardly ever entered, and then not left.
@@ -232,27 +230,36 @@ def completed(proposal: Proposal, laws: Sequence[Local], draws: WeightedDraws) -
     ----------
     proposal : Proposal
         Of jumps.
-    laws : sequence of Local
-        To choose from.
+    laws : sequence of Law
+        To choose from: a map of an early round may hold what the last one left out.
     draws : WeightedDraws
         Of the posterior, from elsewhere.
 
     Returns
     -------
     Proposal
-        With the laws that lower the largest excess at the draws, until it is tenfold at most.
+        With the laws that lower the largest excess at the draws most, until it is tenfold at most.
     """
-
-    def excess(of: Proposal) -> Array:
-        return np.asarray(draws.log_density - draws.log_evidence - of.log_density(draws.z))
-
-    others, beyond = list(laws), excess(proposal)
-    while others and len(proposal.local) < _MOST_LOCAL and beyond.max() > math.log(_LONG):
-        worst = draws.z[np.argmax(beyond)][None]
-        found = others.pop(int(np.argmax([law.log_density(worst)[0] for law in others])))
-        more = dataclasses.replace(proposal, local=(*proposal.local, found))
-        after = excess(more)
-        if after.max() >= beyond.max():
+    target, most = draws.log_density - draws.log_evidence, proposal.log_density(draws.z)
+    each = np.array([law.log_density(draws.z) for law in laws])
+    chosen: tuple[int, ...] = ()
+    beyond = float(np.max(target - most))
+    while len(chosen) < _MOST_MORE and beyond > math.log(_LONG):
+        tried = {
+            float(np.max(target - _with_more(most, each[[*chosen, k]]))): k
+            for k in range(len(laws))
+            if k not in chosen
+        }
+        if not tried or min(tried) >= beyond:
             break
-        proposal, beyond = more, after
-    return proposal
+        beyond = min(tried)
+        chosen = (*chosen, tried[beyond])
+    if not chosen:
+        return proposal
+    return dataclasses.replace(proposal, more=tuple(laws[k] for k in chosen))
+
+
+def _with_more(most: Array, each: Array) -> Array:
+    """Return log densities of a mixture, of those of its first part and of each other law."""
+    share = math.log(_MORE_SHARE / len(each))
+    return np.asarray(np.logaddexp.reduce([math.log1p(-_MORE_SHARE) + most, *(share + each)]))

@@ -69,7 +69,7 @@ class Blend(NamedTuple):
         """Return the log density at z of shape (n, d), shape (n,)."""
         return _mixed(np.array([law.log_density(z) for law in self.laws]), self.counts)
 
-    def draw(self, rng: np.random.Generator, n: int) -> Array:
+    def draw(self, rng: np.random.Generator | np.random.RandomState, n: int) -> Array:
         """Draw n points, shape (n, d): from each law its share, rounded."""
         ends = np.cumsum((0, *self.counts)) * n // sum(self.counts)
         parts = zip(self.laws, np.diff(ends).tolist(), strict=True)
@@ -117,7 +117,7 @@ class Rounds:
     Attributes
     ----------
     proposal : Proposal
-        With the last map, and laws around the places of which it holds too little.
+        With the last map, and laws of any round that hold the places of which it holds too little.
     draws : WeightedDraws
         Those that count.
     dissent : float
@@ -190,8 +190,7 @@ def in_rounds(
             if over or (found.trusted and draws.ess >= target_ess):
                 if not found.trusted:
                     return found
-                around = [law for law in pool.laws if isinstance(law, Local)]
-                return dataclasses.replace(found, proposal=completed(proposal, around, draws))
+                return dataclasses.replace(found, proposal=completed(proposal, pool.laws, draws))
         drawn = pool.z[ends[-1] :]
         sample = _sample(drawn, log_weights, members[beyond], len(members), rng)
         flatter = _flatter(log_weights, pool.target[ends[-1] :])

@@ -11,7 +11,7 @@ import numpy as np
 
 from inference.posterior.job import Job
 from inference.posterior.sampling.effort import effort_of
-from inference.posterior.sampling.ensemble import WALKERS
+from inference.posterior.sampling.ensemble import WALKERS, warm_walkers
 from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.population import Population, first_population, temper
 from inference.posterior.sampling.rounds import Rounds, in_rounds
@@ -142,7 +142,7 @@ def _set_out(job: Job, stage: Tempering) -> tuple[Weighted | Walking, int]:
     if enough and job.settings.method == "auto":
         return Weighted(found.proposal.optima, found.draws, Verdict(True, ())), found.calls
     walking = _walking(job, stage, members, found)
-    return walking, found.calls + WALKERS * len(walking.ensembles)
+    return walking, found.calls + walking.ensembles[0].walkers * len(walking.ensembles)
 
 
 def _walking(
@@ -170,6 +170,10 @@ def _walking(
     trusted = found is not None and found.trusted
     if found is not None and trusted:
         proposal = found.proposal
-    ensembles = new_ensembles(density, proposal, tuple(starts), job.seeds(Stream.ENSEMBLES))
+    walkers = warm_walkers(len(density.parameters)) if trusted else WALKERS
+    seeds = job.seeds(Stream.ENSEMBLES)
+    ensembles = new_ensembles(density, proposal, tuple(starts), seeds, walkers)
     weighted = found.draws if found is not None and trusted else None
-    return Walking(proposal, ensembles, stage.verdict, adaptations=1, weighted=weighted)
+    # a law that was held to weighted draws is left for one fitted to walkers only where these stay
+    adaptations = 2 if trusted else 1
+    return Walking(proposal, ensembles, stage.verdict, adaptations, weighted=weighted)

@@ -83,7 +83,7 @@ def test_they_call_for_populations_once(stayed: Chains) -> None:
 def test_a_branch_gets_the_law_that_stands_there() -> None:
     laws, draws = _laws(), _drawn(5000)
     found = completed(BARE, laws, draws)
-    assert found.local == (laws[1],)
+    assert found.more == (laws[1],)
     # tenfold the posterior over what jumps propose, at most
     assert (draws.log_density - found.log_density(draws.z)).max() < math.log(10.0)
 

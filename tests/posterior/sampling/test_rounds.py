@@ -79,6 +79,34 @@ def test_the_planted_fault_of_maps_alone_is_not_trusted(monkeypatch: pytest.Monk
     assert not _found(SHARE, most=6000).trusted
 
 
+@pytest.mark.parametrize("width", [10.0, 100.0])
+def test_jumps_lead_wherever_the_draws_show_mass(width: float) -> None:
+    """Of a core and a wide rest: no law around one place, and not the last map, holds the rest.
+
+    A walker that stands where the target exceeds the proposal e-fold stays e steps in the mean.
+    With laws around single places alone it was e^7 and e^15.
+    """
+    scales = np.array([1.0, width])
+    shares = np.array([0.98, 0.02])
+
+    def target(z: np.ndarray) -> np.ndarray:
+        squares = np.square(z).sum(axis=1)
+        each = -0.5 * squares / scales[:, None] ** 2 + np.log(shares / scales**2)[:, None]
+        return np.asarray(np.logaddexp.reduce(each))
+
+    populations = tuple(
+        rng.standard_normal((300, D)) * np.where(np.arange(300) < 6, width, 1.0)[:, None]
+        for rng in map(np.random.default_rng, (1, 2))
+    )
+    start = Proposal(Mixture(np.zeros((1, D)), np.eye(D)[None], np.ones(1)), None, 0.5)
+    rng = np.random.default_rng(5 if width < 50.0 else 4)
+    found = in_rounds(cast(Any, target), start, populations, rng, 400, 12_000)
+    draws = found.draws
+    assert found.trusted
+    excess = draws.log_density - draws.log_evidence - found.proposal.log_density(draws.z)
+    assert excess.max() < np.log(10.0)
+
+
 def test_mass_that_one_population_alone_knows_is_found() -> None:
     populations = (_population(300, 0.0, 1), _population(300, SHARE, 2))
     rng = np.random.default_rng(6)
