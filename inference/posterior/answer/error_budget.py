@@ -3,8 +3,9 @@
 A posterior whose scene states no size for the model's error is sampled as if there were none. Then
 every draw is moved by errors of the flux and of a shadow on a background, drawn from what the
 readings leave of them and followed linearly from draws near it
-(`inference.identifiability.model_response`), and every range by a random smooth error of the
-effective distance; where ranges are known, all by it
+(`inference.identifiability.model_response`; where that bends before a background, also by how far
+the best point of all lies from them, `inference.posterior.answer.where_bent`), and every range by a
+random smooth error of the effective distance; where ranges are known, all by it
 (`inference.posterior.answer.where_known`). Where sizes are stated, the flux's error is
 integrated out already; draws are moved by that of the distance, and by what a flux error twice as
 large would move them; an error of the shadow moves them with the flux's free to follow
@@ -34,6 +35,7 @@ from inference.identifiability.model_response import (
 from inference.posterior.answer.error_parts import ErrorParts
 from inference.posterior.answer.error_shares import error_shares
 from inference.posterior.answer.shadow_beside import shadow_beside
+from inference.posterior.answer.where_bent import where_bent
 from inference.posterior.answer.where_known import where_known
 from inference.posterior.criticism.discrepancy_check import LargerDiscrepancy
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
@@ -194,7 +196,8 @@ def error_budget(
     curvature = _curvature(experiments, responses, rng) if erring else 0.0
     pull = common_pull(responses)
     further = erring and job.scene.motion != "static"
-    if further and (curvature > _STRAIGHT or pull.any()):
+    bent = further and (curvature > _STRAIGHT or bool(pull.any()))
+    if bent:
         fewer = slice(None, None, _THINNED)
         chosen, experiments = chosen[fewer], experiments[fewer]
         responses = [model_response(each, readings, pull) for each in experiments]
@@ -208,6 +211,14 @@ def error_budget(
         np.array([each.shift[1] for each in responses])[:, :, None],
         stretch * np.array([each.log_r for each in responses]),
     ]
+    if bent and experiments[0].shadow > 0:
+        middle = [
+            np.median(draws, axis=0) + np.median(by[0][:, :, 0], axis=0)
+            for draws, by in ((z, by_z), (log_r, by_log_r))
+        ]
+        follow = where_bent(experiments, readings, middle[0], middle[1])
+        for by, moved in zip((by_z, by_log_r), follow, strict=True):
+            by.append(np.broadcast_to(moved[:, None], (len(chosen), moved.size, 1)))
     if larger is not None:
         by_z.append(np.broadcast_to(larger.of_z[:, None], (*z[chosen].shape, 1)))
         by_log_r.append(np.broadcast_to(larger.of_log_r[:, None], (*log_r[chosen].shape, 1)))
