@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.density.collapsed import CollapsedDensity, FluxBasis
+from inference.density.collapsed import CollapsedDensity
 from inference.density.whitened import whitened
 from inference.frame.arguments import prior_of
 
@@ -32,7 +32,9 @@ class Linearisation:
     jacobian: Array
 
 
-def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearisation:
+def linearise(
+    density: CollapsedDensity, z: Array, positions: Array, errors: Array | None = None
+) -> Linearisation:
     """Linearise the readings in z, ranges eliminated (variable projection).
 
     Parameters
@@ -41,6 +43,9 @@ def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearis
         Where.
     positions : ndarray, shape (frames,)
         log r of every frame; nan for a frame without object.
+    errors : ndarray, shape (frames, 2, k), optional
+        Whitened derivatives of the readings along more errors, independent and standard normal,
+        which give way as the ranges do; left out: none.
     """
     basis = density.flux_basis(z, positions)
     error = None
@@ -64,15 +69,24 @@ def linearise(density: CollapsedDensity, z: Array, positions: Array) -> Linearis
         return np.asarray(vectors - unit[:, :, None] * shares[:, None, :])
 
     residual, jacobian = across(seen[:, :, None])[:, :, 0], across(-by_z)
+    size = np.ones((len(seen), 1, 1))
     if density.weights is not None:
-        size = np.sqrt(density.weights)
-        residual, jacobian = residual * size[:, None], jacobian * size[:, None, None]
-    if basis is None:
+        size = np.sqrt(density.weights)[:, None, None]
+        residual, jacobian = residual * size[:, 0], jacobian * size
+    other, known = [], []
+    if basis is not None:
+        signal = np.zeros_like(seen)
+        signal[:, :2] = at.signal
+        other.append(size * across(-signal[:, :, None]) * basis.values[:, None, :])
+        known.append(basis.coefficients)
+    if errors is not None:
+        moved = np.zeros((*seen.shape, errors.shape[2]))
+        moved[:, :2] = errors
+        other.append(size * across(-moved))
+        known.append(np.zeros(errors.shape[2]))
+    if not known:
         return Linearisation(residual, jacobian)
-    signal = np.zeros_like(seen)
-    signal[:, :2] = at.signal
-    flux = across(-signal[:, :, None])
-    return _eliminate(residual, jacobian, flux * basis.values[:, None, :], basis)
+    return _eliminate(residual, jacobian, np.concatenate(other, axis=2), np.concatenate(known))
 
 
 def _sums(ranges: NDArray[np.intp], values: Array) -> Array:
@@ -82,7 +96,9 @@ def _sums(ranges: NDArray[np.intp], values: Array) -> Array:
     return total[ranges]
 
 
-def _eliminate(residual: Array, jacobian: Array, other: Array, basis: FluxBasis) -> Linearisation:
+def _eliminate(
+    residual: Array, jacobian: Array, other: Array, coefficients: Array
+) -> Linearisation:
     """Project out coefficients with standard normal priors, which add residuals of their own.
 
     Parameters
@@ -91,16 +107,18 @@ def _eliminate(residual: Array, jacobian: Array, other: Array, basis: FluxBasis)
         Of what stays.
     other : ndarray, shape (frames, m, k)
         Derivative of the residual along the coefficients.
+    coefficients : ndarray, shape (k,)
+        What they are.
 
     Returns
     -------
     Linearisation
         With the rows of the coefficients behind.
     """
-    (m, d), k = jacobian.shape[1:], basis.coefficients.size
+    (m, d), k = jacobian.shape[1:], coefficients.size
     q = np.linalg.qr(np.concatenate([other.reshape(-1, k), np.eye(k)]))[0]
     pad = -k % m
-    rows = np.concatenate([residual.ravel(), basis.coefficients])
+    rows = np.concatenate([residual.ravel(), coefficients])
     rows = rows - q @ (q.T @ rows)
     matrix = np.concatenate([jacobian.reshape(-1, d), np.zeros((k, d))])
     matrix = matrix - q @ (q.T @ matrix)

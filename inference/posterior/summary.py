@@ -287,8 +287,8 @@ def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
         if whole.larger.bayes_factor > MISFIT and rates_of(drawn.own.frames) is not None:
             # known ranges and readings contradict each other: a widened answer is no certain one
             judged = weak_at_best(judged, "by errors of the model that are larger than stated")
-    conflicts = prior_conflicts(drawn.own, sample.flat, log_r, density)
-    fit, judged = contradicted(fit, judged, conflicts)
+    found = prior_conflicts(drawn.own, sample.flat, log_r, density, job.scene.model_error)
+    fit, judged = contradicted(fit, judged, found)
     reasons = (*reasons, *_unfinished(drawn.own, chosen, job.stream(Stream.INTEGRALS)))
     return Findings(
         reasons,

@@ -6,8 +6,8 @@ Three findings, none of which depends on how the walkers moved.
   prior, more than half of a posterior lies in a part of the prior's mass eps with probability at
   most 2 eps (Markov), whatever the model.
 * Most draws lie near an end of the prior's support, and the likelihood, the other unknowns giving
-  way, still climbs there by many of its own standard errors: a score test (Rao 1948), which does
-  not depend on the coordinates.
+  way, and errors of the model as large as are allowed for, still climbs there by many of its own
+  standard errors: a score test (Rao 1948), which does not depend on the coordinates.
 * Most draws of a range lie where its prior has next to no mass; or near an end of it, and without
   that end the frame (all frames, of a static object) would fit far better: a likelihood ratio.
 """
@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.density.profile import linearise
 from inference.density.static import StaticDensity
+from inference.posterior.criticism.errors_left import errors_left
+from simulator.model_error import ModelError
 from simulator.priors import Distribution, NormalDistribution, UniformDistribution
 from simulator.scene import Reference, Stroke
 
@@ -40,7 +42,11 @@ _WIDER = 1.5  # at least
 
 
 def prior_conflicts(
-    density: CollapsedDensity, z: Array, log_r: Array, sampled: CollapsedDensity
+    density: CollapsedDensity,
+    z: Array,
+    log_r: Array,
+    sampled: CollapsedDensity,
+    error: ModelError,
 ) -> tuple[str, ...]:
     """Find unknowns and ranges whose posterior piles up where their prior ends.
 
@@ -52,6 +58,8 @@ def prior_conflicts(
         Draws of the ranges; nan for a frame without object.
     sampled : CollapsedDensity
         That of which z are draws: of all frames, where those of the ranges are some of them.
+    error : ModelError
+        Of the scene: what an error as large as is allowed for may take up pulls no unknown.
 
     Returns
     -------
@@ -62,7 +70,8 @@ def prior_conflicts(
     names = density.parameters.names
 
     def linearised(x: Array) -> tuple[Array, Array]:
-        line = linearise(sampled, x, sampled.best_ranges(x[None])[0, :, 0])
+        best = sampled.best_ranges(x[None])[0, :, 0]
+        line = linearise(sampled, x, best, errors_left(sampled, x, best, error))
         return line.residual.ravel(), line.jacobian.reshape(-1, len(names))
 
     return (*parameter_conflicts(names, z, linearised), *range_conflicts(density, z, log_r))
