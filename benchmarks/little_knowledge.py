@@ -36,7 +36,7 @@ from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import Sensor
 
-__all__ = ["Case", "case_of", "row_of"]
+__all__ = ["SHARES", "Case", "case_of", "line", "row_of"]
 
 GROUP = SceneClass("known ranges")
 SHARES = (0.1, 0.3)
