@@ -44,7 +44,9 @@ class _Stated(NamedTuple):
     strength: float | None  # None where it is not known
 
 
-def contradiction(scene: Scene, sensor: Sensor, frames: Frames) -> Contradiction | None:
+def contradiction(
+    scene: Scene, sensor: Sensor, frames: Frames, open_: tuple[float, float] | None = None
+) -> Contradiction | None:
     """Return how empty frames contradict what the scene states in numbers.
 
     A joint law counts by its centre and its spread, a wall by the error of the effective distance
@@ -54,6 +56,8 @@ def contradiction(scene: Scene, sensor: Sensor, frames: Frames) -> Contradiction
     ----------
     scene, sensor, frames : Scene, Sensor, Frames
         The request.
+    open_ : (float, float), optional
+        Standard deviations of the crosstalk, where its numbers are medians of priors.
 
     Returns
     -------
@@ -76,6 +80,8 @@ def contradiction(scene: Scene, sensor: Sensor, frames: Frames) -> Contradiction
     of_wall = np.zeros(2) if stated.wall is None else (strength or 0.0) * stated.wall
     beyond = beyond - of_wall
     variance = _noise(sensor, stated.crosstalk + of_wall) / n
+    if open_ is not None:
+        variance += np.diag(np.square(open_))
     for change in _shared(scene, sensor, empty, stated, strength):
         variance += np.outer(change, change)
     # readings are rounded, however little noise they have

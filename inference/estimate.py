@@ -1,22 +1,22 @@
 """Estimates at once: readings in, all physical ranges out, at once."""
 
-import time
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from inference.assumptions import assumptions_of
-from inference.contradicted import without_moved
 from inference.empty_frames import Contradiction, contradiction
 from inference.estimates import Estimates, LeftOut, TechniqueResult
 from inference.first_step import beyond_bounds, first_step
 from inference.known import known_of
 from inference.plan import Plan, cheapest, obstacle, plan
 from inference.realtime.registry import TECHNIQUES
-from inference.shared_error import with_shared_error
+from inference.run import by_prior, obstacle_by_prior, run
+from inference.stated_light import StatedLight, answers, stated_light, tells_more
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from inference.temperature import solved_where_told, task_of
-from simulator.errors import InvalidInputError, Problem, RefusedError
+from simulator.errors import InvalidInputError, Problem
 from simulator.frames import Frames
-from simulator.joint_scene import around, centre
+from simulator.joint_scene import centre
 from simulator.scene import Scene
 from simulator.scene_checks import check_scene
 from simulator.sensor import Sensor
@@ -34,9 +34,11 @@ def estimate(
     sensor : Sensor
         The sensor.
     scene : Scene
-        What is known of the scene. Of priors only the supports are used, and as where a fit over
-        many frames begins to look. Of a joint law techniques of single frames take the numbers at
-        its centre, and its spread is the part ``scene`` of every standard deviation.
+        What is known of the scene. Of priors the supports are used, and as where a fit over many
+        frames begins to look; of those of the crosstalk medians and widths, by techniques that take
+        its numbers off, where the light is far above them. Of a joint law techniques of single
+        frames take the numbers at its centre. What either leaves open is the part ``scene`` of
+        every standard deviation.
     frames : Frames
         The readings.
     techniques : sequence of str, optional
@@ -86,21 +88,110 @@ def estimate_planned(
     InvalidInputError
         As of `estimate`.
     """
+    light = stated_light(sensor, scene)
+    numbers, open_ = (scene, None) if light is None else (light.scene, light.sd)
+    against = contradiction(numbers, sensor, frames, open_)
+    asked = _Asked(sensor, scene, frames, light, against)
     supposed = assumptions_of(scene, sensor, frames)
-    against = contradiction(scene, sensor, frames)
-    if against is not None:
+    found = _chosen(asked, choice) if techniques is None else _named(asked, choice, techniques)
+    resting = any(asked.rests_on_prior(each.technique) for each in found.results)
+    if against is not None and (light is None or resting):
         supposed = (against.said, *supposed)
-    if techniques is None:
-        if choice.chosen is None:
-            advice: str | None = first_step(sensor, scene, frames, choice, None)
-            return Estimates(None, (), choice.left_out, supposed, advice)
-        result = _run(sensor, scene, frames, choice.chosen, against)
-        if isinstance(result, LeftOut):
-            advice = first_step(sensor, scene, frames, choice, result)
-            return Estimates(None, (), (result, *choice.left_out), supposed, advice)
-        bounds = result.range_bounds_m is not None
-        advice = beyond_bounds(sensor, scene, frames, choice.chosen) if bounds else None
-        return Estimates(choice.chosen, (result,), choice.left_out, supposed, advice)
+    return Estimates(found.chosen, found.results, found.left_out, supposed, found.do_first)
+
+
+class _Asked(NamedTuple):
+    """A request, and what is found out of it once."""
+
+    sensor: Sensor
+    scene: Scene
+    frames: Frames
+    light: StatedLight | None  # where the crosstalk has priors
+    against: Contradiction | None
+
+    def rests_on_prior(self, name: str) -> bool:
+        """Tell whether a technique needs the crosstalk, of which there is a prior."""
+        own = TECHNIQUES.get(name)
+        return self.light is not None and own is not None and "crosstalk" not in own.immune_to
+
+    def run(self, name: str) -> TechniqueResult | LeftOut:
+        """Ask a technique that serves the scene."""
+        if self.light is not None and self.rests_on_prior(name):
+            return by_prior(self.sensor, self.light, self.frames, name, self.against)
+        against = None if self.light is not None else self.against
+        return run(self.sensor, self.scene, self.frames, name, against)
+
+    def first_step(self, choice: Plan, refused: LeftOut | None) -> str:
+        """Return what to do first where nothing answers."""
+        return first_step(self.sensor, self.scene, self.frames, choice, refused)
+
+
+class _Found(NamedTuple):
+    """Results, and why there are no others; see `Estimates`."""
+
+    chosen: str | None
+    results: tuple[TechniqueResult, ...]
+    left_out: tuple[LeftOut, ...]
+    do_first: str | None = None
+
+
+def _chosen(asked: _Asked, choice: Plan) -> _Found:
+    """Answer by the technique that tells most, of all that the scene allows."""
+    planned = None if choice.chosen is None else asked.run(choice.chosen)
+    left_out = choice.left_out
+    if isinstance(planned, LeftOut):
+        left_out = (planned, *left_out)
+    if asked.light is not None:
+        found, left_out = _beside(asked, asked.light, planned, left_out)
+        if found is not None:
+            return _Found(found.technique, (found,), left_out)
+    if not isinstance(planned, TechniqueResult):
+        return _Found(None, (), left_out, asked.first_step(choice, planned))
+    todo = None
+    if planned.range_bounds_m is not None:
+        todo = beyond_bounds(asked.sensor, asked.scene, asked.frames, planned.technique)
+    return _Found(planned.technique, (planned,), left_out, todo)
+
+
+def _beside(
+    asked: _Asked,
+    light: StatedLight,
+    planned: TechniqueResult | LeftOut | None,
+    left_out: tuple[LeftOut, ...],
+) -> tuple[TechniqueResult | None, tuple[LeftOut, ...]]:
+    """Return what goes before the plan's choice by a prior of the crosstalk, and what is left."""
+    names = filter(asked.rests_on_prior, TECHNIQUES)
+    reasons = {name: obstacle_by_prior(light, asked.frames, name) for name in names}
+    able = [name for name, reason in reasons.items() if reason is None]
+    name = cheapest(able, asked.sensor, asked.scene)
+    found = None if name is None else asked.run(name)
+    served = f"{name} serves the scene at less cost"
+    if isinstance(found, LeftOut):
+        served = found.reason
+    told = {item.name: item for item in left_out}
+    told |= {other: LeftOut(other, reason or served) for other, reason in reasons.items()}
+    if isinstance(found, TechniqueResult):
+        if not isinstance(planned, TechniqueResult):
+            del told[found.technique]
+            return found, tuple(told.values())
+        first = tells_more(found, planned)
+        more, less = (found, planned) if first else (planned, found)
+        told.pop(more.technique, None)
+        told[less.technique] = LeftOut(less.technique, _tells_less(more))
+        return (found if first else None), tuple(told.values())
+    return None, tuple(told.values())
+
+
+def _tells_less(than: TechniqueResult) -> str:
+    return (
+        f"{than.technique} tells more of these frames, or the same sharper: "
+        f"{int(answers(than).sum())} of {len(than)}"
+    )
+
+
+def _named(asked: _Asked, choice: Plan, techniques: Sequence[str]) -> _Found:
+    """Answer by the techniques that are asked for."""
+    sensor, scene, frames = asked.sensor, asked.scene, asked.frames
     problems = [
         Problem(f"/techniques/{i}", f"{name!r} is not a technique")
         for i, name in enumerate(techniques)
@@ -108,90 +199,30 @@ def estimate_planned(
     ]
     if problems:
         raise InvalidInputError(*problems)
-    served: list[TechniqueResult] = []
+    served: dict[str, TechniqueResult] = {}
     refused: LeftOut | None = None
     left_out = {item.name: item for item in choice.left_out if item.name not in techniques}
     if choice.chosen is not None and choice.chosen not in techniques:
         left_out[choice.chosen] = LeftOut(choice.chosen, "was not asked for")
     for name in dict.fromkeys(techniques):
         reason = ELSEWHERE.get(name)
-        if reason is None:
+        if reason is None and not asked.rests_on_prior(name):
             # a fit over many frames asks the frames alone
             of, stated = centre(sensor, scene) if name in TECHNIQUES else (sensor, scene)
             reason = obstacle(ALL_TECHNIQUES[name], of, stated, known_of(stated, of), frames)
-        found = LeftOut(name, reason) if reason else _run(sensor, scene, frames, name, against)
+        found = LeftOut(name, reason) if reason else asked.run(name)
         if isinstance(found, LeftOut):
             left_out[name] = found
-            refused = found if reason is None else refused
+            own = reason is None and not asked.rests_on_prior(name)
+            refused = found if own else refused
         else:
-            served.append(found)
-    chosen = cheapest((result.technique for result in served), sensor, scene)
-    todo = None if served else first_step(sensor, scene, frames, choice, refused)
-    return Estimates(chosen, tuple(served), tuple(left_out.values()), supposed, todo)
-
-
-def _run(
-    sensor: Sensor, scene: Scene, frames: Frames, name: str, against: Contradiction | None
-) -> TechniqueResult | LeftOut:
-    start = time.perf_counter()
-    try:
-        result = solved_where_told(sensor, frames, lambda used: _solved(sensor, scene, used, name))
-    except RefusedError as error:
-        return LeftOut(name, str(error))
-    if against is not None and _rests_on_numbers(name, scene):
-        result = without_moved(result, _beside(sensor, scene, frames, name, against))
-    return _taken(result, time.perf_counter() - start)
-
-
-def _rests_on_numbers(name: str, scene: Scene) -> bool:
-    """Tell whether a technique takes for granted what empty frames should read."""
-    technique = ALL_TECHNIQUES[name]
-    if "crosstalk" not in technique.immune_to:
-        return True
-    if scene.background is None:
-        return False
-    of_wall = any(path.startswith("background.") for path in technique.needs)
-    return of_wall or "background" not in technique.immune_to
-
-
-def _beside(
-    sensor: Sensor, scene: Scene, frames: Frames, name: str, against: Contradiction
-) -> TechniqueResult | None:
-    """Solve with the light that empty frames show as crosstalk; None where that is refused."""
-    of, stated = centre(sensor, scene) if name in TECHNIQUES else (sensor, scene)
-    crosstalk = known_of(stated, of).crosstalk
-    assert crosstalk is not None  # noqa: S101  # nothing contradicts what is unknown
-    light = tuple(a + b for a, b in zip(crosstalk, against.light, strict=True))
-    lit = stated.model_copy(update={"crosstalk": light})
-    try:
-        return solved_where_told(of, frames, lambda used: _solved(of, lit, used, name))
-    except RefusedError:
-        return None
-
-
-def _taken(result: TechniqueResult, seconds: float) -> TechniqueResult:
-    """As `dataclasses.replace`, which takes as long as many an estimate."""
-    told = object.__new__(TechniqueResult)
-    vars(told).update(vars(result), runtime_s=seconds)
-    return told
-
-
-def _solved(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> TechniqueResult:
-    solve = ALL_TECHNIQUES[name].solve
-    if scene.joint is None or name not in TECHNIQUES:
-        return solve(task_of(sensor, scene, frames, known_of(scene, sensor)))
-
-    def at(of: Sensor, stated: Scene) -> TechniqueResult:
-        known = known_of(stated, of)
-        reason = obstacle(ALL_TECHNIQUES[name], of, stated, known, frames)
-        if reason is not None:
-            raise RefusedError(f"a standard deviation off the scene's centre it {reason}")
-        return solve(task_of(of, stated, frames, known, physical=False))
-
-    of, middle = centre(sensor, scene)
-    result = solve(task_of(of, middle, frames, known_of(middle, of)))
-    pairs = ((at(*plus), at(*minus)) for plus, minus in around(sensor, scene))
-    return with_shared_error(result, pairs)
+            served[name] = found
+    chosen = cheapest((name for name in served if not asked.rests_on_prior(name)), sensor, scene)
+    other = cheapest(filter(asked.rests_on_prior, served), sensor, scene)
+    if other is not None and (chosen is None or tells_more(served[other], served[chosen])):
+        chosen = other
+    todo = None if served else asked.first_step(choice, refused)
+    return _Found(chosen, tuple(served.values()), tuple(left_out.values()), todo)
 
 
 def all_roots(

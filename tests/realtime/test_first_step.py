@@ -102,7 +102,8 @@ def test_a_sensor_that_is_not_calibrated_is_to_be_calibrated() -> None:
 
 
 def test_where_bounds_alone_are_told_a_fit_is_named_or_what_it_takes() -> None:
-    sensor, scene = parse_sensor(SENSORS["pulsed"]), parse_scene({"crosstalk": LEAK})
+    leak = [{"prior": "normal", "mean": 0.0, "sd": 0.2}] * 2  # as wide as the light
+    sensor, scene = parse_sensor(SENSORS["pulsed"]), parse_scene({"crosstalk": leak})
     ranges = np.linspace(0.3, 1.0, 8)
     light = 0.1 * 0.08 / (ranges**2 * (ranges**2 + 0.08))
     readings = np.stack([light * ranges / 15.0, light], axis=1)
@@ -114,7 +115,7 @@ def test_where_bounds_alone_are_told_a_fit_is_named_or_what_it_takes() -> None:
     few = estimate(sensor, scene, Frames(readings[:3], time_s=np.arange(3.0))).do_first
     assert few is not None
     assert "take 5 frames without the object (object_present false) and 4 frames of the" in few
-    known = estimate(sensor, parse_scene({"crosstalk": LEAK, "object": PLATE}), many)
+    known = estimate(sensor, parse_scene({"crosstalk": leak, "object": PLATE}), many)
     assert (known.chosen, known.do_first) == ("differential", None)
 
 
