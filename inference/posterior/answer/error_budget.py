@@ -212,11 +212,12 @@ def error_budget(
         stretch * np.array([each.log_r for each in responses]),
     ]
     if bent and experiments[0].shadow > 0:
-        middle = [
-            np.median(draws, axis=0) + np.median(by[0][:, :, 0], axis=0)
-            for draws, by in ((z, by_z), (log_r, by_log_r))
-        ]
-        follow = where_bent(experiments, readings, middle[0], middle[1])
+        follow = where_bent(
+            experiments,
+            readings,
+            z + np.median(by_z[0][:, :, 0], axis=0),
+            log_r + np.median(by_log_r[0][:, :, 0], axis=0),
+        )
         for by, moved in zip((by_z, by_log_r), follow, strict=True):
             by.append(np.broadcast_to(moved[:, None], (len(chosen), moved.size, 1)))
     if larger is not None:

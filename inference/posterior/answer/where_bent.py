@@ -13,6 +13,7 @@ __all__ = ["where_bent"]
 
 Array = NDArray[np.float64]
 
+_REACH = 0.01  # share of the draws on each side that is as good as none
 _STARTS, _FRAMES = 4, 2400  # climbs, and frames of all of them
 
 
@@ -30,24 +31,30 @@ def where_bent(
         Draws with the sizes of their errors: where climbs begin.
     readings : ndarray, shape (n, 2 or 4)
         As for `inference.identifiability.model_response.model_response`.
-    z : ndarray, shape (d,)
-        Median of the draws, moved by the response.
-    log_r : ndarray, shape (n,)
-        That of their ranges; nan for a frame without object.
+    z : ndarray, shape (m, d)
+        Draws, moved by the response.
+    log_r : ndarray, shape (m, n)
+        Their ranges; nan for a frame without object.
 
     Returns
     -------
     (ndarray, ndarray)
-        From those medians, shape (d,) and (n,); 0 for a frame without object.
+        From the medians of the draws, shape (d,) and (n,); 0 for a frame without object, and
+        everywhere where draws reach as far as all ranges of that point: they know its branch.
     """
     best, least = None, math.inf
-    starts = int(np.clip(_FRAMES // log_r.size, 1, min(_STARTS, len(experiments))))
+    starts = int(np.clip(_FRAMES // log_r.shape[1], 1, min(_STARTS, len(experiments))))
     for i in np.linspace(0, len(experiments) - 1, starts).astype(np.intp):
         end, deviance = joint_optimum(experiments[i], readings)
         if deviance < least:
             best, least = end, deviance
-    if best is None:
-        return np.zeros(z.size), np.zeros(log_r.size)
+    off_z, off = np.zeros(z.shape[1]), np.zeros(log_r.shape[1])
+    if best is None or log_r.shape[1] <= z.shape[1]:
+        return off_z, off
     present = np.isfinite(best.log_r)
-    off = np.where(present, best.log_r - log_r, 0.0)
-    return best.z - z, off
+    low, middle, high = np.quantile(log_r[:, present], [_REACH, 0.5, 1.0 - _REACH], axis=0)
+    there = best.log_r[present]
+    if not np.any((there < low) | (there > high)):
+        return off_z, off
+    off[present] = there - middle
+    return best.z - np.median(z, axis=0), off
