@@ -24,7 +24,7 @@ __all__ = ["NOT_SMALL", "by_prior", "obstacle_by_prior", "run"]
 
 NOT_SMALL = (
     "is not immune to crosstalk, and what the scene's prior of it leaves open is not small against "
-    "the light of any frame: take empty frames (object_present false) for joint_fit, or state the "
+    "the light of any frame: take frames without the object for joint_fit, or state the "
     "prior narrower"
 )
 

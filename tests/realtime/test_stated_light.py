@@ -76,7 +76,7 @@ def test_prior_as_wide_as_the_light_is_refused_and_says_what_to_do() -> None:
         found = estimate(PULSE, parse_scene({"crosstalk": wide}), Frames(readings), asked)
         assert found.chosen is None
         reason = {each.name: each.reason for each in found.left_out}["conventional"]
-        assert "take empty frames (object_present false) for joint_fit" in reason
+        assert "take frames without the object for joint_fit" in reason
         assert found.do_first is not None
 
 
