@@ -11,7 +11,7 @@ from inference.known import known_of
 from inference.plan import obstacle
 from inference.realtime.registry import TECHNIQUES
 from inference.shared_error import with_shared_error
-from inference.stated_light import StatedLight, with_scene_part
+from inference.stated_light import StatedLight, faint, with_scene_part
 from inference.techniques import ALL_TECHNIQUES
 from inference.temperature import solved_where_told, task_of
 from simulator.errors import RefusedError
@@ -114,6 +114,8 @@ def obstacle_by_prior(light: StatedLight, frames: Frames, name: str) -> str | No
     light, frames, name
         As of `by_prior`.
     """
+    if faint(light, frames, name).all():
+        return NOT_SMALL
     of, stated = centre(light.sensor, light.scene)
     return obstacle(TECHNIQUES[name], of, stated, known_of(stated, of), frames)
 

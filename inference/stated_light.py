@@ -20,7 +20,15 @@ from simulator.remembered import remembered
 from simulator.scene import Quantity, Scene
 from simulator.sensor import PulsedSensor, Sensor
 
-__all__ = ["FAINT", "StatedLight", "answers", "stated_light", "tells_more", "with_scene_part"]
+__all__ = [
+    "FAINT",
+    "StatedLight",
+    "answers",
+    "faint",
+    "stated_light",
+    "tells_more",
+    "with_scene_part",
+]
 
 Array = NDArray[np.float64]
 
@@ -135,11 +143,11 @@ def with_scene_part(
     open_ = np.sqrt((parts.noise - noise) * (parts.noise + noise))
     split = SdParts(noise, np.hypot(parts.scene, open_), parts.model)
     told = dataclasses.replace(result, sd_parts_m=split)
-    return without_ranges(told, FAINT, _faint(light, frames, result.technique))
+    return without_ranges(told, FAINT, faint(light, frames, result.technique))
 
 
-def _faint(light: StatedLight, frames: Frames, technique: str) -> NDArray[np.bool_]:
-    """Tell whose light may be crosstalk, shape (n,)."""
+def faint(light: StatedLight, frames: Frames, technique: str) -> NDArray[np.bool_]:
+    """Tell of which frames the light may be crosstalk to a technique, shape (n,)."""
     values = light.scene.crosstalk_values
     assert values is not None  # noqa: S101  # they are its numbers
     with np.errstate(all="ignore"):
