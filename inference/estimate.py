@@ -10,7 +10,7 @@ from inference.first_step import beyond_bounds, first_step
 from inference.known import known_of
 from inference.plan import Plan, cheapest, obstacle, plan
 from inference.realtime.registry import TECHNIQUES
-from inference.run import by_prior, obstacle_by_prior, run
+from inference.run import Said, by_prior, obstacle_by_prior, run
 from inference.stated_light import StatedLight, answers, stated_light, tells_more
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from inference.temperature import solved_where_told, task_of
@@ -91,7 +91,7 @@ def estimate_planned(
     light = stated_light(sensor, scene)
     numbers, open_ = (scene, None) if light is None else (light.scene, light.sd)
     against = contradiction(numbers, sensor, frames, open_)
-    asked = _Asked(sensor, scene, frames, light, against)
+    asked = _Asked(sensor, scene, frames, light, against, {})
     supposed = assumptions_of(scene, sensor, frames)
     found = _chosen(asked, choice) if techniques is None else _named(asked, choice, techniques)
     resting = any(asked.rests_on_prior(each.technique) for each in found.results)
@@ -108,6 +108,7 @@ class _Asked(NamedTuple):
     frames: Frames
     light: StatedLight | None  # where the crosstalk has priors
     against: Contradiction | None
+    said: Said
 
     def rests_on_prior(self, name: str) -> bool:
         """Tell whether a technique needs the crosstalk, of which there is a prior."""
@@ -119,7 +120,7 @@ class _Asked(NamedTuple):
         if self.light is not None and self.rests_on_prior(name):
             return by_prior(self.sensor, self.light, self.frames, name, self.against)
         against = None if self.light is not None else self.against
-        return run(self.sensor, self.scene, self.frames, name, against)
+        return run(self.sensor, self.scene, self.frames, name, against, self.said)
 
     def first_step(self, choice: Plan, refused: LeftOut | None) -> str:
         """Return what to do first where nothing answers."""

@@ -20,7 +20,10 @@ from simulator.joint_scene import around, centre
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
-__all__ = ["NOT_SMALL", "by_prior", "obstacle_by_prior", "run"]
+__all__ = ["NOT_SMALL", "Said", "by_prior", "obstacle_by_prior", "run"]
+
+Said = dict[str, TechniqueResult | str]
+"""What techniques said of one request, or why they said nothing; by the names of what differs."""
 
 NOT_SMALL = (
     "is not immune to crosstalk, and what the scene's prior of it leaves open is not small against "
@@ -30,7 +33,12 @@ NOT_SMALL = (
 
 
 def run(
-    sensor: Sensor, scene: Scene, frames: Frames, name: str, against: Contradiction | None
+    sensor: Sensor,
+    scene: Scene,
+    frames: Frames,
+    name: str,
+    against: Contradiction | None,
+    said: Said,
 ) -> TechniqueResult | LeftOut:
     """Return what a technique says that serves a scene, or why it says nothing.
 
@@ -42,15 +50,29 @@ def run(
         The technique.
     against : Contradiction, optional
         What empty frames say against the scene.
+    said : dict
+        Of the same request, and filled: what has several names is solved once.
     """
-    start = time.perf_counter()
-    try:
-        result = solved_where_told(sensor, frames, lambda used: _solved(sensor, scene, used, name))
-    except RefusedError as error:
-        return LeftOut(name, str(error))
+    same = ALL_TECHNIQUES[name].same_as or name
+    if same not in said:
+        start = time.perf_counter()
+        try:
+            said[same] = _taken(
+                solved_where_told(sensor, frames, lambda used: _solved(sensor, scene, used, name)),
+                name,
+                time.perf_counter() - start,
+            )
+        except RefusedError as error:
+            said[same] = str(error)
+    result = said[same]
+    if isinstance(result, str):
+        return LeftOut(name, result)
+    seconds = result.runtime_s
     if against is not None and _rests_on_numbers(name, scene):
+        start = time.perf_counter()
         result = without_moved(result, _beside(sensor, scene, frames, name, against))
-    return _taken(result, time.perf_counter() - start)
+        seconds += time.perf_counter() - start
+    return _taken(result, name, seconds)
 
 
 def _rests_on_numbers(name: str, scene: Scene) -> bool:
@@ -96,14 +118,14 @@ def by_prior(
     reason = obstacle_by_prior(light, frames, name)
     if reason is not None:
         return LeftOut(name, reason)
-    wide = run(light.sensor, light.scene, frames, name, against)
-    alone = run(sensor, light.scene, frames, name, None)
+    wide = run(light.sensor, light.scene, frames, name, against, {})
+    alone = run(sensor, light.scene, frames, name, None, {})
     if isinstance(wide, LeftOut) or isinstance(alone, LeftOut):
         return wide if isinstance(wide, LeftOut) else alone
     result = with_scene_part(light, frames, wide, alone)
     if not np.isfinite(result.roots_sd_m).any():
         return LeftOut(name, NOT_SMALL if against is None else against.said)
-    return _taken(result, wide.runtime_s + alone.runtime_s)
+    return _taken(result, name, wide.runtime_s + alone.runtime_s)
 
 
 def obstacle_by_prior(light: StatedLight, frames: Frames, name: str) -> str | None:
@@ -120,10 +142,10 @@ def obstacle_by_prior(light: StatedLight, frames: Frames, name: str) -> str | No
     return obstacle(TECHNIQUES[name], of, stated, known_of(stated, of), frames)
 
 
-def _taken(result: TechniqueResult, seconds: float) -> TechniqueResult:
+def _taken(result: TechniqueResult, name: str, seconds: float) -> TechniqueResult:
     """As `dataclasses.replace`, which takes as long as many an estimate."""
     told = object.__new__(TechniqueResult)
-    vars(told).update(vars(result), runtime_s=seconds)
+    vars(told).update(vars(result), technique=name, runtime_s=seconds)
     return told
 
 

@@ -84,6 +84,8 @@ class Technique:
     obstacle : callable, optional
         (sensor, scene, known, frames or None) -> a further reason why it cannot serve, or None. Of
         frames it asks how many there are, which columns they have, and which of them are ruled out.
+    same_as : str, optional
+        The technique whose answer it gives by another name: a request for both solves once.
     """
 
     name: str
@@ -99,3 +101,4 @@ class Technique:
     solve: Callable[[Task], TechniqueResult]
     farthest_m: Callable[[Sensor], float] = _told_apart
     obstacle: Callable[[Sensor, Scene, Known, Frames | None], str | None] | None = None
+    same_as: str | None = None

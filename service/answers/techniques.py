@@ -20,7 +20,7 @@ class _Techniques:
 
 # what solves and what refuses is code
 _SHAPES: dict[type, Shape] = {
-    Technique: Shape(without=frozenset({"solve", "obstacle", "farthest_m"}))
+    Technique: Shape(without=frozenset({"solve", "obstacle", "farthest_m", "same_as"}))
 }
 
 TechniquesResponse: type[pydantic.BaseModel] = model_of(_Techniques, _SHAPES)

@@ -3,12 +3,15 @@
 from collections import Counter
 from typing import Any
 
+import numpy as np
 import pytest
 
 from inference.estimate import estimate
 from inference.estimates import Status
+from inference.fits.answer import likelihood_answer
 from inference.fits.likelihood import maximum
 from inference.fits.likelihood.levenberg_marquardt import levenberg_marquardt
+from simulator.errors import RefusedError
 from tests.counting import counting
 from tests.fits.scenes import OBJECT, VAGUE, data, exact_scene, path, sensor_of
 
@@ -45,3 +48,39 @@ def test_climbs_and_their_steps(
     assert made <= steps
     # a step that does not help is tried again with more damping, which is seldom needed
     assert total["deviance.deviance"] <= tries * made
+
+
+def test_one_fit_by_two_names_is_fitted_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    sensor = sensor_of()
+    sent = data(sensor, {"object": OBJECT, "discrepancy": 0, **CROSSTALK}, path(8))
+    scene = exact_scene({"object": OBJECT, "crosstalk": [VAGUE, VAGUE]})
+    names = ["joint_fit", "iterative_differential"]
+    alone = [estimate(sensor, scene, sent, [name]).results[0] for name in names]
+    fits = []
+    found = likelihood_answer._found
+
+    def counted(problem: Any) -> Any:
+        fits.append(problem)
+        return found(problem)
+
+    monkeypatch.setattr(likelihood_answer, "_found", counted)
+    both = estimate(sensor, scene, sent, names).results
+    assert len(fits) == 1
+    assert [result.technique for result in both] == names
+    for one, other in zip(both, alone, strict=True):
+        assert (one.technique, one.parameters, one.fit) == (
+            other.technique,
+            other.parameters,
+            other.fit,
+        )
+        np.testing.assert_array_equal(one.roots_m, other.roots_m)
+        np.testing.assert_array_equal(one.roots_sd_m, other.roots_sd_m)
+
+    def refuse(problem: Any) -> Any:
+        fits.append(problem)
+        raise RefusedError("there is no telling")
+
+    monkeypatch.setattr(likelihood_answer, "_found", refuse)
+    left_out = {each.name: each.reason for each in estimate(sensor, scene, sent, names).left_out}
+    assert [left_out[name] for name in names] == ["there is no telling"] * 2
+    assert len(fits) == 2

@@ -62,6 +62,7 @@ ITERATIVE_DIFFERENTIAL = Technique(
     equations="5.9-5.13: joint_fit of c0, c1, c2 and crosstalk",
     roots="1 as a rule: all frames decide between the roots of one",
     solve=lambda task: _solve_as("iterative_differential", task),
+    same_as="joint_fit",
     obstacle=_differential_obstacle,
 )
 
@@ -77,5 +78,6 @@ ITERATIVE_BACKGROUND_CANCELLING = Technique(
     equations="5.14-5.16: joint_fit of c0, c1, c2 and the background's strength, c' = c",
     roots="1 as a rule: all frames decide between the roots of one",
     solve=lambda task: _solve_as("iterative_background_cancelling", task),
+    same_as="joint_fit",
     obstacle=_cancelling_obstacle,
 )
