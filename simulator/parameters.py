@@ -111,6 +111,21 @@ class Parameters:
         """
         return z if self.law is None else self.law.marginal(z)
 
+    def deviations(self, z: Array) -> Array:
+        """Return how far unknowns lie from where their priors are densest, shape (n, d).
+
+        Of a normal law |z|; of one that is densest at an end, or everywhere the same, less
+        (`Distribution.deviation`). Of a joint law |z|.
+        """
+        off = np.abs(z)
+        if self.law is not None:
+            return np.asarray(off)
+        values = self._values(z)
+        for j, unknown in enumerate(self.unknowns):
+            if unknown.deviation is not None:
+                off[:, j] = np.fmin(off[:, j], unknown.deviation(values[unknown.name], values))
+        return np.asarray(off)
+
     def log_prior(self, z: Array) -> Array:
         """Return the log prior density of z, shape (n,), up to one constant of the scene."""
         density = self._log_law(z)

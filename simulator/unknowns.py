@@ -39,6 +39,8 @@ class Unknown:
         (value, values so far) -> z.
     law : Distribution, optional
         Its prior, where that is one law whatever the other unknowns are.
+    deviation : callable, optional
+        (value, values so far) -> `Distribution.deviation`; left out, it is |z|.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Unknown:
     to_normal: Callable[[Array, Values], Array]
     log_correction: Callable[[Values], Array] | None = None
     law: Distribution | None = None
+    deviation: Callable[[Array, Values], Array] | None = None
 
 
 def add_quantity(
@@ -62,7 +65,13 @@ def add_quantity(
         return
     law = quantity.distribution().truncated(low, high)
     unknowns.append(
-        Unknown(name, lambda z, _: law.from_normal(z), lambda x, _: law.to_normal(x), law=law)
+        Unknown(
+            name,
+            lambda z, _: law.from_normal(z),
+            lambda x, _: law.to_normal(x),
+            law=law,
+            deviation=lambda x, _: law.deviation(x),
+        )
     )
 
 
@@ -91,6 +100,7 @@ def add_shape(
                 lambda z, v: scale(v) * law.from_normal(z, least / scale(v)),
                 lambda x, v: law.to_normal(x / scale(v), least / scale(v)),
                 None if least == 0.0 else (lambda v: law.log_mass(least / scale(v))),
+                deviation=lambda x, v: law.deviation(x / scale(v), least / scale(v)),
             )
         )
     else:
@@ -109,6 +119,7 @@ def add_shape(
                 name1,
                 lambda z, v: np.sqrt(v["object.c0"]) * _DEFAULT_SHADOW_C1.from_normal(z),
                 lambda x, v: _DEFAULT_SHADOW_C1.to_normal(x / np.sqrt(v["object.c0"])),
+                deviation=lambda x, v: _DEFAULT_SHADOW_C1.deviation(x / np.sqrt(v["object.c0"])),
             )
         )
     elif isinstance(c1, float | int):
@@ -126,6 +137,7 @@ def add_shape(
                 lambda z, v: law1.from_normal(z, bound(v)),
                 lambda x, v: law1.to_normal(x, bound(v)),
                 None if always_inside else (lambda v: law1.log_mass(bound(v))),
+                deviation=lambda x, v: law1.deviation(x, bound(v)),
             )
         )
 

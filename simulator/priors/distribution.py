@@ -43,9 +43,9 @@ class RangeForm(NamedTuple):
 class Distribution(abc.ABC):
     """A law of x, or of log x, cut to the support [low, high].
 
-    A form of law says four things in its own coordinate (x or log x), between bounds a < b of it:
-    `_log_share`, `_position`, `_variate` and `_log_density`; and what it offers as prior of the
-    ranges, `range_form`.
+    A form of law says five things in its own coordinate (x or log x), between bounds a < b of it:
+    `_log_share`, `_position`, `_variate`, `_log_density` and `_deviation`; and what it offers as
+    prior of the ranges, `range_form`.
 
     Attributes
     ----------
@@ -74,6 +74,10 @@ class Distribution(abc.ABC):
     @abc.abstractmethod
     def _log_density(self, position: Array, a: Array, b: Array) -> Array:
         """Log density at a position of the law between a and b."""
+
+    @abc.abstractmethod
+    def _deviation(self, position: Array, a: Array, b: Array) -> Array:
+        """Root of twice by how much the log density is below its greatest between a and b."""
 
     @property
     @abc.abstractmethod
@@ -167,6 +171,26 @@ class Distribution(abc.ABC):
         # a law of log x has no density at x = 0, where both of its terms are infinite
         inside = (x >= self.low) & (x <= self.high) & ~np.isnan(density)
         return np.asarray(np.where(inside, density, -np.inf))
+
+    def deviation(self, x: Any, low: Any = -np.inf, high: Any = np.inf) -> Array:
+        """Return how far x lies from where the law, cut to [low, high], is densest.
+
+        Of a whole normal law |z|. A law that is densest at its end, as a half normal one is at
+        zero, has next to no mass there and yet nothing against it.
+
+        Parameters
+        ----------
+        x, low, high : array_like
+            As for `to_normal`.
+
+        Returns
+        -------
+        ndarray
+            ``sqrt(2 log(p_max / p))``, p the density in the law's own coordinate (x or log x).
+        """
+        low = np.maximum(low, 0.0) if self.log else low
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            return np.asarray(self._deviation(self._coordinate(x), *self._bounds(low, high)))
 
     def truncated(self, low: float = -np.inf, high: float = np.inf) -> Self:
         """Return the same law on a smaller support, renormalised."""

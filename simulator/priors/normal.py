@@ -106,6 +106,12 @@ class NormalDistribution(Distribution):
         density = -0.5 * standard**2 - _HALF_LOG_2PI - math.log(self.scale)
         return density - _log_normal_mass(self._standard(a), self._standard(b))
 
+    def _deviation(self, position: Array, a: Array, b: Array) -> Array:
+        standard = np.abs(self._standard(position))
+        least = np.abs(np.clip(0.0, self._standard(a), self._standard(b)))
+        # the difference of two squares, without overflow
+        return np.asarray(np.sqrt(np.maximum(standard - least, 0.0)) * np.sqrt(standard + least))
+
     @property
     def range_form(self) -> RangeForm:
         """Normal in r, or in log r."""

@@ -40,6 +40,9 @@ class UniformDistribution(Distribution):
     def _log_density(self, position: Array, a: Array, b: Array) -> Array:
         return np.asarray(-np.log(b - a) + np.zeros_like(position))
 
+    def _deviation(self, position: Array, a: Array, b: Array) -> Array:
+        return np.zeros(np.broadcast(position, a, b).shape)
+
     @property
     def range_form(self) -> RangeForm:
         """Constant in r, or in log r."""

@@ -69,6 +69,40 @@ def test_an_object_unlike_its_priors_is_a_misfit_that_says_so() -> None:
     assert any("priors" in reason for reason in result.fit["reasons"])
 
 
+@pytest.mark.parametrize("noise", [1e-5, 1e-7])
+def test_a_glass_that_leaks_no_light_is_no_misfit(noise: float) -> None:
+    """Half normal priors of the crosstalk, which is none: each was 3 to 4 deviations off.
+
+    Four unknowns in five are within their laws, the two of the crosstalk at their end.
+    """
+    sensor = hybridtof.parse_sensor({**KINDS["pulsed"], "noise": {"read": [noise, noise]}})
+    told = [{"prior": "halfnormal", "sd": 0.002}, {"prior": "halfnormal", "sd": 0.02}]
+    path = hybridtof.SampledTrajectory(
+        range_m=[1.0] * 5 + list(np.geomspace(0.25, 1.2, 15)),
+        object_present=[False] * 5 + [True] * 15,
+    )
+    truth = hybridtof.parse_scene({"object": OBJECT, "discrepancy": 0})
+    seen = hybridtof.simulate(sensor, truth, path, 3)
+    scene = hybridtof.parse_scene({"crosstalk": told})
+    (result,) = hybridtof.estimate(sensor, scene, seen.frames, ["joint_fit"]).results
+    assert result.fit is not None
+    assert not result.fit["misfit"]
+    assert result.fit["checks"]["priors"] > 0.01
+    off = np.abs(result.range_m[5:] - seen.range_m[5:]) / result.sd_m[5:]
+    assert off.max() < 4.0  # one of fifteen frames beyond it in a thousand runs
+
+
+def test_a_prior_that_ends_before_the_truth_is_a_misfit() -> None:
+    """No density of a uniform law is against its end, but what pulls c2 beyond it is."""
+    sensor = sensor_of("pulsed")
+    law = {"prior": "uniform", "low": 0.15, "high": 0.5}  # it is 0.0957
+    scene = hybridtof.parse_scene({"object": {**OBJECT, "c2": law}})
+    frames = data(sensor, {"discrepancy": 0}, 24, 1, (0.25, 1.2)).frames
+    (result,) = hybridtof.estimate(sensor, scene, frames, ["joint_fit"]).results
+    assert result.fit is not None
+    assert result.fit["checks"]["priors"] < 1e-6
+
+
 def test_the_check_of_priors_is_what_the_readings_alone_say_against_them() -> None:
     """One unknown, told as well by its prior as by readings whose light errs.
 

@@ -54,6 +54,31 @@ def test_cut_laws(prior, law) -> None:  # type: ignore[no-untyped-def]
     assert float(distribution.log_mass(high, low)) == -math.inf
 
 
+@pytest.mark.parametrize(("prior", "law"), LAWS, ids=NAMES)
+def test_deviations_are_those_of_the_density(prior, law) -> None:  # type: ignore[no-untyped-def]
+    """Whole laws and cut ones, against densities in x, or in log x, on a grid of their support."""
+    distribution = prior.distribution()
+    for low, high in ((-math.inf, math.inf), tuple(float(q) for q in law.ppf([0.2, 0.7]))):
+        x = distribution.from_normal(np.linspace(-6, 6, 4001), low, high)
+        density = law.logpdf(x) + (np.log(x) if distribution.log else 0.0)
+        wanted = np.sqrt(np.maximum(2 * (density.max() - density), 0.0))
+        # the greatest density may lie between two points of the grid
+        np.testing.assert_allclose(distribution.deviation(x, low, high), wanted, atol=5e-3)
+
+
+def test_a_prior_that_is_densest_at_its_end_has_nothing_against_it() -> None:
+    """A millionth of the light that it allows has next to no mass below; five times has above."""
+    light = {"prior": "halfnormal", "sd": 1.0}
+    parameters = parameters_of(PULSED, parse_scene({"crosstalk": [light, light]}))
+    values = np.array([[0.1, 0.0, 0.1, 1e-6, 5.0]])
+    z = parameters.standard(values)
+    off = parameters.deviations(z)
+    assert z[0, 3] < -4.4
+    np.testing.assert_allclose(off[0, 3:], [1e-6, z[0, 4]], rtol=1e-6)
+    assert z[0, 4] > 4.4
+    np.testing.assert_allclose(off[0, :3], np.abs(z[0, :3]))
+
+
 @pytest.mark.parametrize(
     "scene",
     [

@@ -17,7 +17,12 @@ from numpy.typing import NDArray
 
 from inference.fits.likelihood.arguments import CROSSTALK
 from inference.fits.likelihood.erring import Erring
-from inference.fits.likelihood.erring_point import linearised, point_at, slopes_of_priors
+from inference.fits.likelihood.erring_point import (
+    deviations_of,
+    linearised,
+    point_at,
+    slopes_of_priors,
+)
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import eliminated
 
@@ -65,11 +70,14 @@ class _Rows(NamedTuple):
         Derivatives along all that was fitted.
     crosstalk : ndarray, shape (m, c)
         Along the crosstalk that is no unknown.
+    dense : ndarray, shape (d,)
+        How much nearer than in the target unknowns are to where their priors are densest.
     """
 
     target: Array
     followed: Array
     crosstalk: Array
+    dense: Array
 
 
 def _rows(problem: FitProblem, top: Erring) -> _Rows:
@@ -91,6 +99,7 @@ def _rows(problem: FitProblem, top: Erring) -> _Rows:
         np.concatenate([residual[:, 0], -at.a, -at.z]),
         np.block([[errors, seen.jacobian], [np.eye(k, k + d)], [np.zeros((d, k)), slopes]]),
         np.vstack([crosstalk, np.zeros((k + d, c))]),
+        at.z - deviations_of(problem, at.x),
     )
 
 
@@ -136,8 +145,13 @@ def model_checks(problem: FitProblem, top: Erring) -> dict[str, Check]:
     of_priors = followed[rows.target.size - d :]
     share, turn = np.linalg.eigh(np.eye(d) - of_priors @ of_priors.T)
     free = share > _FREE
-    off = (turn.T @ target[rows.target.size - d :])[free] / np.sqrt(share[free])
-    return {"crosstalk": _check(light.T @ target), "priors": _check(off)}
+    share, turn = share[free], turn[:, free]
+    off = turn.T @ target[rows.target.size - d :]
+    # where the unknowns lie, and what pulls them beyond: of a prior that is densest at its end the
+    # latter alone says that an unknown should not be there
+    place, pull = off + turn.T @ rows.dense, off * np.sqrt((1.0 - share) / share)
+    priors = Check(_check(place).statistic + _check(pull).statistic, off.size)
+    return {"crosstalk": _check(light.T @ target), "priors": priors}
 
 
 def _check(off: Array) -> Check:

@@ -116,6 +116,23 @@ def standard(problem: FitProblem, points: Array) -> Array:
     return np.clip(np.nan_to_num(z, nan=_FARTHEST), -_FARTHEST, _FARTHEST)
 
 
+def deviations_of(problem: FitProblem, x: Array) -> Array:
+    """Return `standard` of one point, no farther from zero than where the priors are dense.
+
+    Returns
+    -------
+    ndarray, shape (d,)
+        As `Parameters.deviations`, with the signs of `standard`.
+    """
+    z = standard(problem, x[None])[0]
+    if problem.mode is not None:
+        return np.asarray(z)
+    columns = columns_of(problem)
+    whole = np.empty((1, len(columns)))
+    whole[0, columns] = z
+    return np.asarray(np.copysign(problem.parameters.deviations(whole)[0, columns], z))
+
+
 def slopes_of_priors(problem: FitProblem, x: Array) -> Array:
     """Return the derivatives of `standard` along the coordinates, shape (d, d)."""
     around = np.vstack([x, x + _DIFFERENCE * np.eye(x.size)])

@@ -2,9 +2,10 @@
 
 Three findings, none of which depends on how the walkers moved.
 
-* Most draws of an unknown lie where its prior has next to no mass. If the truth comes from the
-  prior, more than half of a posterior lies in a part of the prior's mass eps with probability at
-  most 2 eps (Markov), whatever the model.
+* Most draws of an unknown lie where its prior is least dense, in a part of next to no mass. If the
+  truth comes from the prior, more than half of a posterior lies in a part of the prior's mass eps
+  with probability at most 2 eps (Markov), whatever the model. The end at which a prior is densest,
+  the zero of a half normal one, is no such part: it is stated of light that may be none at all.
 * Most draws lie near an end of the prior's support, and the likelihood, the other unknowns giving
   way, and errors of the model as large as are allowed for, still climbs there by many of its own
   standard errors: a score test (Rao 1948), which does not depend on the coordinates.
@@ -74,7 +75,9 @@ def prior_conflicts(
         line = linearise(sampled, x, best, errors_left(sampled, x, best, error))
         return line.residual.ravel(), line.jacobian.reshape(-1, len(names))
 
-    return (*parameter_conflicts(names, z, linearised), *range_conflicts(density, z, log_r))
+    off = np.median(density.parameters.deviations(z), axis=0)
+    found = parameter_conflicts(names, z, linearised, off)
+    return (*found, *range_conflicts(density, z, log_r))
 
 
 def scores(jacobian: Array, residual: Array, z: Array) -> Array:
@@ -115,7 +118,10 @@ def scores(jacobian: Array, residual: Array, z: Array) -> Array:
 
 
 def parameter_conflicts(
-    names: tuple[str, ...], z: Array, linearised: Callable[[Array], tuple[Array, Array]]
+    names: tuple[str, ...],
+    z: Array,
+    linearised: Callable[[Array], tuple[Array, Array]],
+    off: Array | None = None,
 ) -> tuple[str, ...]:
     """Find unknowns whose posterior piles up where their prior fades or ends.
 
@@ -127,9 +133,12 @@ def parameter_conflicts(
         Draws of equal weight.
     linearised : callable
         (d,) -> whitened residuals (k,) and their Jacobian (k, d).
+    off : ndarray, shape (d,), optional
+        Medians of `Parameters.deviations`; left out, all priors are normal.
     """
     reasons = []
     middle = np.median(z, axis=0)  # beyond a point where more than half of the draws are
+    off = np.abs(middle) if off is None else off
     near = np.abs(middle) > -float(scipy.special.ndtri(_OUTER))
     pulls = np.zeros(len(names))
     if near.any():
@@ -141,9 +150,9 @@ def parameter_conflicts(
         pulls = np.median(found, axis=0)
     for j, name in enumerate(names):
         side = "upper" if middle[j] > 0 else "lower"
-        if abs(middle[j]) > _TAIL:
+        if off[j] > _TAIL:
             reasons.append(
-                f"{name} is drawn where its prior has next to no mass, {abs(middle[j]):.1f} "
+                f"{name} is drawn where its prior has next to no mass, {off[j]:.1f} "
                 f"standard deviations towards its {side} end: widen its prior"
             )
         elif near[j] and pulls[j] > _SCORE:

@@ -62,6 +62,22 @@ def test_a_prior_that_no_allowed_error_reconciles_is_still_named() -> None:
     assert any("background.strength" in reason for reason in _conflicts(density, z, error))
 
 
+def test_light_that_may_be_none_and_is_none_conflicts_with_no_half_normal_prior() -> None:
+    """Half of a noise of 1e-6 lies five deviations towards the end at zero."""
+    sensor = parse_sensor(
+        {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1e-6, 1e-6]}}
+    )
+    light = {"prior": "halfnormal", "sd": 1.0}
+    scene = parse_scene({"object": OBJECT, "crosstalk": [light, light]})
+    path = RadialTrajectory(from_m=0.15, to_m=0.6, frames=10, spacing="log")
+    frames = simulate(sensor, parse_scene({"object": OBJECT}), path, 1).frames
+    job = fold.prepare(sensor, scene, frames, SamplerSettings(seed=1))
+    density = job.density()
+    z = density.parameters.standard(np.array([[3e-7, 5e-7]]))[0]
+    assert (z < -4.9).all()
+    assert _conflicts(density, z, scene.model_error) == ()
+
+
 def test_errors_give_way_as_unknowns_with_standard_normal_priors_do() -> None:
     """What is left of readings that a single error made: 1 / (1 + its squared length)."""
     density, error = _set(0, LOGNORMAL)
