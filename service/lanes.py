@@ -15,6 +15,7 @@ from fastapi import Request
 
 from service.errors import BusyError, ClientGoneError
 from service.process_pool import ProcessPool
+from simulator.compiled import while_compiling
 
 __all__ = ["Processes", "Threads", "while_wanted"]
 
@@ -54,6 +55,12 @@ async def while_wanted(request: Request, work: Awaitable[R]) -> R:
         await asyncio.gather(working, leaving, return_exceptions=True)
 
 
+def _at_once(function: Callable[..., R], *arguments: Any) -> R:
+    """Run what is small: nobody waits for a compiler."""
+    with while_compiling():
+        return function(*arguments)
+
+
 class Threads:
     """Some threads, and a queue before them that has an end.
 
@@ -81,9 +88,9 @@ class Threads:
         if limiter.available_tokens <= 0:
             if limiter.statistics().tasks_waiting >= self._waiting:
                 raise BusyError("too many requests wait for their turn")
-            work = anyio.to_thread.run_sync(function, *arguments, limiter=limiter)
+            work = anyio.to_thread.run_sync(_at_once, function, *arguments, limiter=limiter)
             return await while_wanted(request, work)
-        return await anyio.to_thread.run_sync(function, *arguments, limiter=limiter)
+        return await anyio.to_thread.run_sync(_at_once, function, *arguments, limiter=limiter)
 
 
 class Processes:

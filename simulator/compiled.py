@@ -32,6 +32,7 @@ __all__ = [
     "ready_only",
     "soon",
     "when_compiling",
+    "while_compiling",
 ]
 
 P = ParamSpec("P")
@@ -41,6 +42,8 @@ R = TypeVar("R")
 _START_S, _LOAD_S = 0.4, 0.04
 # time between looks for machine code on the disk [s]
 _LOOK_S = 0.05
+# how long machine code that is on the disk is waited for at most [s]
+_WAIT_S = 2.0
 # share of the time of making machine code for which the interpreter may try what is called often
 _HOT = 0.1
 # elements beyond which it is not worth trying: less may be a table, of which few rows are asked
@@ -88,6 +91,25 @@ def ready_only() -> Iterator[None]:
         yield
     finally:
         _this_thread.ready_only = False
+
+
+@contextlib.contextmanager
+def while_compiling() -> Iterator[None]:
+    """Let the interpreter go on in this thread while machine code is made in another.
+
+    For who answers one after the other, and is not to make them wait. What would take the
+    interpreter longer than the compiler waits for machine code even so.
+    """
+    before = _beside()
+    _this_thread.beside = True
+    try:
+        yield
+    finally:
+        _this_thread.beside = before
+
+
+def _beside() -> bool:
+    return getattr(_this_thread, "beside", False)
 
 
 @contextlib.contextmanager
@@ -262,6 +284,11 @@ class Kernel:
 
         called.get_call_template = of_types
 
+    def make(self, args: tuple[Any, ...]) -> None:
+        """Make or load machine code for the types of some arguments, without a call."""
+        with at_once(self):
+            self.dispatcher._compile_for_args(*args)
+
     def _note_made(self, args: tuple[Any, ...]) -> None:
         from simulator import compiling_cost, uncompiled
 
@@ -296,7 +323,7 @@ class Kernel:
             return False
         if uncompiled.size(args) > _MANY:
             return False
-        return self._left_s(kind) > 0.0
+        return _beside() or self._left_s(kind) > 0.0
 
     def _answer(self, *args: Any, **kwargs: Any) -> Any:
         """Answer a call for which there is no machine code, as far as is known."""
@@ -307,16 +334,52 @@ class Kernel:
         kind = uncompiled.kind_of(args)
         if kwargs or not self._may_try(args, kind):
             return self.dispatcher(*args, **kwargs)
-        spent_s, began = self._spent_s.get(kind, 0.0), time.thread_time()
+        if _beside():
+            return self._answer_beside(args, kind)
         try:
-            answer, took_s = uncompiled.run(self._function, args, self._left_s(kind))
+            return self._tried(args, kind, self._left_s(kind))
         except uncompiled.NotSoError:
             self._spent_s[kind] = float("inf")
-            _given_up_s[0] += time.thread_time() - began
             dispatcher = self.dispatcher
             return dispatcher(*args)
-        self._spent_s[kind] = spent_s + took_s
+
+    def _tried(self, args: tuple[Any, ...], kind: object, most_s: float) -> Any:
+        """Answer by the interpreter, if that takes no longer."""
+        from simulator import uncompiled
+
+        began = time.thread_time()
+        try:
+            answer, took_s = uncompiled.run(self._function, args, most_s)
+        except uncompiled.NotSoError:
+            _given_up_s[0] += time.thread_time() - began
+            raise
+        self._spent_s[kind] = self._spent_s.get(kind, 0.0) + took_s
         return answer
+
+    def _answer_beside(self, args: tuple[Any, ...], kind: object) -> Any:
+        """Answer while machine code is made, unless waiting for it takes less time."""
+        from simulator import compiling_beside, compiling_cost, uncompiled
+
+        make_s, kept = compiling_cost.make_s(self._function, kind), self._kept()
+        limits = [make_s]
+        making = None
+        if kept or self._spent_s.get(kind, 0.0) > _HOT * make_s:
+            making = compiling_beside.begun(self, args, kind)
+            if making.done.is_set():
+                limits = []
+            elif kept and not making.slow:
+                limits = [_START_S + _LOAD_S, make_s]
+        for most_s in limits:
+            try:
+                return self._tried(args, kind, most_s)
+            except uncompiled.NotSoError:
+                making = making or compiling_beside.begun(self, args, kind)
+                if making.done.wait(_WAIT_S):
+                    break
+                making.slow = True
+        with at_once(self):
+            dispatcher = self.dispatcher
+            return dispatcher(*args)
 
     def _answer_at_once(self, *args: Any, **kwargs: Any) -> Any:
         """Answer as `_answer` where such calls were answered before, and nothing is in the way."""

@@ -25,6 +25,7 @@ from service.streams.model import model_of
 from service.streams.room import Room
 from service.streams.taking import take
 from service.streams.writer import Writer
+from simulator.compiled import while_compiling
 from simulator.errors import InvalidInputError
 
 __all__ = ["Producer", "lines_of", "place_of"]
@@ -209,7 +210,8 @@ class Producer:
 
     def _taken(self, place: Place, lines: list[Any]) -> tuple[Taken, StreamChange]:
         earlier = _Stored(self.store, self.record.id)
-        taken = take(self.model, place, lines, JsonLines(), earlier)
+        with while_compiling():  # no line waits for that
+            taken = take(self.model, place, lines, JsonLines(), earlier)
         place = taken.place
         change = StreamChange(
             self.record.id,

@@ -5,6 +5,7 @@ import contextlib
 import json
 import logging
 import socket
+import threading
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,13 @@ import websockets
 from websockets.exceptions import InvalidStatus
 
 from benchmarks.streams import lines_of, system
+from inference.tracking import track
 from service.app import create_app
 from service.border.keys import new_key, write_keys
 from service.cli import main
 from service.service_settings import ServiceSettings
+from simulator import compiling_cost
+from simulator.compiled import Kernel
 from tests.service import fake_fold
 from tests.service.conftest import listening, speaking
 from tests.service.streaming import LINES, NDJSON, plain, sent
@@ -253,3 +257,30 @@ async def test_the_latest_is_not_kept_waiting(address: str) -> None:
     assert stands["dropped"] == sum(answer.get("dropped", 0) for answer in found) > 0
     assert stands["dropped"] + stands["answered"] == 3000
     assert stands["gaps"] == 0
+
+
+async def test_no_line_waits_for_a_compiler(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After some hundred lines one waited for 14.5 s, where the service was not warm."""
+    kernel = Kernel(track.run_filter.__wrapped__, for_both=False)  # type: ignore[attr-defined]
+    monkeypatch.setattr(kernel, "_folder", None)
+    monkeypatch.setattr(track, "run_filter", kernel)
+    monkeypatch.setattr(compiling_cost, "make_s", lambda *_: 60.0)
+    asked, free = threading.Event(), threading.Event()
+
+    def compile_(_: object) -> None:
+        asked.set()
+        free.wait()
+
+    monkeypatch.setattr(kernel, "make", compile_)
+    try:
+        async with speaking(f"http://{address}") as http:
+            path = await made(http)
+            answers = await sent(http, path, *LINES[:1])
+            # as if hundreds had followed
+            kernel._spent_s = dict.fromkeys(kernel._spent_s, 61.0)
+            answers += await sent(http, path, *LINES[1:3])
+            assert [answer["sequence"] for answer in answers] == [1, 2, 3]
+            assert asked.wait(60.0)
+            assert kernel._dispatcher is None
+    finally:
+        free.set()
