@@ -17,12 +17,13 @@ somewhere.
 A line a scene: tracks, those with a frame that is sure and wrong (one range, no misfit, no outlier,
 5 standard deviations off), the share of such frames, tracks that say misfit, and by how much of the
 wall's light the best shadow errs at most (10, 50, 90 % of the tracks). Then what techniques of
-single frames say of every 20th. With --flux the scene states the sizes of the model's errors, of
-which the shadow's is then none.
+single frames say of every 20th, also of waves whose wall is 1.6 and 3.8 half turns away. With
+--flux the scene states the sizes of the model's errors, of which the shadow's is then none.
 """
 
 import argparse
 import dataclasses
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -45,6 +46,8 @@ KINDS = (
     {"kind": "pulsed", "pulse_width_s": 2e-8},
     {"kind": "pulsed", "pulse_width_s": 3e-8},
 )
+# waves whose walls are more than half a turn of phase away [Hz, m]
+FAR = ((2e7, 5.0), (4e7, 6.0))
 COUNT, STEP_S = 600, 1 / 30
 WHITE = 0.5  # albedo of the wall
 HELD = 1.645  # sd: half of a 90 % interval
@@ -124,9 +127,10 @@ class Course(NamedTuple):
     wall: Array  # (1,) where it stands [m]
 
 
-def course_of(number: int, rng: np.random.Generator) -> Course:
-    """Draw one."""
-    kind = dict(KINDS[number % 4])
+def course_of(number: int, rng: np.random.Generator, far: bool = False) -> Course:
+    """Draw one, before a wall that is more than half a turn of phase away if ``far``."""
+    hertz, metres = FAR[number % 2]
+    kind = {"kind": "sine_wave", "frequency_hz": hertz} if far else dict(KINDS[number % 4])
     reach = parse_sensor({**kind, "noise": {"read": [1.0, 1.0]}}).max_range_m
     low, high = 0.15, min(0.68 * reach, 2.0)
     radius, albedo = np.exp(rng.uniform(np.log([0.03, 0.05]), np.log([1.0, 0.9]))).tolist()
@@ -135,6 +139,8 @@ def course_of(number: int, rng: np.random.Generator) -> Course:
     signal = albedo * float(moments_of(np.ones(1), radius, power)[1].sum())
     noise = signal / float(np.exp(rng.uniform(np.log(20), np.log(2000))))
     wall = np.array([max(0.8 * reach, 1.02 * high) if reach < 5 else 3.0])
+    if far:
+        wall = np.array([metres])
     return Course(kind, albedo, radius, power, noise, way, grid, wall)
 
 
@@ -202,10 +208,10 @@ class Seen(NamedTuple):
     error: float
 
 
-def seen_of(number: int, walled: bool, flux: float | None = None) -> Seen:
+def seen_of(number: int, walled: bool, flux: float | None = None, far: bool = False) -> Seen:
     """Return frames of a course."""
     rng = np.random.default_rng([number, 3])
-    course = course_of(number, rng)
+    course = course_of(number, rng, far)
     shadow, error, _, numbers = fitted_of(course)
     paths, light = moments_of(course.way, course.radius, course.power)
     readings, truth = read_of(course.kind, paths, course.albedo * light)
@@ -233,9 +239,11 @@ def wrong_of(number: int, walled: bool, flux: float | None = None) -> tuple[floa
     return float((sure & off).mean()), bool(said.misfit.any()), seen.error
 
 
-def single_frames(number: int, technique: str, flux: float | None = None) -> Array:
+def single_frames(
+    number: int, technique: str, flux: float | None = None, far: bool = False
+) -> Array:
     """Return of every 20th frame with one range how many sd it is off, and its relative sd."""
-    seen = seen_of(number, True, flux)
+    seen = seen_of(number, True, flux, far)
     some = np.arange(0, COUNT, 20)
     frames = dataclasses.replace(
         seen.frames, readings=seen.frames.readings[some], time_s=STEP_S * some.astype(np.float64)
@@ -272,13 +280,15 @@ def main() -> None:
     print(
         "\n| frames by themselves | told | held by 90 % | beyond 5 sd | sd |\n|---|---|---|---|---|"
     )
-    for technique in ("background_intensity", "background_cancelling"):
+    techniques = ("background_intensity", "background_cancelling")
+    for technique, far in itertools.product(techniques, (False, True)):
         off, sd = np.concatenate(
-            [single_frames(n, technique, arguments.flux) for n in range(tracks)]
+            [single_frames(n, technique, arguments.flux, far) for n in range(tracks)]
         ).T
         held = f"{100 * np.mean(off < HELD):.0f} %"
         width = f"{100 * np.median(sd):.1f} %"
-        print(f"| {technique} | {off.size} | {held} | {int((off > 5).sum())} | {width} |")
+        name = technique + (", far walls" if far else "")
+        print(f"| {name} | {off.size} | {held} | {int((off > 5).sum())} | {width} |")
 
 
 if __name__ == "__main__":

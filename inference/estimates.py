@@ -65,7 +65,8 @@ class TechniqueResult:
         Number of roots of each frame.
     near_fold : ndarray of bool, shape (n,)
         Whether the noise could merge, part or remove a pair of roots, or reaches the r0 of a
-        pulse, from where on all ranges read alike.
+        pulse, from where on all ranges read alike. Where noise or errors of the model may have
+        merged a pair into none, the place of its fold is a root beside those that are left.
     reason : ndarray of uint8, shape (n,)
         Index into ``reasons``; 0 says nothing.
     reasons : tuple of str

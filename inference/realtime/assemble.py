@@ -68,6 +68,8 @@ class Candidates:
         Whether noise reaches any fold, with or without a root.
     model : ndarray, shape (n, m), optional
         First-order standard deviations by errors of the model [m]; None where it is exact.
+    merged : ndarray of bool, shape (n, m), optional
+        Which are places of folds, a pair of whose roots errors may have merged into none.
     """
 
     roots: Array
@@ -75,6 +77,7 @@ class Candidates:
     near: Flags
     near_frame: Flags
     model: Array | None = None
+    merged: Flags | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -127,6 +130,11 @@ def assemble(
         inside = (candidates.roots >= low * (1 - slack)) & (candidates.roots <= high * (1 + slack))
         physical = found if outcome.physical is None else found & outcome.physical
         keep = physical & inside
+        if candidates.merged is not None:
+            # alone, a fold is a reason; beside a root it is what else may explain the frame
+            single = ~candidates.merged
+            found, physical = found & single, physical & single
+            keep &= (keep & single).any(axis=1)[:, None] | single
         count = np.count_nonzero(keep, axis=1)
         width = max(int(count.max(initial=0)), 1)
         roots = np.where(keep, candidates.roots, np.nan)

@@ -1,7 +1,7 @@
 """Solve a technique that inverts a curve: targets in, candidates out."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from inference.known import Known
 from inference.realtime.assemble import NOISE_BAND, Candidates
-from inference.realtime.model_error import model_error_of, point_error, sd_of_roots
+from inference.realtime.model_error import PointError, point_error, sd_of_roots
 from inference.realtime.solving.curves.curve import Curve, CurveParameters
+from inference.realtime.solving.intervals import MonotoneIntervals
 from inference.realtime.solving.invert import invert
 from inference.realtime.solving.monotone_intervals import monotone_intervals
 from inference.realtime.solving.reach import Span
@@ -52,9 +53,15 @@ def curve_parameters(known: Known, sensor: Sensor) -> CurveParameters:
 
 
 def candidates_of(
-    task: Task, curve: Curve, high_m: float, top: Array, sd: Array, bottom: Array | None = None
+    task: Task,
+    curve: Curve,
+    high_m: float,
+    top: Array,
+    sd: Array,
+    bottom: Array | None = None,
+    beside: Callable[[Array], Array] | None = None,
 ) -> tuple[Candidates, Array]:
-    """Find all roots of a curve for every frame.
+    """Find all roots of a curve for every frame, and folds whose roots errors may have merged.
 
     Parameters
     ----------
@@ -66,6 +73,9 @@ def candidates_of(
         Targets top / bottom, in lengths of ``task.known.unit``; nan where there is none.
     sd : ndarray, shape (n,)
         Standard deviation of the target.
+    beside : callable, optional
+        Ranges [m], shape (n, m) or (1, m), to standard deviations of the target, shape (n, m), by
+        errors of the model beside those of the object's flux and time of flight.
 
     Returns
     -------
@@ -81,29 +91,69 @@ def candidates_of(
     bottom = np.ones_like(top) if bottom is None else bottom
     nearest_m, farthest_m = task.known.support if task.physical else (0.0, math.inf)
     span = Span(nearest_m / unit, min(high, farthest_m / unit), NOISE_BAND)
+    error = point_error(task, unit)
+    errors = _at_ends(curve, p, intervals, error, None if beside is None else (beside, unit))
     step = max(_CHUNK // max(intervals.low.size, 1), 1)
     chunks = [slice(i, i + step) for i in range(0, top.size, step)]
     parts = [
         _trimmed(
-            invert(curve.kind, p, intervals, curve.period, top[rows], bottom[rows], sd[rows], span)
+            invert(
+                curve.kind,
+                p,
+                intervals,
+                curve.period,
+                top[rows],
+                bottom[rows],
+                sd[rows],
+                span,
+                errors[rows] if len(errors) > 1 else errors,
+            )
         )
         for rows in chunks
     ]
     roots, slopes, gaps, nearest, reaches = parts[0] if len(parts) == 1 else _joined(parts)
-    error = model_error_of(task)
     model = None
-    if error.flux > 0 or error.range_m > 0:
-        model = unit * sd_of_roots(curve.kind, p, roots, slopes, point_error(task, unit))
+    if error.flux > 0 or error.late > 0:
+        model = unit * sd_of_roots(curve.kind, p, roots, slopes, error)
     with np.errstate(all="ignore"):
         slopes = slopes / unit
+        if beside is not None:
+            moved = beside(roots * unit) / np.abs(slopes)
+            model = moved if model is None else np.hypot(model, moved)
+        merged = slopes == 0
         candidates = Candidates(
             roots=roots * unit,
             noise=np.maximum(sd[:, None] / np.abs(slopes), reaches * unit),
             model=model,
             near=gaps < NOISE_BAND * sd[:, None],
-            near_frame=nearest < NOISE_BAND * sd,
+            near_frame=(nearest < NOISE_BAND * sd) | merged.any(axis=1),
+            merged=merged if merged.any() else None,
         )
     return candidates, slopes
+
+
+def _at_ends(
+    curve: Curve,
+    p: CurveParameters,
+    intervals: MonotoneIntervals,
+    error: PointError,
+    beside: tuple[Callable[[Array], Array], float] | None,
+) -> Array:
+    """Return what errors of the model do to a curve where it turns, shape (n or 1, k, 2)."""
+    ends = np.where(
+        np.column_stack([intervals.turns_low, intervals.turns_high]),
+        np.column_stack([intervals.low, intervals.high]),
+        np.nan,
+    ).reshape(1, -1)
+    if not np.isfinite(ends).any():
+        return np.zeros((1, intervals.low.size, 2))
+    sd = sd_of_roots(curve.kind, p, ends, np.ones_like(ends), error)
+    if beside is not None:
+        of, unit = beside
+        with np.errstate(all="ignore"):
+            sd = np.hypot(sd, of(ends * unit))
+    sd = np.where(np.isnan(sd), 0.0, sd)
+    return np.asarray(sd.reshape(len(sd), -1, 2))
 
 
 Part = tuple[Array, Array, Array, Array, Array]

@@ -60,12 +60,13 @@ def evaluations(curve: Curve, noise: float = 0.0) -> Iterator[tuple[int, int]]:
         winds = curve.period > 0 or curve.name == "cancelling_quadrature"
         high = min(distance, 0.5 * math.pi / p.wave) if winds else distance
         intervals = monotone_intervals(curve, p, 0.0, high)
+        none = np.zeros((1, intervals.low.size, 2))
         for u in high * 10.0 ** rng.uniform(-3, -1e-3, 8):
             target = np.array([dispatch.value(curve.kind, float(u), p)])
             sd = np.array([noise * u * abs(dispatch.slope(curve.kind, float(u), p))])
             span = Span(0.0, high, 3.0)
             (roots, *_), calls = counted_calls(
-                invert, curve.kind, p, intervals, curve.period, target, np.ones(1), sd, span
+                invert, curve.kind, p, intervals, curve.period, target, np.ones(1), sd, span, none
             )
             count = calls["dispatch.power_law"] + calls["dispatch.residual"]
             yield count, int(np.isfinite(roots).sum())

@@ -12,7 +12,7 @@ from simulator.frames import Frames
 from simulator.model_error import FITTED_SHARE, RANGE_ERROR_SD
 from simulator.parameters import parameters_of
 from simulator.scene import parse_scene
-from simulator.sensor import Sensor, parse_sensor
+from simulator.sensor import Sensor, SineWaveSensor, parse_sensor
 from simulator.shadow_error import SHADOW_SD
 from simulator.simulate import mean_readings
 
@@ -77,3 +77,37 @@ def test_an_exact_model_has_no_such_error() -> None:
     exact = answered("background_intensity", sensor, readings_of(sensor, WALL), 0)
     assert exact.sd_parts_m is not None
     np.testing.assert_array_equal(exact.sd_parts_m.model, 0.0)
+
+
+@pytest.mark.parametrize("turns", [0.8, 1.4, 3.3])
+@pytest.mark.parametrize("size", [-2.0, -1.0, 1.0, 2.0])
+def test_no_root_that_the_shadow_moves_or_merges_is_taken_away(turns: float, size: float) -> None:
+    """A wall whose visible light is farther or nearer than stated by some standard deviations.
+
+    Of a wall so many half turns of phase away there are several roots; an error of the shadow that
+    merges the right one with another leaves a third, which must not be called the only one.
+    """
+    sensor = sensor_of("sine_wave")
+    assert isinstance(sensor, SineWaveSensor)
+    distance = turns * np.pi / sensor.wave_number
+    grid = np.geomspace(0.2, min(3.0, 0.7 * distance), 60)
+    share = grid * (grid + SHADOW["c1"]) / (grid * (grid + SHADOW["c1"]) + SHADOW["c0"])
+    wall = {"strength": 0.05, "distance_m": distance, "shadow": SHADOW}
+    readings = []
+    for r, hidden in zip(grid, 1.0 - share, strict=True):
+        moved = {**wall, "distance_m": distance * (1.0 + size * SHADOW_SD * hidden)}
+        scene = parse_scene({"object": OBJECT, "background": moved})
+        terms = parameters_of(sensor, scene).terms(np.zeros((1, 0)))
+        readings.append(mean_readings(sensor, terms, np.array([r]))[0])
+    said = estimate(
+        sensor,
+        parse_scene({"object": OBJECT, "background": wall}),
+        Frames(np.array(readings)),
+        ["background_cancelling"],
+    ).results[0]
+    sure = (said.status == Status.UNIQUE) & ~said.near_fold
+    off = np.abs(said.range_m - grid)[sure] / said.sd_m[sure]
+    assert off.max() < 1.5 * abs(size) + 0.5  # of first order
+    kept = (np.abs(said.roots_m - grid[:, None]) < 4 * said.roots_sd_m).any(axis=1)
+    assert (kept | said.near_fold | (said.status == Status.NONE)).all()
+    assert (said.status != Status.NONE).mean() > 0.4

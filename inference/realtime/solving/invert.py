@@ -19,13 +19,30 @@ Array = NDArray[np.float64]
 
 @compiled
 def _capacity(intervals: MonotoneIntervals, period: float) -> int:
-    """Return the largest possible number of roots of one frame."""
+    """Return the largest possible number of roots and folds of one frame."""
     total = 0
     for j in range(intervals.low.size):
-        total += 1
+        total += 1 + int(_own_fold(intervals, j)) + int(intervals.turns_high[j])
         if period > 0.0:
             total += int(abs(intervals.at_high[j] - intervals.at_low[j]) / period)
     return max(total, 1)
+
+
+@compiled
+def _own_fold(intervals: MonotoneIntervals, j: int) -> bool:
+    """Say whether the curve turns at the lower end of interval j, and no other ends there."""
+    if not intervals.turns_low[j]:
+        return False
+    return j == 0 or intervals.high[j - 1] != intervals.low[j] or not intervals.turns_high[j - 1]
+
+
+@compiled
+def _beyond(turn: float, other: float, target: float, period: float) -> float:
+    """Return by how much a target lies beyond a turning value, where no root is; else less."""
+    beyond = target - turn
+    if period > 0.0:
+        beyond -= period * math.floor(beyond / period + 0.5)
+    return beyond if turn > other else -beyond
 
 
 @compiled
@@ -47,8 +64,9 @@ def invert(
     bottom: Array,
     sd: Array,
     span: Span,
+    errors: Array,
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Find all roots of value(u) = top / bottom.
+    """Find all roots of value(u) = top / bottom, and folds whose roots errors may have merged.
 
     Parameters
     ----------
@@ -66,13 +84,15 @@ def invert(
         Their standard deviations; nan where there is none.
     span : Span
         Where ranges end, and how far noise is followed along the curve.
+    errors : ndarray, shape (n or 1, k, 2)
+        Standard deviations of the values at both ends of the intervals by errors of the model.
 
     Returns
     -------
     roots : ndarray, shape (n, m)
         nan-padded, in the order in which they are found.
     slopes : ndarray, shape (n, m)
-        d value / du at the roots.
+        d value / du at the roots; 0 at a fold that the target misses by less than ``span.band``.
     gaps : ndarray, shape (n, m)
         Distance of the target from the nearer turning value of the root's interval, inf without.
     nearest : ndarray, shape (n,)
@@ -93,14 +113,21 @@ def invert(
         found = 0
         last = -1.0
         target = top[i] / bottom[i] if bottom[i] != 0.0 else math.inf
+        row = min(i, errors.shape[0] - 1)
         for j in range(k):
             low, high = intervals.low[j], intervals.high[j]
             at_low, at_high = intervals.at_low[j], intervals.at_high[j]
             below, above = min(at_low, at_high), max(at_low, at_high)
+            by_low, by_high = (
+                math.hypot(sd[i], errors[row, j, 0]),
+                math.hypot(sd[i], errors[row, j, 1]),
+            )
             if intervals.turns_low[j]:
                 nearest[i] = min(nearest[i], _off(at_low, target, period))
-            if intervals.turns_high[j]:
-                nearest[i] = min(nearest[i], _off(at_high, target, period))
+                beyond = _beyond(at_low, at_high, target, period)
+                if 0.0 < beyond < span.band * by_low and _own_fold(intervals, j) and found < m:
+                    roots[i, found], slopes[i, found], gaps[i, found] = low, 0.0, 0.0
+                    found += 1
             goal = target
             if period > 0.0:
                 goal = target + period * math.ceil((below - target) / period)
@@ -128,4 +155,10 @@ def invert(
                 if period <= 0.0:
                     break
                 goal += period
+            if intervals.turns_high[j]:
+                nearest[i] = min(nearest[i], _off(at_high, target, period))
+                beyond = _beyond(at_high, at_low, target, period)
+                if 0.0 < beyond < span.band * by_high and found < m:
+                    roots[i, found], slopes[i, found], gaps[i, found] = high, 0.0, 0.0
+                    found += 1
     return roots, slopes, gaps, nearest, reaches

@@ -122,8 +122,9 @@ def _crossings(level: Level, p: CurveParameters, low: float, high: float) -> lis
     intervals = monotone_intervals(other, p, low, high)
     target = np.array([level.value(p)])
     exactly = Span(0.0, math.inf, 0.0)
+    nothing = np.zeros((1, intervals.low.size, 2))
     roots, _, _, _, _ = invert(
-        other.kind, p, intervals, other.period, target, np.ones(1), np.zeros(1), exactly
+        other.kind, p, intervals, other.period, target, np.ones(1), np.zeros(1), exactly, nothing
     )
     return [float(u) for u in roots.ravel() if math.isfinite(u)]
 

@@ -1,6 +1,6 @@
 """Background cancelling: a background of known distance drops out, whatever its strength."""
 
-import dataclasses
+import functools
 import math
 from typing import NamedTuple
 
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
 from inference.realtime.assemble import NOISE_BAND, Outcome, assemble, reasons_of
-from inference.realtime.from_curve import candidates_of
-from inference.realtime.model_error import model_error_of
+from inference.realtime.from_curve import candidates_of, curve_parameters
+from inference.realtime.model_error import model_error_of, point_error, sd_of_roots
 from inference.realtime.net import UNREPRESENTABLE, Form, Net, known_net_readings
 from inference.realtime.solving.bracketing import EPSILON
 from inference.realtime.solving.curves import cancelling_quadrature, cancelling_ratio
@@ -119,12 +119,10 @@ def _solve(task: Task) -> TechniqueResult:
         target = np.where(usable, target, np.nan)
         sd = np.hypot(np.sqrt(parts.var_free) * scale, net.relative * target)
         distance = known.get("background.distance_m")
-        candidates, slopes = candidates_of(task, curve, distance, target, sd)
-        shadow = model_error_of(task).shadow
-        if shadow > 0:
-            by_shadow = _by_shadow(task, parts.whole, candidates.roots) * scale / np.abs(slopes)
-            model = 0.0 if candidates.model is None else candidates.model
-            candidates = dataclasses.replace(candidates, model=np.hypot(model, shadow * by_shadow))
+        beside = None
+        if model_error_of(task).shadow > 0:
+            beside = functools.partial(_by_shadow, task, parts.whole * scale, scale)
+        candidates, slopes = candidates_of(task, curve, distance, target, sd, beside=beside)
         physical = None
         if task.physical and known.has("background.strength"):
             scene = _Scene(
@@ -137,7 +135,12 @@ def _solve(task: Task) -> TechniqueResult:
             wave = None
             if isinstance(sensor, SineWaveSensor):
                 wave = _Wave(sensor.wave_number, distance)
-            physical = _physical(candidates.roots, slopes / scale, parts, scene, wave, NOISE_BAND)
+            by_model = _moved(task, curve, candidates.roots, slopes)
+            if beside is not None:
+                by_model = np.hypot(by_model, beside(candidates.roots) / np.abs(slopes))
+            physical = _physical(
+                candidates.roots, slopes / scale, by_model, parts, scene, wave, NOISE_BAND
+            )
     reason = np.full(free.size, _NO_RANGE, dtype=np.uint8)
     if isinstance(sensor, PulsedSensor):
         reason[~(free > 0)] = _BEYOND
@@ -146,34 +149,53 @@ def _solve(task: Task) -> TechniqueResult:
     return assemble("background_cancelling", state, candidates, outcome)
 
 
-def _by_shadow(task: Task, whole: Array, roots: Array) -> Array:
-    """Return what errors of the shadow leave of a background, in units of their size, shape (n, m).
+def _moved(task: Task, curve: Curve, roots: Array, slopes: Array) -> Array:
+    """Return how far errors of the time of flight move roots [m], shape (n, m)."""
+    unit = task.known.unit
+    late = point_error(task, unit)._replace(flux=0.0, flux_slope=0.0)
+    p = curve_parameters(task.known, task.sensor)
+    return unit * sd_of_roots(curve.kind, p, roots / unit, slopes * unit, late)
+
+
+def _by_shadow(task: Task, whole: Array, scale: float, roots: Array) -> Array:
+    """Return what errors of the shadow leave of a background, shape (n, m), in units of ``whole``.
 
     Light that is farther away than the background is not cancelled: docs/model.md, shadow-error.
-    Where no number tells the shadow, it is taken for as large as the object.
+    Where no number tells the shadow, it is taken for as large as the object. How much light there
+    is the readings tell, but for these errors themselves; where its strength is known, also that.
     """
     sensor, known = task.sensor, task.known
     c0, c1 = known.get("object.c0"), known.get("object.c1")
-    flux = object_fluxes(roots, sensor.known_gain * known.get("object.c2") * c0, c0, c1)
+    flux = object_fluxes(roots, sensor.known_gain * known.get("object.c2") * c0 * scale, c0, c1)
     turn = 1.0
     if isinstance(sensor, SineWaveSensor):
-        distance = known.get("background.distance_m")
-        turn = sensor.wave_number * distance
+        turn = sensor.wave_number * known.get("background.distance_m")
         flux = flux * np.cos(turn - sensor.wave_number * roots)
     if known.has("background.shadow.c0", "background.shadow.c1"):
         c0, c1 = known.get("background.shadow.c0"), known.get("background.shadow.c1")
-    _, by_distance = shadow_errors(shadows(roots, c0, c1))
-    return np.asarray(np.abs(whole[:, None] - flux) * turn * by_distance)
+    seen = shadows(roots, c0, c1)
+    _, by_distance = shadow_errors(seen)
+    light = np.abs(whole[:, None] - flux)
+    if known.has("background.strength"):
+        light = np.maximum(light, known.get("background.strength") * scale * seen)
+    return np.asarray(model_error_of(task).shadow * light * turn * by_distance)
 
 
 @compiled
 def _physical(
-    roots: Array, slopes: Array, parts: _Parts, scene: _Scene, wave: _Wave | None, band: float
+    roots: Array,
+    slopes: Array,
+    by_model: Array,
+    parts: _Parts,
+    scene: _Scene,
+    wave: _Wave | None,
+    band: float,
 ) -> Flags:
-    """Say at which roots the background is between nothing and its strength, within noise.
+    """Say at which roots the background is between nothing and its strength, within its errors.
 
     The background is whole - C Phi(r), with C = 1 or cos k (R - r), and its first-order error
-    d whole - (C Phi)' d free / free'(r).
+    d whole - (C Phi)' d free / free'(r). Errors of the model move r by ``by_model``. At a fold the
+    slope is 0, and any background is possible.
     """
     n, m = roots.shape
     accepted = np.zeros((n, m), dtype=np.bool_)
@@ -181,6 +203,9 @@ def _physical(
         for j in range(m):
             r = roots[i, j]
             if not r > 0.0:
+                continue
+            if slopes[i, j] == 0.0:
+                accepted[i, j] = True
                 continue
             q = quadratic(r, scene.c0, scene.c1)
             flux = scene.gain * (scene.c0 / q) / r / r
@@ -196,7 +221,8 @@ def _physical(
             variance = parts.var_whole[i] - 2.0 * (lever * parts.cov[i])
             variance += lever * (lever * parts.var_free[i])
             common = scene.relative * (part - lever * parts.free[i])
-            variance = max(variance, 0.0) + common * common
+            moved = change * by_model[i, j]
+            variance = max(variance, 0.0) + common * common + moved * moved
             rounding = 64.0 * EPSILON * (parts.size[i] * (1.0 + abs(lever)) + flux)
             slack = band * math.sqrt(variance) + rounding
             accepted[i, j] = not (background < -slack or background > scene.strength + slack)
