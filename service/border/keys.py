@@ -88,15 +88,14 @@ def read_keys(path: Path) -> tuple[Key, ...]:
         Where it cannot be read, is no file of keys, or can be read by others.
     """
     try:
-        with path.open(encoding="utf-8") as file:
-            mode = os.fstat(file.fileno()).st_mode
-            if mode & _OTHERS:
-                raise InvalidInputError.at(
-                    POINTER, f"others can read or write {path}: chmod 600 {path}"
-                )
-            return tuple(Key(**entry) for entry in json.load(file)["keys"])
+        with path.open("rb") as file:
+            mode, content = os.fstat(file.fileno()).st_mode, file.read()
     except OSError as error:
         raise InvalidInputError.at(POINTER, f"{path}: {error.strerror}") from None
+    if mode & _OTHERS:
+        raise InvalidInputError.at(POINTER, f"others can read or write {path}: chmod 600 {path}")
+    try:
+        return tuple(Key(**entry) for entry in json.loads(content)["keys"])
     except (ValueError, TypeError, KeyError):
         raise InvalidInputError.at(POINTER, f"{path} is no file of keys") from None
 

@@ -141,9 +141,17 @@ def test_command(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert os.listdir(file.parent) == ["keys.json"]  # noqa: PTH208
 
 
-@pytest.mark.parametrize("spoil", ["mode", "text", "shape", "gone"])
+@pytest.mark.parametrize(
+    ("spoil", "why"),
+    [
+        ("mode", "others can read or write"),
+        ("text", "is no file of keys"),
+        ("shape", "is no file of keys"),
+        ("gone", "No such file"),
+    ],
+)
 def test_a_file_that_is_no_secret_ends_the_start(
-    file: Path, secrets: list[str], capsys: pytest.CaptureFixture[str], spoil: str
+    file: Path, secrets: list[str], capsys: pytest.CaptureFixture[str], spoil: str, why: str
 ) -> None:
     assert len(read_keys(file)) == len(secrets)
     if spoil == "mode":
@@ -157,6 +165,7 @@ def test_a_file_that_is_no_secret_ends_the_start(
     assert main(["serve", "--port", "0"]) == 2
     said = capsys.readouterr().err
     assert said.startswith("hybridtof: error: /HYBRIDTOF_API_KEYS: ")
+    assert why in said
     assert said.count("\n") == 1
 
 
