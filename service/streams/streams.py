@@ -26,6 +26,8 @@ __all__ = ["Streams"]
 
 _LOOK_S = 1.0
 _TOGETHER_S = 0.1
+# how long a client that has hung up takes to be gone: the next is often the same one
+_LEAVING_S = 0.5
 _REMEMBERED = 256
 
 
@@ -57,7 +59,8 @@ class Streams:
         self._threads = threads
         self._writer = Writer(store)
         self._holder = holder_name()
-        self._producing: set[str] = set()
+        # streams that somebody sends to, and what tells that nobody does any more
+        self._producing: dict[str, asyncio.Event] = {}
         # held by those who wait alone
         self._watched: weakref.WeakValueDictionary[str, asyncio.Event] = (
             weakref.WeakValueDictionary()
@@ -192,13 +195,14 @@ class Streams:
         GoneError
             Where it has expired, or its state is of another version.
         """
+        await self._left(stream_id)
         known = None if lasting else self._remembered(stream_id, client)
         record = known or await self.get(stream_id, client)
         if self._store.expired(record):
             raise GoneError("the stream has expired: make a new one")
         if stream_id in self._producing or self._held_elsewhere(record):
             raise ConflictError("another client sends to this stream")
-        self._producing.add(stream_id)
+        self._producing[stream_id] = asyncio.Event()
         self._traces.producers.inc()
         if self._limiter is None:
             self._limiter = anyio.CapacityLimiter(self._threads)
@@ -228,8 +232,15 @@ class Streams:
                     with contextlib.suppress(StoreError):  # the lease runs out by itself
                         await asyncio.to_thread(self._store.release, stream_id, self._holder)
         finally:
-            self._producing.discard(stream_id)
+            self._producing.pop(stream_id).set()
             self._traces.producers.dec()
+
+    async def _left(self, stream_id: str) -> None:
+        """Wait a moment for a client that is about to be gone."""
+        if (leaving := self._producing.get(stream_id)) is not None:
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(_LEAVING_S):
+                    await leaving.wait()
 
     def _remembered(self, stream_id: str, client: str) -> StreamRecord | None:
         """Return the record of a stream as it stood here, where it need not be read again.

@@ -6,6 +6,7 @@ import json
 import logging
 import socket
 import threading
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from service.app import create_app
 from service.border.keys import new_key, write_keys
 from service.cli import main
 from service.service_settings import ServiceSettings
+from service.store.stream_store import StreamStore
 from simulator import compiling_cost
 from simulator.compiled import Kernel
 from tests.service import fake_fold
@@ -284,3 +286,23 @@ async def test_no_line_waits_for_a_compiler(address: str, monkeypatch: pytest.Mo
             assert kernel._dispatcher is None
     finally:
         free.set()
+
+
+async def test_a_client_that_comes_again_at_once_is_let_in(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was told that another client sends, for as long as its own end was being written."""
+    release = StreamStore.release
+
+    def slow(*args: Any) -> None:
+        time.sleep(0.1)
+        release(*args)
+
+    monkeypatch.setattr(StreamStore, "release", slow)
+    async with speaking(f"http://{address}") as http:
+        path = await made(http)
+        for line in LINES[:3]:
+            async with websockets.connect(f"ws://{address}{path}/live") as socket_:
+                await socket_.send(line.decode())
+                await socket_.recv()
+        assert (await sent(http, path, *LINES[3:4]))[0]["sequence"] == 4
