@@ -1,15 +1,17 @@
 """Tracks whose crosstalk is learnt beside light that is known to a factor: what is held, and lost.
 
-    python -m benchmarks.uncertain_light [--tracks 600] [--seed S] [--crosstalk known]
+    python -m benchmarks.uncertain_light [--tracks 600] [--seed S] [--crosstalk known] [--object]
 
-Random tracks: pulses and sine waves, c2 known to exp(0.003) to exp(0.5) by a joint law, crosstalk
-to a thousandth to a whole of the light at 0.6 m, read noise 1e-6 to 1e-3 of the unit, 8 to 30
-frames of a motion as stated, errors of the model on in every other. A track is lost where any frame
-that is called unique lies more than five standard deviations off and no misfit is said.
+Random tracks: pulses and sine waves, c2 known to exp(0.003) to exp(0.5) by its prior (with
+`--object` to no worse than exp(0.3), c0 as well, and c1 to as much of sqrt(c0)), crosstalk to a
+thousandth to a whole of the light at 0.6 m, read noise 1e-6 to 1e-3 of the unit, 8 to 30 frames of
+a motion as stated, errors of the model on in every other. A track is lost where any frame that is
+called unique lies more than five standard deviations off and no misfit is said.
 """
 
 import argparse
 import dataclasses
+import math
 import secrets
 from typing import Any
 
@@ -35,6 +37,7 @@ KINDS = (
     {"kind": "sine_wave", "frequency_hz": 5e6},
 )
 SHAPE, C2 = {"c0": 0.0769, "c1": -0.123}, 0.1
+MOST_WHOLE = 0.3
 NEAREST_M, FARTHEST_M = 0.2, (0.6, 1.0, 1.5, 2.5)
 STEPS_S, RATES = (0.02, 0.1, 0.2), (0.3, 1.0)
 WITHIN = 10  # steps of the motion between two frames
@@ -69,17 +72,20 @@ def _path(rng: np.random.Generator, count: int, step: float, rate_sd: float, far
             return np.exp(path)
 
 
-def random_track(seed: int, number: int) -> RandomTrack:
+def random_track(seed: int, number: int, whole: bool = False) -> RandomTrack:
     """Draw a track.
 
     Parameters
     ----------
     seed, number : int
         Of the study and of the track in it.
+    whole : bool
+        Whether c0 and c1 have priors, too.
     """
     rng = np.random.default_rng([seed, number])
     kind = KINDS[int(rng.integers(2))]
     sigma, noise = np.exp(rng.uniform(np.log([0.003, 1e-6]), np.log([0.5, 1e-3]))).tolist()
+    sigma = min(sigma, MOST_WHOLE) if whole else sigma
     count, step = int(rng.integers(8, 31)), float(rng.choice(STEPS_S))
     rate_sd, far = float(rng.choice(RATES)), float(rng.choice(FARTHEST_M))
     light = float(object_flux(0.6, SHAPE["c0"] * C2, SHAPE["c0"], SHAPE["c1"]))
@@ -88,14 +94,21 @@ def random_track(seed: int, number: int) -> RandomTrack:
     c2 = C2 * float(np.exp(sigma * rng.standard_normal()))
     r = _path(rng, count, step, rate_sd, far)
     sensor = parse_sensor({**kind, "noise": {"read": [noise] * 2}})
+    stated: dict[str, Any] = {**SHAPE, "c2": {"prior": "lognormal", "median": C2, "sigma": sigma}}
+    shape = SHAPE
+    if whole:
+        sd = sigma * SHAPE["c0"] ** 0.5
+        stated["c0"] = {"prior": "lognormal", "median": SHAPE["c0"], "sigma": sigma}
+        stated["c1"] = {"prior": "normal", "mean": SHAPE["c1"], "sd": sd}
+        first, second = rng.standard_normal(2).tolist()
+        shape = {"c0": SHAPE["c0"] * math.exp(sigma * first), "c1": SHAPE["c1"] + sd * second}
     told = {
-        "object": {**SHAPE, "c2": {"prior": "lognormal", "median": C2, "sigma": sigma}},
+        "object": stated,
         "crosstalk": [{"prior": "normal", "mean": 0.0, "sd": unknown_by}] * 2,
         "discrepancy": "default" if rng.random() < 0.5 else 0,
         "range_m": {"prior": "loguniform", "low": NEAREST_M, "high": far},
-        "joint": {"unknowns": ["object.c2"], "modes": [{"mean": [0.0], "covariance": [[1.0]]}]},
     }
-    truth = {"object": {**SHAPE, "c2": c2}, "crosstalk": crosstalk, "discrepancy": 0}
+    truth = {"object": {**shape, "c2": c2}, "crosstalk": crosstalk, "discrepancy": 0}
     path = SampledTrajectory(range_m=r.tolist(), time_s=(step * np.arange(count)).tolist())
     frames = simulate(sensor, parse_scene(truth), path, rng).frames
     return RandomTrack(sensor, told, crosstalk, frames, r, rate_sd)
@@ -129,11 +142,12 @@ def main() -> None:
     parser.add_argument("--tracks", type=int, default=600)
     parser.add_argument("--seed", type=int, help="left out: a fresh one")
     parser.add_argument("--crosstalk", choices=("learnt", "known"), default="learnt")
+    parser.add_argument("--object", action="store_true", help="c0 and c1 have priors, too")
     args = parser.parse_args()
     seed = secrets.randbits(31) if args.seed is None else args.seed
     held, widths, told, lost = [], [], [], []
     for number in range(args.tracks):
-        track = random_track(seed, number)
+        track = random_track(seed, number, args.object)
         off, relative = off_of(track, args.crosstalk == "known")
         any_told = np.isfinite(off)
         told.append(any_told.mean())

@@ -6,12 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.answer.posterior import Posterior
-from simulator.errors import InvalidInputError, RefusedError
+from simulator.errors import InvalidInputError, RefusedError, listed
 from simulator.parameters import Parameters, Terms
+from simulator.sensor_unknowns import GAIN
 
-__all__ = ["Nuisance", "nuisance_of"]
+__all__ = ["CALIBRATE", "Nuisance", "nuisance_of"]
 
 Array = NDArray[np.float64]
+
+CALIBRATE = (
+    "calibrate the scene first (hybridtof calibrate, or a posterior of frames of this scene), or "
+    "let the stream learn it (--calibrate, over HTTP `calibrate`)"
+)
 
 _FEWEST_DRAWS = 20  # a direction
 
@@ -25,6 +31,8 @@ class Nuisance:
     # change with a direction is taken as a secant between the two, which feels the curvature
     plus: tuple[Terms, ...]
     minus: tuple[Terms, ...]
+    # unknowns of object and gain whose priors are all that is known: the last directions are theirs
+    carried: tuple[str, ...] = ()
 
 
 def nuisance_of(
@@ -40,7 +48,7 @@ def nuisance_of(
         The scene's unknowns.
     posterior : Posterior or ndarray, shape (draws, d), optional
         Draws in SI units in the order of ``parameters.names``, or a posterior of this scene. Left
-        out, the scene's joint law is what is known.
+        out, the scene's joint law is what is known, and the priors of object and gain.
     learnt : tuple of str
         Unknowns that need no posterior.
 
@@ -49,32 +57,27 @@ def nuisance_of(
     InvalidInputError
         Where the draws are not finite, too few, or of another scene.
     RefusedError
-        Where something is unknown and there is no posterior.
+        Where there is no posterior, and others than the object and the gain are unknown.
     """
     names = parameters.names
     told = () if parameters.law is None else parameters.law.names
     free = [name for name in names if name not in (*learnt, *told) and "range_m." not in name]
     origin = np.zeros(len(names))
     if posterior is None:
-        if free:
-            differs = (
-                "; of objects that differ, state the numbers of one and as `discrepancy.flux` how "
-                "far others are from it (0.7: half to twice the light)"
-            )
+        others = [n for n in free if not n.startswith("object.") and n != GAIN]
+        if others:
             raise RefusedError(
-                f"{', '.join(free)} unknown: a tracker needs numbers or a posterior; calibrate the "
-                "scene first (hybridtof calibrate, or a posterior of frames of this scene), or "
-                "let the stream learn it (--calibrate, over HTTP `calibrate`)"
-                + (differs if "object.c2" in free else "")
+                f"{listed(others)} unknown: a tracker takes priors of the object, the gain and the "
+                f"crosstalk, and needs numbers or a posterior of all else; {CALIBRATE}"
             )
-        steps = np.eye(len(names))[[names.index(name) for name in told]]
+        steps = np.eye(len(names))[[names.index(name) for name in (*told, *free)]]
         near = parameters.natural(np.concatenate([origin[None], steps, -steps]))
         if not np.isfinite(near).all():
             raise RefusedError(
                 "the scene's joint law reaches beyond what can be computed with; calibrate with "
                 "frames that tell more of its unknowns"
             )
-        return _around(parameters, origin, steps)
+        return _around(parameters, origin, steps, tuple(free))
     draws = _draws(parameters, posterior)
     with np.errstate(all="ignore"):
         z = parameters.standard(draws)
@@ -87,11 +90,14 @@ def nuisance_of(
     return _around(parameters, centre, roots)
 
 
-def _around(parameters: Parameters, centre: Array, roots: Array) -> Nuisance:
+def _around(
+    parameters: Parameters, centre: Array, roots: Array, carried: tuple[str, ...] = ()
+) -> Nuisance:
     return Nuisance(
         parameters.terms(centre[None]),
         tuple(parameters.terms((centre + root)[None]) for root in roots),
         tuple(parameters.terms((centre - root)[None]) for root in roots),
+        carried,
     )
 
 

@@ -23,6 +23,7 @@ from inference.tracking.readings_table import ReadingsTable
 from inference.tracking.rules import MisfitLimits, is_felt, misfit_limits, rules_of
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
+from inference.tracking.stated_priors import check_carried
 from inference.tracking.tabulate import empty_readings, knots_of, places_of, table_of
 from inference.tracking.unsteady import UNSTEADY
 from inference.tracking.weighing import Model
@@ -116,7 +117,7 @@ def tracker(
         What is known of the scene's unknowns: draws in SI units in the order of
         ``parameters_of(sensor, scene).names``. Their uncertainty is common to all frames: it is in
         every standard deviation and does not average down. Left out, it is the scene's joint law,
-        where it has one.
+        where it has one, and the priors of object and gain.
 
     Returns
     -------
@@ -128,9 +129,10 @@ def tracker(
         Where `check_scene` refuses the scene (pointers below "/scene"), for draws that do not
         belong to it ("/posterior"), or for settings that do not belong to the sensor ("/settings").
     RefusedError
-        Where there is no honest answer: unknowns without a posterior, tangential motion, optional
-        terms, derivatives with an uncertain scene, crosstalk to learn of a sensor whose delay
-        drifts, an error of the distance of more than a radian of a sine wave.
+        Where there is no honest answer: unknowns without a posterior, but for crosstalk and an
+        object whose light is known to a factor of two; tangential motion, optional terms,
+        derivatives with an uncertain scene, crosstalk to learn of a sensor whose delay drifts, an
+        error of the distance of more than a radian of a sine wave.
     """
     settings = TrackingSettings() if settings is None else settings
     try:
@@ -165,13 +167,16 @@ def tracker(
         )
     law = _law(parameters.range_prior, known.centre)
     knots = knots_of(sensor, known.centre, law, observed, settings.rate_sd)
+    check_carried(known, knots.positions)
     # what derivatives owe to errors of the model is added to what the filter says
     erring = scene.model_error
     carried = ModelError(0.0, 0.0, integrated=False)
     if not observed.by_rate:
-        # numbers, or a joint law, come from a fit
-        fixed = not any(n.startswith("object.") and n not in told for n in parameters.names)
-        carried = erring.beside_numbers() if fixed else erring
+        # numbers, a joint law, and priors about numbers come from a fit
+        whole = posterior is not None and any(
+            n.startswith("object.") and n not in told for n in parameters.names
+        )
+        carried = erring if whole else erring.beside_numbers()
     jacobian = nuisance_jacobian(sensor, carried, known, knots, observed.scale, not learns)
     crosstalk = np.zeros(2)
     if known.centre.crosstalk is not None and not observed.by_rate:

@@ -5,9 +5,11 @@ import pytest
 
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.track import track
+from inference.tracking.tracker import tracker
 from simulator.errors import RefusedError
 from simulator.frames import frames_from_columns
 from simulator.parameters import parameters_of
+from simulator.priors import LogNormal
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
 from simulator.simulate import simulate
@@ -59,7 +61,7 @@ def test_what_the_law_does_not_name_is_refused() -> None:
         RadialTrajectory(from_m=0.5, to_m=1.2, frames=2),
         3,
     ).frames
-    with pytest.raises(RefusedError, match=r"object\.c1, object\.c2 unknown"):
+    with pytest.raises(RefusedError, match=r"object\.c1 and object\.c2 unknown, by a factor of"):
         track(SENSOR, parse_scene({"joint": joint}), frames)
 
 
@@ -81,3 +83,61 @@ def test_crosstalk_that_the_law_does_not_name_is_learnt_from_its_prior() -> None
     assert found.crosstalk_sd is not None
     assert np.allclose(found.crosstalk[-1], readings.mean(axis=0) * weights[1] / sum(weights))
     assert np.allclose(found.crosstalk_sd[-1], sum(weights) ** -0.5)
+
+
+PRIORS = {
+    "c2": {"c0": 0.08, "c1": 0.0, "c2": {"prior": "lognormal", "median": 0.1, "sigma": 0.3}},
+    "gain": {"c0": 0.08, "c1": 0.0, "c2": 0.1},
+    "all": {
+        "c0": {"prior": "lognormal", "median": 0.08, "sigma": 0.2},
+        "c1": {"prior": "normal", "mean": 0.0, "sd": 0.05},
+        "c2": {"prior": "lognormal", "median": 0.1, "sigma": 0.2},
+    },
+}
+
+
+@pytest.mark.parametrize("which", PRIORS)
+@pytest.mark.parametrize("crosstalk", [None, [0.001, 0.002], STATED["crosstalk"]])
+def test_priors_of_the_object_are_carried_as_a_law_of_them_is(
+    which: str, crosstalk: object
+) -> None:
+    """A standard normal law in the coordinates of the priors says what they say: to the last bit.
+
+    Such a scene, the strength of an object known to a factor, was refused.
+    """
+    told = {"object": PRIORS[which]} | ({} if crosstalk is None else {"crosstalk": crosstalk})
+    sensor = SENSOR
+    if which == "gain":
+        gain = LogNormal(median=1.0, sigma=0.3)
+        sensor = SENSOR.model_copy(update={"gain": gain})
+    unknown = parameters_of(sensor, parse_scene(told)).names
+    names = [name for name in unknown if not name.startswith("crosstalk.")]
+    mode = {"mean": [0.0] * len(names), "covariance": np.eye(len(names)).tolist()}
+    truth = {"object": {"c0": 0.08, "c1": 0.0, "c2": 0.12}, "crosstalk": [0.001, 0.002]}
+    path = RadialTrajectory(from_m=0.5, to_m=1.2, frames=10, duration_s=1.0)
+    frames = simulate(SENSOR, parse_scene(truth), path, 3).frames
+    here = track(sensor, parse_scene(told), frames)
+    joint = {"unknowns": names, "modes": [mode]}
+    there = track(sensor, parse_scene(told | {"joint": joint}), frames)
+    assert np.array_equal(here.range_m, there.range_m, equal_nan=True)
+    assert np.array_equal(here.sd_m, there.sd_m, equal_nan=True)
+    assert np.nanmax(here.sd_parts_m.scene) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("changed", "factor"),
+    [
+        ({"c2": {"prior": "lognormal", "median": 0.1, "sigma": 0.7}}, "2.01"),
+        ({"c2": None}, "2.72"),
+        ({"c0": {"prior": "lognormal", "median": 0.08, "sigma": 0.6}, "c2": None}, "3.21"),
+        # near its pole little of c1 is much of the light
+        ({"c1": {"prior": "normal", "mean": -0.53, "sd": 0.05}}, "2.29"),
+    ],
+)
+def test_light_that_is_open_by_more_than_a_factor_of_two_is_refused(
+    changed: dict[str, object], factor: str
+) -> None:
+    told = {"c0": 0.08, "c1": 0.0, "c2": 0.1} | changed
+    scene = parse_scene({"object": {name: x for name, x in told.items() if x is not None}})
+    with pytest.raises(RefusedError, match=f"by a factor of {factor} of the light.*narrower"):
+        tracker(SENSOR, scene)
