@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.realtime.assemble import NOISE_BAND
+from inference.realtime.net import Net
 
 __all__ = ["phase_reach"]
 
@@ -12,12 +13,12 @@ Array = NDArray[np.float64]
 _SMALL = 0.05  # below it the angle and its sine differ by less than a percent at the band's end
 
 
-def phase_reach(phase: Array, sd: Array, turn: float) -> Array:
+def phase_reach(phase: Array, sd: Array, net: Net, length: Array, turn: float) -> Array:
     """Return standard deviations of phases that hold to the ends of the noise band.
 
-    Noise of m standard deviations turns a phasor of length a by at most arcsin(m sd / a), and any
-    way where it is as long as the phasor: the phase may then be any of the turn
-    (docs/model.md, reach).
+    Noise of m standard deviations puts the end of a phasor into an ellipse, and turns the phasor as
+    far as the tangents from zero to that; any way where noise along it is as long as the phasor:
+    the phase may then be any of the turn (docs/model.md, reach).
 
     Parameters
     ----------
@@ -25,6 +26,10 @@ def phase_reach(phase: Array, sd: Array, turn: float) -> Array:
         In [0, turn] [rad].
     sd : ndarray, shape (n,)
         Of first order: noise across the phasor over its length [rad].
+    net : Net
+        The phasor, and its noise.
+    length : ndarray, shape (n,)
+        Of the phasor, in the unit of ``net``.
     turn : float
         Phases are known modulo this: 2 pi, or pi where the sign of the phasor is open [rad].
 
@@ -33,6 +38,23 @@ def phase_reach(phase: Array, sd: Array, turn: float) -> Array:
     ndarray, shape (n,)
         [rad]; nan stays nan.
     """
-    most = NOISE_BAND * sd
-    angle = np.where(most > 1.0, np.maximum(phase, turn - phase), np.arcsin(np.minimum(most, 1.0)))
-    return np.where(sd > _SMALL, angle / NOISE_BAND, sd)
+    # noise of any direction counts, such as of light that is taken off
+    bent = np.flatnonzero(np.sqrt(np.maximum(net.var1, net.var2)) > _SMALL * length)
+    if bent.size == 0:
+        return sd
+    few, size, most = net.select(bent), length[bent], NOISE_BAND * sd[bent]
+    cosine, sine = few.first / size / size, few.second / size / size
+    with np.errstate(all="ignore"):
+        along = NOISE_BAND**2 * few.variance(cosine, sine)
+        # of noise across with noise along
+        turned = cosine * (few.var2 - few.var1) * sine + (cosine - sine) * (cosine + sine) * few.cov
+        both = NOISE_BAND**2 * turned
+        left = 1.0 - along
+        tangent = (np.abs(both) + np.sqrt(np.square(both) + left * np.square(most))) / left
+        # not less than of noise that is as large along the phasor as across
+        angle = np.maximum(np.arctan(tangent), np.arcsin(np.minimum(most, 1.0)))
+        any_way = np.maximum(phase[bent], turn - phase[bent])
+        angle = np.where((most > 1.0) | ~(left > 0.0), any_way, angle)
+    result = sd.copy()
+    result[bent] = np.where(np.isnan(most), np.nan, angle / NOISE_BAND)
+    return result

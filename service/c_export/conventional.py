@@ -34,8 +34,8 @@ _WAVE = """
 static int answer(real first, real second, @_answer *out)
 {
     const real x = first - CROSSTALK1, y = second - CROSSTALK2;
-    const real size = LARGER(x, y), a = x / size, b = y / size;
-    real phase, range, sd, band;
+    const real size = LARGER(x, y), a = x / size, b = y / size, square = a * a + b * b;
+    real phase, range, sd, band, var1, var2;
     if (!(size > 0))
         return @_NONE;
     phase = ATAN2(y, x) - OFFSET;
@@ -44,20 +44,26 @@ static int answer(real first, real second, @_answer *out)
     if (phase >= TURN)
         phase -= TURN;
     {
-@NOISE        sd = SQRT(b * b * (own1 + shared) + a * a * (own2 + shared)) / (a * a + b * b) / size;
+@NOISE        var1 = (own1 + shared) / size / size;
+        var2 = (own2 + shared) / size / size;
     }
+    sd = SQRT(b * b * var1 + a * a * var2) / square;
     band = 3 * sd < TURN / 4 ? 3 * sd : TURN / 4;
     if (!(phase > 0) || phase > TURN - band + LOW * WAVE_NUMBER)
         return @_NONE;
     range = phase / WAVE_NUMBER;
     if (!(range >= LOW * (1 - 8 * EPSILON)) || !(range <= HIGH * (1 + 8 * EPSILON)))
         return @_NONE;
-    if (20 * sd > 1) { /* noise turns a faint phasor by more than its tangent */
-        const real most = 3 * sd;
-        if (most > 1)
+    if (400 * LARGER(var1, var2) > square) { /* noise turns it by more than its tangent */
+        const real most = 3 * sd, both = 9 * SIZE(a * b * (var2 - var1)) / square / square;
+        const real left = 1 - 9 * (a * a * var1 + b * b * var2) / square / square;
+        if (most > 1 || !(left > 0))
             sd = (phase > TURN - phase ? phase : TURN - phase) / 3;
-        else
-            sd = ATAN2(most, SQRT((1 - most) * (1 + most))) / 3;
+        else {
+            const real bent = ATAN2(both + SQRT(both * both + left * most * most), left);
+            const real even = ATAN2(most, SQRT((1 - most) * (1 + most)));
+            sd = (bent > even ? bent : even) / 3;
+        }
     }
     sd = sd / WAVE_NUMBER;
     if (sd < EPSILON * range)

@@ -45,6 +45,10 @@ BEYOND = {"prior": "uniform", "low": 1.0, "high": 20.0}
 CASES: dict[str, tuple[str, Any, Any]] = {
     "pulse": ("conventional", PULSE | {"full_scale": [3.0, 3.0]}, {"crosstalk": CROSSTALK}),
     "wave": ("conventional", WAVE, {"crosstalk": CROSSTALK}),
+    # photons of the crosstalk make more noise in q than in i
+    "wave behind a bright glass": ("conventional",
+                                   WAVE | {"noise": {"read": [1e-3, 1e-3], "shot": 2e-3}},
+                                   {"crosstalk": CROSSTALK}),
     "wave beyond 1 m": ("conventional", WAVE, {"crosstalk": CROSSTALK, "range_m": BEYOND}),
     "light": ("intensity", PULSE | {"noise": {"read": [2e-5, 1e-3], "relative": 0.01}},
               {"object": OBJECT, "crosstalk": CROSSTALK}),

@@ -186,7 +186,7 @@ def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
         # gradient of the phase: (-q, i) / modulus^2
         sd = np.sqrt(net.variance(-net.second / safe / safe, net.first / safe / safe))
         band = np.minimum(NOISE_BAND * sd, 0.5 * np.pi)
-        turned = phase_reach(phase, sd, 2 * np.pi)
+        turned = phase_reach(phase, sd, net, safe, 2 * np.pi)
         # a range that the scene allows lies within the noise of zero, or this is the far end
         contact = (phase > 2 * np.pi - band + k * support[0]) | (phase == 0.0)
         usable = (modulus > 0) & np.isfinite(modulus)

@@ -113,7 +113,7 @@ def target_of(task: Task, rate: Net) -> Targets:
         sd = np.sqrt(rate.variance(-d2 / length / size, d1 / length / size))
         band = np.minimum(NOISE_BAND * sd, 0.25 * np.pi)
         contact = (phase > np.pi - band) | (phase == 0)
-        turned = phase_reach(phase, sd, np.pi)
+        turned = phase_reach(phase, sd, rate, size, np.pi)
         return Targets(np.where(usable, phase, np.nan), np.ones_like(phase), turned, contact, still)
 
 
