@@ -19,7 +19,14 @@ from inference.fits.answer.inflation import inflation, shift_of
 from inference.fits.answer.model_checks import model_checks
 from inference.fits.answer.profile_scan import profile_scan
 from inference.fits.answer.ranges import CONTRADICTION, DECIDED, WITHIN, Answer, frame_ranges
-from inference.fits.answer.report import FALSE_ALARM, describe, fit_report, p_value_of, spoiled
+from inference.fits.answer.report import (
+    FALSE_ALARM,
+    describe,
+    doubt_of,
+    fit_report,
+    p_value_of,
+    spoiled,
+)
 from inference.fits.likelihood.erring import Erring, contradicting, erring_maxima, softened
 from inference.fits.likelihood.erring_valley import valleys
 from inference.fits.likelihood.information import residuals_and_information
@@ -133,19 +140,26 @@ def _exact_answer(
             scanned, _ = profile_scan(problem, top, facts, always=True)
         refuse_if_noise_was_followed(problem, top, scanned)
     wider = math.hypot(wider, off_the_top(top))
-    points = [one for one in scanned if one.deviance - top.deviance <= DECIDED]
-    for point in points:
-        reach = np.sqrt(max(point.deviance - top.deviance, WITHIN))
-        wider = max(wider, shift_of(problem, top, facts, point) / reach)
     residual, facts = residuals_and_information(problem, top.x, top.positions)
-    others = [(one.deviance - top.deviance, one) for one in optima[1:]]
-    refuse_if_open(problem, top, facts, wider, others)
+    chi_square = float(np.square(residual).sum())
+    doubt = doubt_of(problem, chi_square)
+
+    def with_excess(found: Sequence[Maximum]) -> list[tuple[float, Maximum]]:
+        return [((one.deviance - top.deviance) / doubt, one) for one in found]
+
+    points = [(excess, one) for excess, one in with_excess(scanned) if excess <= DECIDED]
+    for excess, point in points:
+        reach = math.sqrt(doubt * max(excess, WITHIN))
+        wider = max(wider, shift_of(problem, top, facts, point) / reach)
     best = Answer(top.x, 0.0, wider * facts.factor)
+    wider *= math.sqrt(doubt)
+    others = with_excess(optima[1:])
+    refuse_if_open(problem, top, facts, wider, others)
     near = [(excess, one) for excess, one in others if excess <= DECIDED]
-    undecided = [Answer(one.x, excess) for excess, one in near]
-    report = fit_report(problem, optima, float(np.square(residual).sum()), facts.rank, wider)
-    parameters = describe(problem, top, facts, wider, [*(one for _, one in near), *points])
-    points += [one for one in walked if one.deviance - top.deviance <= DECIDED]
+    undecided = [Answer(one.x, one.deviance - top.deviance) for _, one in near]
+    report = fit_report(problem, optima, chi_square, facts.rank, wider)
+    parameters = describe(problem, top, facts, wider, [one for _, one in (*near, *points)])
+    points += [(excess, one) for excess, one in with_excess(walked) if excess <= DECIDED]
     return frame_ranges(
         name,
         problem,
@@ -153,7 +167,8 @@ def _exact_answer(
         state,
         spoiled(parameters, report) if report["misfit"] else parameters,
         report,
-        [(one.deviance - top.deviance, one.positions) for one in points],
+        [(excess, one.positions) for excess, one in points],
+        doubt=doubt,
     )
 
 
@@ -183,20 +198,22 @@ def _erring_answer(
     if not problem.law and problem.known is None:
         refuse_if_undetermined(top.clean, top, facts)
     contradicted = contradicting(top, problem)
-    wider = 1.0
+    wider, doubt = 1.0, doubt_of(problem, top.chi_square)
     if not contradicted:
         wider = math.hypot(1.0, off_the_top(top))
-        refuse_if_open(top.clean, top, top.facts, wider, whole=top.whole)
-    near = [one for one in (*found[1:], *along) if one.deviance - top.deviance <= DECIDED]
+        refuse_if_open(top.clean, top, top.facts, wider * math.sqrt(doubt), whole=top.whole)
+    decided = top.deviance + doubt * DECIDED
+    near = [one for one in (*found[1:], *along) if one.deviance <= decided]
     # another mode of the law is another answer; near in the same mode, a wider one
     others = {id(one.clean.mode): one for one in reversed(near) if one.clean.mode is not None}
     others.pop(id(top.clean.mode), None)
     checks = model_checks(problem, top)
-    report = fit_report(problem, found, top.chi_square, facts.rank, wider, checks)
+    widening = wider * math.sqrt(doubt)
+    report = fit_report(problem, found, top.chi_square, facts.rank, widening, checks)
     if contradicted:
         report["misfit"] = True
         report["reasons"].append(CONTRADICTION)
-    parameters = describe(top.clean, top, top.facts, wider, near, top.whole)
+    parameters = describe(top.clean, top, top.facts, widening, near, top.whole)
     return frame_ranges(
         name,
         problem,
@@ -208,9 +225,10 @@ def _erring_answer(
         spoiled(parameters, report) if report["misfit"] else parameters,
         report,
         [
-            (one.deviance - top.deviance, one.positions)
+            ((one.deviance - top.deviance) / doubt, one.positions)
             for one in near
             if one.clean.mode is top.clean.mode
         ],
         contradicted,
+        doubt,
     )

@@ -199,6 +199,7 @@ def frame_ranges(
     fit: Mapping[str, Any],
     points: Sequence[tuple[float, Array]] = (),
     contradicted: Collection[int] = (),
+    doubt: float = 1.0,
 ) -> TechniqueResult:
     """Build the result of a technique of many frames.
 
@@ -222,6 +223,9 @@ def frame_ranges(
         reaches them.
     contradicted : collection of int
         Frames of the problem whose readings and known ranges contradict one another.
+    doubt : float
+        By what the variance of noise may be larger than stated (`report.doubt_of`); ``points`` have
+        their deviances over it.
 
     Returns
     -------
@@ -230,7 +234,9 @@ def frame_ranges(
     """
     used = np.flatnonzero(state != SATURATED)
     modes, chi_square = _modes(problem, answers)
-    u, excess = modes.log_r, modes.excess
+    u, excess = modes.log_r, modes.excess / doubt
+    for part in (modes.noise, modes.told):
+        part *= math.sqrt(doubt)
     modes.told[:, 0] = np.fmax(modes.told[:, 0], _reaches(problem, u[:, 0], points))
     sd = np.hypot(modes.told, modes.model)
     n = state.size

@@ -19,6 +19,7 @@ from simulator.parameters import Parameters
 __all__ = [
     "FALSE_ALARM",
     "describe",
+    "doubt_of",
     "entries",
     "fit_report",
     "p_value_of",
@@ -28,6 +29,7 @@ __all__ = [
 
 
 FALSE_ALARM = 1e-3
+DOUBTFUL = 0.05  # of healthy fits whose noise is doubted
 _ONE = 1.0 - 1e-12  # for 1, whose logarithm of what is left is no number
 
 
@@ -178,6 +180,29 @@ def _freedom(problem: FitProblem) -> int:
     # what a joint law knows of the unknowns is held against the frames as they are
     free = 0 if problem.law else len(problem)
     return 2 * problem.present.size - int(problem.present.sum()) - free + told
+
+
+def doubt_of(problem: FitProblem, chi_square: float) -> float:
+    """Return by what the variance of noise may be larger than stated, where chi-square doubts it.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        Every frame is one term, of as many readings as it has.
+    chi_square : float
+        Of the best fit.
+
+    Returns
+    -------
+    float
+        Chi-square over its degrees of freedom (Birge 1932) where so large a one comes by chance in
+        less than one fit in twenty; 1 elsewhere, and where it is a misfit, which says so
+        (docs/model.md, doubt).
+    """
+    p_value = p_value_of(problem, chi_square)
+    if not FALSE_ALARM <= p_value < DOUBTFUL:
+        return 1.0
+    return max(chi_square / max(_freedom(problem), 1), 1.0)
 
 
 def p_value_of(problem: FitProblem, chi_square: float) -> float:
