@@ -20,6 +20,7 @@ from inference.tracking.report import (
     BEST,
     LASTING,
     OUTLIER,
+    OUTLIERS_RUN,
     POSITION,
     PRESENT,
     SD,
@@ -28,7 +29,7 @@ from inference.tracking.report import (
     UNSTEADY_MEAN,
     report,
 )
-from inference.tracking.unsteady import UNSTEADY, take_unsteady
+from inference.tracking.unsteady import OUTLIERS, UNSTEADY, take_empty, take_unsteady
 from inference.tracking.weighing import Model, room_for, weigh_frame, weigh_known
 from simulator.closed import closed
 from simulator.compiled import compiled
@@ -107,9 +108,16 @@ def run_filter(
         report(out, rows, i, of, rules)
         out[i, OUTLIER], out[i, SURPRISE] = outlier, numbers[RUNNING]
         if numbers.size > UNSTEADY:
-            if kinds[i] == USABLE and outlier < 0.5 and out[i, PRESENT] > 0.5:
-                u, sd = out[i, BEST + POSITION], out[i, BEST + SD]
-                take_unsteady(of, 1, u, sd, frame, times[i], model.table, rules)
+            if kinds[i] == USABLE and outlier >= 0.5:
+                numbers[OUTLIERS] += 1.0
+            elif kinds[i] == USABLE or kinds[i] == EMPTY:
+                numbers[OUTLIERS] = 0.0
+                if out[i, PRESENT] > 0.5:
+                    u, sd = out[i, BEST + POSITION], out[i, BEST + SD]
+                    take_unsteady(of, 1, u, sd, frame, times[i], model.table, rules)
+                else:
+                    take_empty(of, frame, times[i], model.table, model.places.empty, rules)
+            out[i, OUTLIERS_RUN] = numbers[OUTLIERS]
             out[i, UNSTEADY_MEAN] = numbers[UNSTEADY]
             out[i, LASTING] = lasting_of(numbers, nuisance_count(model.table), rules.memory)
         if kinds[i] == SATURATED or kinds[i] == EMPTY_SATURATED:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.tracking.report import LASTING, SURPRISE, UNSTEADY_MEAN
+from inference.tracking.report import LASTING, OUTLIERS_RUN, PRESENT, SURPRISE, UNSTEADY_MEAN
 from inference.tracking.rules import MisfitLimits
 
 __all__ = ["misfits"]
@@ -15,6 +15,8 @@ def misfits(
     out: Array, limits: MisfitLimits, crosstalk: Array | None, bounds: Array | None
 ) -> NDArray[np.bool_]:
     """Tell of each frame whether a running mean, or learnt crosstalk, is beyond what may be.
+
+    What lasts across the curve is of an object: where none is, it is remembered and not said.
 
     Parameters
     ----------
@@ -28,7 +30,8 @@ def misfits(
         Least and largest that it is as its prior says [reading units].
     """
     misfit = out[:, SURPRISE] > limits.surprise
-    misfit |= (out[:, UNSTEADY_MEAN] > limits.unsteady) | (out[:, LASTING] > limits.lasting)
+    misfit |= (out[:, UNSTEADY_MEAN] > limits.unsteady) | (out[:, OUTLIERS_RUN] >= limits.outliers)
+    misfit |= (out[:, LASTING] > limits.lasting) & (out[:, PRESENT] > 0.5)
     if crosstalk is not None and bounds is not None:
         misfit |= ((crosstalk < bounds[:, 0]) | (crosstalk > bounds[:, 1])).any(axis=1)
     return misfit

@@ -27,6 +27,7 @@ __all__ = [
     "LASTING",
     "MODEL_SD",
     "OUTLIER",
+    "OUTLIERS_RUN",
     "POSITION",
     "PRESENT",
     "RATE",
@@ -45,7 +46,7 @@ Array = NDArray[np.float64]
 
 # columns of a report
 STATUS, PRESENT, OUTLIER, SURPRISE, HYPOTHESES, BEST = range(6)
-CROSSTALK, UNSTEADY_MEAN, LASTING, REPORT_COLUMNS = 12, 16, 17, 18
+CROSSTALK, UNSTEADY_MEAN, LASTING, OUTLIERS_RUN, REPORT_COLUMNS = 12, 16, 17, 18, 19
 # columns of a hypothesis, and of the best range: u, its sd, the parts of it that all frames share
 # because the scene and because the model may be wrong, rate, its sd, weight (of the best range
 # given that an object is there)

@@ -69,6 +69,7 @@ class MisfitLimits(NamedTuple):
     surprise: float  # running surprise
     unsteady: float  # running mean of changes across the curve
     lasting: float  # mean of what is left across the curve, in standard deviations of what may be
+    outliers: float  # outliers one after another, from so many on
 
 
 def misfit_limits(
@@ -91,7 +92,22 @@ def misfit_limits(
         surprise_limit(settings, rules, channels, shared),
         unsteady_limit(settings, rules),
         float(scipy.stats.norm.isf(0.5 * settings.false_alarm)),
+        outliers_limit(settings),
     )
+
+
+def outliers_limit(settings: TrackingSettings) -> float:
+    """Return how many outliers one after another are not there by chance, two at least.
+
+    Parameters
+    ----------
+    settings : TrackingSettings
+        With the probabilities of an outlier and of a false alarm.
+    """
+    if settings.outlier <= settings.false_alarm:
+        return 2.0
+    many = math.log(settings.false_alarm) / math.log(settings.outlier)
+    return max(math.ceil(many - 1e-9), 2.0)
 
 
 def surprise_limit(

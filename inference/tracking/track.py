@@ -70,8 +70,8 @@ class Track:
     surprise : ndarray, shape (n,)
         Running mean of the normalised innovation squared per reading: 1 where all is as modelled.
     misfit : ndarray of bool, shape (n,)
-        Whether it, jumps or what lasts beside the curve are above what chance allows, or learnt
-        crosstalk is far from its prior: scene, noise or motion are not as stated.
+        Whether it, jumps, what lasts beside the curve or outliers in a row are above what chance
+        allows, or learnt crosstalk is far from its prior: scene, noise or motion are not as stated.
     hypotheses_m, hypotheses_sd_m, hypotheses_weight : ndarray, shape (n, k)
         All ranges by ascending order, padded with nan [m].
     crosstalk, crosstalk_sd : ndarray, shape (n, 2), optional

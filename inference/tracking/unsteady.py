@@ -5,6 +5,8 @@ surprise tells little of it. But it is smooth along the range, and what is left 
 across the curve hardly changes with it from one frame to the next: that changes by noise. Noise
 that is stated too small shows at once, beside any error of the model or of the scene.
 
+Frames without an object tell the noise, too: there both readings change by nothing else.
+
 What is left across the curve may also last, by more than those errors: another object, light that
 nobody stated. `inference.tracking.lasting` has its mean.
 
@@ -12,6 +14,9 @@ docs/model.md, unsteady, has the statistic.
 """
 
 import math
+
+import numpy as np
+from numpy.typing import NDArray
 
 from inference.tracking.borrowed import borrowed
 from inference.tracking.frame_density import TrackedFrame
@@ -24,6 +29,8 @@ from inference.tracking.lasting import (
 )
 from inference.tracking.motion import Rules
 from inference.tracking.readings_table import (
+    FIRST,
+    SECOND,
     ReadingsTable,
     cell_of,
     mean_at,
@@ -35,13 +42,17 @@ from inference.tracking.readings_table import (
 from inference.tracking.roots import UNIT
 from simulator.compiled import compiled
 
-__all__ = ["UNSTEADY", "first_unsteady", "take_unsteady"]
+__all__ = ["OUTLIERS", "UNSTEADY", "first_unsteady", "take_empty", "take_unsteady"]
+
+Array = NDArray[np.float64]
 
 # places in `Hypotheses.numbers` behind its own, only where errors that frames share are felt: the
-# running mean, and of the last frame its time, what is left of its two readings, the direction
-# across the curve (nan: there was none), and what every nuisance parameter does along that; behind
-# them what lasts
-UNSTEADY, _TIME, _LEFT1, _LEFT2, _ACROSS1, _ACROSS2, _SHARED = range(6, 13)
+# running mean, how many frames up to the last were outliers one after another, and of the last
+# that was none its time, what is left of its two readings, the direction across the curve (of an
+# empty scene nan and the gain), and what every nuisance parameter does along that; behind them what
+# lasts
+UNSTEADY, OUTLIERS, _TIME, _LEFT1, _LEFT2, _ACROSS1, _ACROSS2, _SHARED = range(6, 14)
+_GAIN = _ACROSS2
 # standard deviations that an error which frames share may be off by: beyond it one in a million is
 _ALLOWED = 5.0
 _MOST = 15.1  # squared change at which a single frame is cut: noise exceeds it once in 10,000
@@ -49,7 +60,7 @@ _MOST = 15.1  # squared change at which a single frame is cut: noise exceeds it 
 
 def first_unsteady(nuisance: int) -> list[float]:
     """Return these numbers before any frame, of so many nuisance parameters."""
-    return [1.0] + [math.nan] * (_SHARED - _TIME + nuisance) + first_lasting(nuisance)
+    return [1.0, 0.0] + [math.nan] * (_SHARED - _TIME + nuisance) + first_lasting(nuisance)
 
 
 @borrowed
@@ -119,3 +130,58 @@ def take_unsteady(
         numbers[UNSTEADY] += (1.0 - rules.memory) * (own - numbers[UNSTEADY])
     numbers[_TIME], numbers[_LEFT1], numbers[_LEFT2] = time, left1, left2
     numbers[_ACROSS1], numbers[_ACROSS2] = across1, across2
+
+
+@borrowed
+@compiled
+def take_empty(
+    of: Hypotheses,
+    frame: TrackedFrame,
+    time: float,
+    table: ReadingsTable,
+    empty: Array,
+    rules: Rules,
+) -> None:
+    """Take a frame without an object into the running mean of changes: both readings tell it.
+
+    Parameters
+    ----------
+    of : Hypotheses
+        The state; the numbers are changed in place.
+    frame, time : TrackedFrame, float
+        The frame and when it was [s].
+    table : ReadingsTable
+        Known crosstalk, and the noise.
+    empty : ndarray, shape (2, 1 + p)
+        Readings of the empty scene without crosstalk, and their change with the nuisance
+        parameters.
+    rules : Rules
+        How crosstalk drifts, and the memory of the mean.
+    """
+    numbers, gain = of.numbers, frame.gain
+    first = frame.first - gain * empty[FIRST, 0]
+    second = frame.second - gain * empty[SECOND, 0]
+    # what was before: nothing, an object, or an empty scene
+    change1, change2 = first - numbers[_LEFT1], second - numbers[_LEFT2]
+    after_empty = math.isnan(numbers[_ACROSS1]) and not math.isnan(change1)
+    seconds, brighter, shared = time - numbers[_TIME], gain - numbers[_GAIN], 0.0
+    numbers[_TIME], numbers[_LEFT1], numbers[_LEFT2] = time, first, second
+    numbers[_ACROSS1], numbers[_GAIN] = math.nan, gain
+    if not after_empty:
+        return
+    if brighter != 0.0:
+        for j in range(nuisance_count(table)):
+            g1, g2 = brighter * empty[FIRST, 1 + j], brighter * empty[SECOND, 1 + j]
+            shared += g1 * g1 + g2 * g2
+    root = UNIT
+    if not table.noise.plain:
+        m1, m2 = frame.first - first + table.crosstalk1, frame.second - second + table.crosstalk2
+        if learns_crosstalk(of):
+            m1, m2 = m1 + of.x[0, CROSSTALK1], m2 + of.x[0, CROSSTALK2]
+        root = noise_root(m1, m2, 0.0, 0.0, table.noise)
+    change1 /= root.r11
+    change2 = (change2 - root.r21 * change1) / root.r22
+    variance = 2.0 + _ALLOWED * _ALLOWED * shared
+    variance += seconds * (rules.drift1 * rules.drift1 + rules.drift2 * rules.drift2)
+    own = min(0.5 * (change1 * change1 + change2 * change2) / variance, 0.5 * _MOST)
+    numbers[UNSTEADY] += (1.0 - rules.memory) * (own - numbers[UNSTEADY])
