@@ -75,8 +75,8 @@ def test_a_bad_line_is_answered_and_changes_nothing(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scene: Path
 ) -> None:
     good = [
-        {"time_s": 0.0, "w1": 0.021, "w2": 1.71, "camera": "left", "sequence": 10},
-        {"time_s": 0.1, "w1": 0.022, "w2": 1.63},
+        {"time_s": 0.0, "w1": 0.003866, "w2": 0.1159, "camera": "left", "sequence": 10},
+        {"time_s": 0.1, "w1": 0.003668, "w2": 0.1078},
     ]
     bad = ['{"time_s": 0.05, "w1": "x", "w2": 1.7, "camera": "left"}', "nope", '{"w1": 1, "w2": 2}',
            '{"time_s": -1, "w1": 0.02, "w2": 1.7}', '{"time_s": 0.05, "W1": 0.02, "w2": 1.7}',
