@@ -28,13 +28,14 @@ def light_of(kind: str) -> Array:
     return mean_readings(sensor, terms, ranges)
 
 
-def tracked(kind: str, light: Array, more: float | Array = 1.0, **settings: float) -> Track:
+def tracked(
+    kind: str, light: Array, more: float | Array = 1.0, settings: TrackingSettings | None = None
+) -> Track:
     """Track that light, beside crosstalk and so many times the noise."""
     noise = NOISE * np.random.default_rng(1).standard_normal((FRAMES, 2))
     readings = light + CROSSTALK + np.reshape(more, (-1, 1)) * noise
     scene = parse_scene({**PLATE, "crosstalk": CROSSTALK.tolist()})
-    stated = TrackingSettings(**settings)
-    return track(sensor_of(NOISE, kind), scene, frames_of(readings, STEP_S), stated)
+    return track(sensor_of(NOISE, kind), scene, frames_of(readings, STEP_S), settings)
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
@@ -62,7 +63,7 @@ def test_how_many_outliers_in_a_row_are_a_misfit_follows_from_how_often_they_are
     # 0.05 to the fourth is 6e-6, to the fifth 3e-7
     light = light_of("pulsed")
     light[FROM : FROM + 6] = 300.0, 5000.0
-    found = tracked("pulsed", light, outlier=0.05)
+    found = tracked("pulsed", light, settings=TrackingSettings(outlier=0.05))
     assert np.flatnonzero(found.misfit)[0] == FROM + 4
 
 
