@@ -10,7 +10,6 @@ What lies there is run. A folder that another user owns, or that others may writ
 
 import functools
 import hashlib
-import logging
 import os
 import re
 import stat
@@ -19,7 +18,6 @@ from typing import NamedTuple
 
 __all__ = ["CacheFolder", "base_folder", "digest_of_all", "folder_of"]
 
-_log = logging.getLogger("hybridtof")
 _ROOT = Path(__file__).resolve().parents[1]
 # what kernels call, and what they take: their members are found by their places
 _MARKS = (b"from simulator.compiled import compiled", b"(NamedTuple):")
@@ -87,6 +85,12 @@ def base_folder() -> CacheFolder | None:
         return None
 
 
+def _warn(why: str) -> None:
+    import logging  # seldom needed
+
+    logging.getLogger("hybridtof").warning("%s: its machine code is not used", why)
+
+
 @functools.cache
 def _checked(path: Path) -> CacheFolder | None:
     try:
@@ -97,10 +101,10 @@ def _checked(path: Path) -> CacheFolder | None:
     own = not hasattr(os, "getuid") or found.st_uid == os.getuid()
     # of the superuser's making: an image, as the sources themselves
     if not own and found.st_uid != 0:
-        _log.warning("%s belongs to another user: its machine code is not used", path)
+        _warn(f"{path} belongs to another user")
         return None
     if found.st_mode & _OTHERS_MAY_WRITE:
-        _log.warning("others may write to %s: its machine code is not used", path)
+        _warn(f"others may write to {path}")
         return None
     writable = own and os.access(path, os.W_OK | os.X_OK)
     if writable and stat.S_IMODE(found.st_mode) != 0o700:
