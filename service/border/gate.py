@@ -1,5 +1,6 @@
 """The outermost application: it lets requests in, dresses what goes out, and tells of both."""
 
+import asyncio
 import time
 from collections.abc import Sequence
 
@@ -12,6 +13,7 @@ from service.border.held import Held, Room
 from service.border.keys import KeyRing
 from service.border.methods import Methods
 from service.border.traces import REQUEST_ID, Told, Traces, request_id
+from service.errors import UnauthorizedError
 from service.problems import internal, response_of
 from simulator.errors import HybridTofError
 
@@ -26,9 +28,22 @@ _HEADERS = (
     (b"x-content-type-options", b"nosniff"),
 )
 _BLOCK = 2**16
+# with which a WebSocket is closed
+_POLICY = 1008
 
 WITHOUT_KEY = frozenset({"/health/live", "/health/ready"})
 """Who starts and stops the service must see whether it lives, and has no key."""
+
+
+async def _unless(out: asyncio.Event, receive: Receive) -> Message:
+    """Receive a message, or the end of the connection as soon as its key is known to be none."""
+    coming, ending = asyncio.ensure_future(receive()), asyncio.ensure_future(out.wait())
+    try:
+        await asyncio.wait((coming, ending), return_when=asyncio.FIRST_COMPLETED)
+        return coming.result() if coming.done() else {"type": "http.disconnect"}
+    finally:
+        coming.cancel()
+        ending.cancel()
 
 
 class Gate:
@@ -75,9 +90,18 @@ class Gate:
         name = request_id(Headers(scope=scope).get("x-request-id"))
         before = REQUEST_ID.set(name)
         began, status, sent = time.perf_counter(), None, 0
+        out = False
+
+        async def receive_known() -> Message:
+            nonlocal out
+            message = await receive()
+            out = message["type"] == "websocket.receive" and self._out(scope)
+            return {"type": "websocket.disconnect", "code": _POLICY} if out else message
 
         async def send_counted(message: Message) -> None:
             nonlocal status, sent
+            if out and message["type"] == "websocket.close":
+                message = dict(message) | {"code": _POLICY}
             if message["type"] == "websocket.http.response.start":
                 status = message["status"]
             elif status is None:
@@ -88,12 +112,12 @@ class Gate:
         self._traces.open.inc()
         try:
             self._let_in(scope)
-            await self._app(scope, receive, send_counted)
+            await self._app(scope, receive_known, send_counted)
         except HybridTofError as error:
             if "websocket.http.response" in scope.get("extensions", {}):
                 await response_of(error)(scope, receive, send_counted)
             else:
-                await send_counted({"type": "websocket.close", "code": 1008})
+                await send_counted({"type": "websocket.close", "code": _POLICY})
         finally:
             self._traces.open.dec()
             self._traces.tell(scope, Told(status, sent, time.perf_counter() - began))
@@ -101,29 +125,60 @@ class Gate:
 
     def _let_in(self, scope: Scope) -> None:
         """Refuse a request, or note whose it is."""
-        headers = Headers(scope=scope)
-        self._authorities.check(headers)
+        self._authorities.check(Headers(scope=scope))
         if self._keys is not None and scope["path"] not in WITHOUT_KEY:
-            given = headers.getlist("authorization")
-            scope["hybridtof.client"] = self._keys.owner(given[0] if len(given) == 1 else None)
+            scope["hybridtof.client"] = self._owner(self._keys, scope)
+
+    @staticmethod
+    def _owner(keys: KeyRing, scope: Scope) -> str:
+        given = Headers(scope=scope).getlist("authorization")
+        return keys.owner(given[0] if len(given) == 1 else None)
+
+    def _out(self, scope: Scope) -> bool:
+        """Tell whether a key was revoked since it was let in: some connections last for days."""
+        if self._keys is None or scope["path"] in WITHOUT_KEY:
+            return False
+        try:
+            self._owner(self._keys, scope)
+        except UnauthorizedError:
+            return True
+        return False
 
     async def _request(self, scope: Scope, receive: Receive, send: Send) -> None:
         name = request_id(Headers(scope=scope).get("x-request-id"))
         before = REQUEST_ID.set(name)
         began, status, sent = time.perf_counter(), None, 0
+        # an answer without a stated length may last for days
+        begun, lasting, out = False, False, asyncio.Event()
+
+        async def receive_known() -> Message:
+            nonlocal begun
+            if not begun:
+                begun = True
+                return await receive()
+            message = await _unless(out, receive)
+            if lasting and message["type"] == "http.request" and self._out(scope):
+                out.set()
+            return {"type": "http.disconnect"} if out.is_set() else message
+
         held = scope["hybridtof.held"] = Held(self._room)
 
         async def send_dressed(message: Message) -> None:
-            nonlocal status, sent
+            nonlocal status, sent, lasting
             if message["type"] == "http.response.start":
                 status = message["status"]
                 headers = list(message.get("headers", ()))
                 known = {header.lower() for header, _ in headers}
+                lasting = b"content-length" not in known
                 headers += [pair for pair in _HEADERS if pair[0] not in known]
                 headers.append((b"x-request-id", name.encode("ascii")))
                 await send(dict(message) | {"headers": headers})
                 return
             body = message.get("body", b"")
+            if lasting and sent and body and self._out(scope):
+                out.set()
+            if out.is_set():
+                return
             held.answer(len(body))
             sent += len(body)
             # each block waits until the client has read most of those before it
@@ -138,7 +193,9 @@ class Gate:
         self._traces.open.inc()
         try:
             self._let_in(scope)
-            await self._app(scope, receive, send_dressed)
+            await self._app(scope, receive_known, send_dressed)
+            if out.is_set():
+                await send({"type": "http.response.body", "body": b""})
         except HybridTofError as error:  # of the border: those of the routes are answered there
             await response_of(error)(scope, receive, send_dressed)
         except Exception as error:

@@ -1,5 +1,6 @@
 """API keys: two that know nothing of one another, over a socket; and the command for them."""
 
+import asyncio
 import json
 import os
 from collections.abc import AsyncIterator
@@ -8,7 +9,9 @@ from typing import Any
 
 import httpx
 import pytest
+from websockets import ConnectionClosed, connect
 
+from benchmarks.streams import system
 from service.app import create_app
 from service.border.keys import KeyRing, read_keys
 from service.cli import main
@@ -16,6 +19,7 @@ from service.service_settings import ServiceSettings
 from simulator.errors import InvalidInputError
 from tests.service import fake_fold
 from tests.service.conftest import listening, speaking
+from tests.service.streaming import LINES, NDJSON
 
 pytestmark = pytest.mark.anyio
 
@@ -117,6 +121,64 @@ async def test_revoked_and_changed_while_it_runs(
         assert (await http.get("/metrics", headers=bearer(third))).status_code == 200
         file.unlink()  # then nobody is known
         assert (await http.get("/metrics", headers=bearer(third))).status_code == 401
+
+
+async def test_who_is_revoked_is_out_of_what_is_open(
+    address: str,
+    secrets: list[str],
+    capsys: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A connection that lasts went on for as long as its client liked."""
+    monkeypatch.setattr("fastapi.routing._PING_INTERVAL", 0.1)
+    first, second = LINES[:2]
+    async with speaking(address, bearer(secrets[0])) as one:
+        sent_to, followed, live = [
+            (await one.post("/v1/streams", json=system())).headers["location"] for _ in range(3)
+        ]
+        revoked, told = asyncio.Event(), asyncio.Event()
+
+        async def lines() -> AsyncIterator[bytes]:
+            yield first + b"\n"
+            await revoked.wait()
+            yield second + b"\n"
+
+        async def send() -> bytes:
+            body = lines()
+            answer = await one.post(sent_to + "/frames", content=body, headers=NDJSON)
+            return answer.content
+
+        async def follow() -> int:
+            events = 0
+            async with one.stream("GET", followed + "/events") as response:
+                async for line in response.aiter_lines():
+                    events += line.startswith("data:")
+                    told.set()
+            return events
+
+        async with (
+            asyncio.timeout(30.0),
+            connect(f"ws{address.removeprefix('http')}{live}/live",
+                    additional_headers=bearer(secrets[0])) as socket,
+        ):  # fmt: skip
+            sending, following = asyncio.create_task(send()), asyncio.create_task(follow())
+            await one.post(followed + "/frames", content=first, headers=NDJSON)
+            await socket.send(first.decode())
+            assert json.loads(await socket.recv())["sequence"] == 1
+            await told.wait()
+            while (await one.get(sent_to)).json()["sequence"] is None:
+                await asyncio.sleep(0.01)
+            assert Said(capsys, "revoke", "one").code == 0
+            revoked.set()
+            await socket.send(second.decode())
+            with pytest.raises(ConnectionClosed) as closed:
+                await socket.recv()
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 1008
+            assert len((await sending).splitlines()) == 1
+            assert await following == 1
+    assert not [record for record in caplog.records if record.levelname == "ERROR"]
 
 
 def test_command(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
