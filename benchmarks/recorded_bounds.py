@@ -15,6 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.identifiability.before_data import Foresight, identifiability
+from inference.identifiability.experiment import Experiment
 from inference.identifiability.range_response import range_response
 from inference.identifiability.response_rows import ResponseRows
 from simulator.discrepancy import DISCREPANCY_SD
@@ -23,7 +24,7 @@ from simulator.model_error import RANGE_ERROR_SD
 from simulator.scene import parse_scene
 from simulator.sensor import Sensor
 
-__all__ = ["Truth", "demanded", "fitted_object", "widths"]
+__all__ = ["Truth", "beyond", "demanded", "fitted_object", "widths"]
 
 Array = NDArray[np.float64]
 
@@ -139,6 +140,43 @@ def demanded(truth: Truth, frames: Frames) -> float:
     here = np.isfinite(truth.range_m)
     known = [_KNOWN_M if there else None for there in here.tolist()]
     experiment = _foresight(truth, 1.0, known, None).experiment
+    best, spread, own, count = _solved(experiment, frames, here)
+    errors = slice(own, count)
+    told = count - own - np.square(spread[errors]).sum()
+    return float(math.sqrt(np.square(best[errors]).sum() / told))
+
+
+def beyond(truth: Truth, frames: Frames) -> Array:
+    """Return by how many standard deviations ranges are missed, to first order, shape (n,).
+
+    Parameters
+    ----------
+    truth : Truth
+        The measurement.
+    frames : Frames
+        Its readings, and what is known of ranges beside them.
+
+    Returns
+    -------
+    ndarray
+        What the readings and the priors move each range by from the truth, over what they leave
+        open of it; nan without an object.
+    """
+    here = np.isfinite(truth.range_m)
+    known = _where(frames.known_range_m, frames.known_range_sd_m)
+    moved = _where(frames.displacement_m, frames.displacement_sd_m)
+    experiment = _foresight(truth, 1.0, known, moved).experiment
+    best, spread, _, count = _solved(experiment, frames, here)
+    off = np.full(here.size, np.nan)
+    off[here] = best[count:] / np.sqrt(np.square(spread[count:]).sum(axis=1))
+    return off
+
+
+def _solved(experiment: Experiment, frames: Frames, here: Any) -> tuple[Array, Array, int, int]:
+    """Return how far unknowns, errors of the model and log ranges are from the truth.
+
+    And a root of their covariance, the number of the unknowns, and that of unknowns and errors.
+    """
     rows = ResponseRows(experiment, RANGE_ERROR_SD)
     (n, m, d), k = rows.jacobian.shape, rows.by_error.shape[2]
     system = np.zeros((n * m + d + k, d + k + n))
@@ -149,12 +187,12 @@ def demanded(truth: Truth, frames: Frames) -> float:
     system[n * m :, : d + k] = np.eye(d + k)
     empty = np.flatnonzero(~here) + d + k
     system = np.delete(system, empty, axis=1)
-    seen = np.column_stack([frames.readings, experiment.told])
+    seen = frames.readings
+    if experiment.told is not None:
+        seen = np.column_stack([seen, experiment.told])
     own = experiment.z.size
     off = np.concatenate([rows.residual(seen).ravel(), -experiment.z, np.zeros(d - own + k)])
     factor, triangle = scipy.linalg.qr(system, mode="economic")
     best = scipy.linalg.solve_triangular(triangle, factor.T @ off)
     spread = scipy.linalg.solve_triangular(triangle, np.eye(len(triangle)))
-    errors = slice(own, d + k)
-    told = d + k - own - np.square(spread[errors]).sum()
-    return float(math.sqrt(np.square(best[errors]).sum() / told))
+    return best, spread, own, d + k

@@ -7,7 +7,7 @@ import pytest
 import scipy
 from numpy.typing import NDArray
 
-from benchmarks.recorded_bounds import Truth, demanded, fitted_object, widths
+from benchmarks.recorded_bounds import Truth, beyond, demanded, fitted_object, widths
 from simulator.discrepancy import DISCREPANCY_SD, discrepancy_basis
 from simulator.frames import Frames
 from simulator.model_error import RANGE_ERROR_SD
@@ -45,6 +45,22 @@ def test_how_large_errors_were_is_told_where_ranges_are_known(times: float) -> N
     # some 24 coefficients are told: chi-square of as many, 1e-4 on either side
     low, high = np.sqrt(scipy.stats.chi2.ppf([1e-4, 1 - 1e-4], 24) / 24)
     assert low < np.sqrt(np.mean(np.square(found))) / times < high
+
+
+def test_ranges_are_missed_by_what_is_left_open() -> None:
+    """Errors of the model and noise are drawn anew; what the priors pull is less than these."""
+    sizes = {"flux": DISCREPANCY_SD, "range_m": RANGE_ERROR_SD}
+    scene = parse_scene({"object": _OBJECT, "crosstalk": _CROSSTALK, "discrepancy": sizes})
+    path = SampledTrajectory(range_m=_RANGE.tolist())
+    known = np.where(np.isin(np.arange(_RANGE.size), (0, 9)), _RANGE, np.nan)
+    told = {"known_range_m": known, "known_range_sd_m": np.full(_RANGE.size, _RULER_M)}
+    middle = []
+    for seed in range(60):
+        frames = simulate(_SENSOR, scene, path, seed).frames
+        middle.append(beyond(_TRUTH, dataclasses.replace(frames, **told))[5])
+    # 60 squares of a normal law, 1e-4 on either side
+    low, high = (float(scipy.stats.chi2.ppf(p, 60)) / 60 for p in (1e-4, 1 - 1e-4))
+    assert low < np.mean(np.square(middle)) < high
 
 
 def test_bounds_are_those_of_all_unknowns_at_once() -> None:
