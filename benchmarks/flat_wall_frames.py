@@ -5,8 +5,9 @@
 
 The disks, walls and emitters of `benchmarks.flat_wall`, 30 frames evenly spread in log r. What is
 told, in turn: the object and its shadow as the numbers that fit best and the wall's strength to a
-factor exp(0.5); nothing of the object, of the shadow that it is up to metres wide; the same with
-crosstalk that is known to three tenths of the signal. The wall's distance is known.
+factor exp(0.5); nothing of the object, of the shadow that it is up to metres wide; nothing of
+either; of the shadow that, and crosstalk that is known to three tenths of the signal. The wall's
+distance is known.
 
 A line for each way and what is told: sets, answered, those that say misfit (or have not converged),
 frames of the others with one range, the share that 90 % intervals hold, frames beyond 5 standard
@@ -37,7 +38,7 @@ __all__ = ["TOLD", "WAYS", "answered", "set_of"]
 Array = NDArray[np.float64]
 
 FRAMES = 30
-TOLD = ("numbers", "nothing", "crosstalk")
+TOLD = ("numbers", "nothing", "default", "crosstalk")
 WAYS = ("joint_fit", "infer")
 
 
@@ -73,6 +74,8 @@ def set_of(number: int, told: str) -> Set:
     scene: dict[str, Any] = {"background": wall}
     if told == "numbers":
         scene |= {"object": numbers, "background": {**wall, "shadow": shadow}}
+    if told == "default":
+        del wall["shadow"]
     readings = readings + bare - flat_wall.hidden_of(course, way)[0]
     if told == "crosstalk":
         readings = readings + 0.1 * size * rng.standard_normal(2)

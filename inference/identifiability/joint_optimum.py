@@ -14,7 +14,7 @@ __all__ = ["joint_optimum"]
 Array = NDArray[np.float64]
 
 _STEPS = 300
-_TRIES = 12  # of one step, each damped four times as much
+_TRIES = 20  # of one step, each damped four times as much
 _DAMPED = 1e-2  # at first, in units of the priors
 _GAINED = 0.003  # of the deviance, by a step that is the last
 

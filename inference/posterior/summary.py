@@ -7,17 +7,17 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.frame.known_range import rates_of
-from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK, taken_for_crosstalk
 from inference.frame.warmth import gains_of
 from inference.identifiability.after_data import statuses_of_draws
 from inference.identifiability.status import Identifiability, weak_at_best
 from inference.posterior.answer.draws import Draws, draws_of
 from inference.posterior.answer.error_parts import ErrorParts
+from inference.posterior.answer.fit import Fit
 from inference.posterior.answer.folds import near_fold
+from inference.posterior.answer.left_out import left_out
 from inference.posterior.answer.mode_summary import mode_summary
 from inference.posterior.answer.parameter_summary import summaries_of_chains, summaries_of_weights
 from inference.posterior.answer.posterior import (
-    LeftOutTerm,
     ParameterSummary,
     Posterior,
     RangeSummary,
@@ -25,8 +25,15 @@ from inference.posterior.answer.posterior import (
 )
 from inference.posterior.answer.range_summary import joined, range_summary
 from inference.posterior.answer.whole import Whole, with_model_error
+from inference.posterior.criticism.best_point import best_point
 from inference.posterior.criticism.cross_check import cross_check
-from inference.posterior.criticism.discrepancy_check import MISFIT, judge_fit, with_model_part
+from inference.posterior.criticism.discrepancy_check import (
+    MISFIT,
+    LargerDiscrepancy,
+    beside_shadow,
+    judge_fit,
+    with_model_part,
+)
 from inference.posterior.criticism.many_frames import bias_of_many_frames
 from inference.posterior.criticism.predictive_check import predictive_check
 from inference.posterior.criticism.prior_conflict import prior_conflicts
@@ -38,7 +45,7 @@ from inference.posterior.job import Job
 from inference.posterior.sample import Sample, sample_of
 from inference.posterior.sampling.represent import doubts
 from inference.posterior.sampling.verdict import Verdict
-from inference.posterior.selection.selection import Selection, selection_summary
+from inference.posterior.selection.selection import selection_summary
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.selecting import sampled
 from inference.posterior.stages.stage import (
@@ -59,31 +66,6 @@ __all__ = ["draw", "summarise"]
 Array = NDArray[np.float64]
 
 _INTEGRALS = 100  # draws at which the integrals over ranges are looked at
-
-
-def _left_out(job: Job, selection: Selection | None) -> tuple[LeftOutTerm, ...]:
-    scene = job.scene
-    absent = {
-        "crosstalk": scene.crosstalk,
-        "background": scene.background,
-    }
-    none = dict.fromkeys(absent, "the scene states none")
-    if taken_for_crosstalk(scene, job.frames):
-        none["background"] += f"; {TAKEN_FOR_CROSSTALK}"
-    rows = [LeftOutTerm(term, none[term]) for term, value in absent.items() if value is None]
-    error = scene.model_error
-    if error.flux == error.range_m == error.shadow == 0:
-        rows.append(LeftOutTerm("discrepancy", "the scene states none"))
-    if job.sensor.temperature is None and job.frames.temperature_k is not None:
-        reason = "temperature_k is given and not used: the sensor states no coefficients"
-        rows.append(LeftOutTerm("temperature", reason))
-    if selection is not None:
-        rows += [
-            LeftOutTerm(decision.term, decision.reason)
-            for decision in selection.decisions
-            if not decision.kept
-        ]
-    return tuple(rows)
 
 
 def _parameters(
@@ -241,7 +223,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
         found.range_m,
         rows,
         found.fit,
-        _left_out(job, checkpoint.selection),
+        left_out(job, checkpoint.selection),
         Runtime(wall_s, cpu_s, drawn.calls, found.k_hat),
         drawn.draws,
         selection_summary(job.scene, checkpoint.selection),
@@ -267,6 +249,23 @@ def _ranges(drawn: _Drawn, whole: Whole) -> RangeSummary:
     return joined(found, numbers, len(drawn.job.frames))
 
 
+def _checked(drawn: _Drawn, whole: Whole) -> tuple[Fit, LargerDiscrepancy | None]:
+    """Check the model at draws, and where it fails before a background at the best point of all."""
+    job, larger = drawn.parts[0], whole.larger
+    fit = predictive_check(job, drawn.own, whole.chosen, drawn.rng, drawn.parts[1:])
+    demands = larger is not None and larger.bayes_factor > MISFIT
+    if drawn.parts[1:] or not (fit.misfit or demands):
+        return fit, larger
+    log_r, error = np.log(whole.draws.range_m[..., job.usable]), job.scene.model_error
+    answered = log_r.reshape(-1, log_r.shape[-1])
+    best = best_point(drawn.own, whole.chosen, whole.log_r, error, answered)
+    if best is None:
+        return fit, larger
+    if larger is not None:
+        larger = beside_shadow(larger, best)
+    return predictive_check(job, drawn.own, whole.chosen, drawn.rng, best=best), larger
+
+
 def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
     """Say what draws say: of every unknown and range, of themselves, and of the model."""
     job, stage, density, sample = drawn.parts[0], drawn.stage, drawn.density, drawn.sample
@@ -280,11 +279,11 @@ def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
         reasons = (*reasons, *found)
     if drawn.every is not None:
         reasons = (*reasons, *doubts(drawn.every, density, sample.flat))
-    fit = predictive_check(job, drawn.own, chosen, drawn.rng, drawn.parts[1:])
+    fit, larger = _checked(drawn, whole)
     judged = _judged(job, drawn.own, whole)
-    if whole.larger is not None:
-        fit = judge_fit(fit, whole.larger)
-        if whole.larger.bayes_factor > MISFIT and rates_of(drawn.own.frames) is not None:
+    if larger is not None:
+        fit = judge_fit(fit, larger)
+        if larger.bayes_factor > MISFIT and rates_of(drawn.own.frames) is not None:
             # known ranges and readings contradict each other: a widened answer is no certain one
             judged = weak_at_best(judged, "by errors of the model that are larger than stated")
     found = prior_conflicts(drawn.own, sample.flat, log_r, density, job.scene.model_error)

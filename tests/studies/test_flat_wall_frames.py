@@ -43,3 +43,14 @@ def test_a_posterior_before_a_flat_wall_holds_only_with_the_error_of_its_shadow(
     assert exact is not None
     assert exact.off.max() > 10.0
     assert exact.flagged
+
+
+@pytest.mark.parametrize("number", [3, 5])
+def test_bright_frames_before_a_flat_wall_are_no_misfit_where_the_answer_holds(
+    number: int,
+) -> None:
+    """Draws of the exact model are thousands of noises off: no place to follow errors from."""
+    said = answered(set_of(number, "numbers"), "infer", number)
+    assert said is not None
+    assert not said.flagged
+    assert said.held.all()

@@ -34,8 +34,8 @@ from inference.identifiability.model_response import (
 )
 from inference.posterior.answer.error_parts import ErrorParts
 from inference.posterior.answer.error_shares import error_shares
-from inference.posterior.answer.shadow_beside import shadow_beside
-from inference.posterior.answer.where_bent import where_bent
+from inference.posterior.answer.shadow_beside import shadow_beside, with_shadow
+from inference.posterior.answer.where_bent import best_ends, where_bent
 from inference.posterior.answer.where_known import where_known
 from inference.posterior.criticism.discrepancy_check import LargerDiscrepancy
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
@@ -213,8 +213,7 @@ def error_budget(
     ]
     if bent and experiments[0].shadow > 0:
         follow = where_bent(
-            experiments,
-            readings,
+            best_ends(experiments, readings),
             z + np.median(by_z[0][:, :, 0], axis=0),
             log_r + np.median(by_log_r[0][:, :, 0], axis=0),
         )
@@ -233,7 +232,7 @@ def error_budget(
         by_z.append(np.zeros((*z[chosen].shape, moved.shape[2])))
         by_log_r.append(moved)
     if isinstance(density, DiscrepantDensity) and shadow > 0:
-        follow = shadow_beside(density, experiments, readings, shadow)
+        follow = shadow_beside(with_shadow(density, experiments, shadow), readings)
         for by, moved in zip((by_z, by_log_r), follow, strict=True):
             by[0] = by[0] + moved[:, :, :1]
             by.append(moved[:, :, 1:])

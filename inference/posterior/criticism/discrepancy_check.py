@@ -7,16 +7,29 @@ exceeds b with a probability of at most 1/b, whatever the scene (Markov's inequa
 """
 
 import dataclasses
+import math
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from inference.density.discrepant import DiscrepantDensity
+from inference.identifiability.expected_posterior import eliminated
+from inference.identifiability.experiment import Experiment
+from inference.identifiability.joint_optimum import joint_optimum
+from inference.identifiability.response_rows import ResponseRows
 from inference.identifiability.status import Identifiability
 from inference.posterior.answer.fit import Fit
+from inference.posterior.criticism.best_point import BestPoint
 
-__all__ = ["MISFIT", "LargerDiscrepancy", "judge_fit", "larger_discrepancy", "with_model_part"]
+__all__ = [
+    "MISFIT",
+    "LargerDiscrepancy",
+    "beside_shadow",
+    "judge_fit",
+    "larger_discrepancy",
+    "with_model_part",
+]
 
 Array = NDArray[np.float64]
 
@@ -74,6 +87,33 @@ def larger_discrepancy(density: DiscrepantDensity, z: Array, log_r: Array) -> La
     return LargerDiscrepancy(
         factor, weights @ z - z.mean(axis=0), weights @ ranges - ranges.mean(axis=0)
     )
+
+
+def beside_shadow(larger: LargerDiscrepancy, at: BestPoint) -> LargerDiscrepancy:
+    """Return the same where errors of a shadow may have made what the flux's cannot.
+
+    By Laplace's method about the best points of unknowns, ranges and all errors together, for the
+    stated size and for the larger one.
+    """
+    best, readings = at
+    assert best.discrepancy is not None and best.error is not None  # noqa: S101, PT018
+    error = best.error.copy()
+    error[: best.flux_errors] /= _FACTOR
+    wider = dataclasses.replace(best, discrepancy=_FACTOR * best.discrepancy, error=error)
+    stated, twice = (_log_mass(each, readings) for each in (best, wider))
+    factor = min(larger.bayes_factor, math.exp(min(twice - stated, 700.0)))
+    return dataclasses.replace(larger, bayes_factor=factor)
+
+
+def _log_mass(experiment: Experiment, readings: Array) -> float:
+    end, deviance = joint_optimum(experiment, readings)
+    rows = ResponseRows(end)
+    both = np.concatenate([rows.jacobian, rows.by_error], axis=2)
+    across, *_ = eliminated(end, both, rows.along)
+    size = both.shape[2]
+    whole = np.concatenate([across.reshape(-1, size), np.eye(size)])
+    diagonal = np.abs(np.diag(scipy.linalg.qr(whole, mode="r")[0][:size]))
+    return float(-0.5 * deviance - np.log(diagonal).sum())
 
 
 def judge_fit(fit: Fit, larger: LargerDiscrepancy) -> Fit:

@@ -16,7 +16,7 @@ from inference.frame.warmth import gains_of
 from inference.posterior.answer.replicate import replicate_frames
 from inference.posterior.job import Job
 
-__all__ = ["FitResiduals", "fit_residuals"]
+__all__ = ["FitResiduals", "fit_residuals", "followed_part"]
 
 _AT_END = 1e-6  # log range between the best range and an end of its prior
 
@@ -153,7 +153,7 @@ def fit_residuals(
     )
     empty = at.residual.reshape(sets, n, 2)[:, ~present].reshape(sets, -1)
     before = np.concatenate([across[:, present], empty, known], axis=1)
-    followed, found = _followed(before, rows)
+    followed, found = followed_part(before, rows)
     fitted = before - followed
     count = int(present.sum())
     squared = np.empty((sets, n))
@@ -189,12 +189,12 @@ def _of_one_range(density: StaticDensity, z: Array, seen: Array, readings: Array
     if not at_end.any():
         rows = np.concatenate([rows, direction.reshape(m * n, 1)], axis=1)
     # a range at an end of its prior cannot follow what lies beyond
-    fitted = residuals - _followed(residuals, rows, free=0 if at_end.any() else 1)[0]
+    fitted = residuals - followed_part(residuals, rows, free=0 if at_end.any() else 1)[0]
     squared = np.sum(fitted.reshape(sets, n, m) ** 2, axis=2)
     return FitResiduals(np.empty((sets, 0)), squared, np.empty(0), np.zeros(sets))
 
 
-def _followed(residuals: Array, rows: Array, free: int = 0) -> tuple[Array, Array]:
+def followed_part(residuals: Array, rows: Array, free: int = 0) -> tuple[Array, Array]:
     """Return the part of residuals that the parameters follow, and how far they go.
 
     The last few are without a prior.

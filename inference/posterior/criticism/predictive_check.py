@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.answer.fit import Fit, FitCheck
+from inference.posterior.criticism.best_point import BestPoint
+from inference.posterior.criticism.erring_residuals import erring_residuals
 from inference.posterior.criticism.fit_residuals import FitResiduals, fit_residuals
 from inference.posterior.job import Job
 from simulator.discrepancy import matern
@@ -91,6 +93,7 @@ def predictive_check(
     z: Array,
     rng: np.random.Generator,
     others: Sequence[Job] = (),
+    best: BestPoint | None = None,
 ) -> Fit:
     """Check the frames against replicates of them.
 
@@ -108,12 +111,18 @@ def predictive_check(
     others : sequence of Job
         The other parts of a job whose frames were dealt out. Each is fitted on its own, and what
         is looked at is that of all together.
+    best : BestPoint, optional
+        Where readings before a background are met best with errors of the model: where draws of an
+        exact model are no place to follow them from.
     """
     chosen = np.linspace(0, len(z) - 1, min(_DRAWS, len(z))).astype(np.intp)
     replicates = max(_REPLICATES // (1 + len(others)), _FEWEST)
     found, seen = [], []
     for part, own in ((job, density), *((other, other.density()) for other in others)):
-        every = [fit_residuals(part, own, z[k], replicates, rng) for k in chosen]
+        if best is None:
+            every = [fit_residuals(part, own, z[k], replicates, rng) for k in chosen]
+        else:
+            every = [erring_residuals(best, _DRAWS * replicates, rng)]
         found.append({name: [check(of) for of in every] for name, check in _CHECKS.items()})
         seen.append(np.median([of.squared[0] for of in every], axis=0))
     checks = []
