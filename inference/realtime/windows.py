@@ -229,6 +229,15 @@ def differences(t: Array, net: Net, gain: Array | None, radial: bool, out: Windo
             # are far apart, an estimate that lies along the change says nothing of what is across
             if radial and count == _NODES and at != _NODES // 2 and square > 0.0:
                 sideways = bias / math.sqrt(square) * min(_CROOKED * bend, 1.0)
+                # nor do series to one side converge where the light grows severalfold within them:
+                # what an order more changes says how far they are from it
+                side = 0 if at < _NODES // 2 else 1
+                four = _difference(t, net, nodes, at, side, side + _NODES - 2)
+                three = _difference(t, net, nodes, at, 2 * side, 2 * side + _NODES - 3)
+                last = abs(x * (whole.d1 - four.d1) / s1 - y * (whole.d2 - four.d2) / s2)
+                before = abs(x * (four.d1 - three.d1) / s1 - y * (four.d2 - three.d2) / s2)
+                slower = min(last / before, 1.0) if before > 0.0 else 1.0
+                sideways = max(sideways, last * slower / square)
                 if sideways > turn:
                     more += sideways * sideways - turn * turn
                     turn = sideways

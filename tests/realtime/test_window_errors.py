@@ -83,3 +83,18 @@ def test_a_bias_that_vanishes_at_one_frame_is_told_by_its_neighbours(
     assert np.isfinite(off).sum() >= frames - 1
     assert np.nanmax(np.abs(off)) < 3.0
     assert np.nanmedian(sd / r) < 0.3
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("near", [0.22, 0.3, 0.4])
+def test_windows_to_one_side_that_do_not_converge_say_so(kind: str, near: float) -> None:
+    """Eight coarse frames at constant speed: the far end was 9 to 14 sd off.
+
+    The light grows severalfold within a window there, and a derivative of five readings is as far
+    off as one of three. Nothing but bias counts at this noise.
+    """
+    far = near + 7 * 0.1 * near * 3.3
+    for r in (np.linspace(far, near, 8), np.linspace(near, far, 8)):
+        off, sd, _ = told(kind, r, {"read": [1e-8, 1e-8]})
+        assert np.nanmax(np.abs(off)) < 3.0
+        assert np.isfinite(sd).sum() >= 4
