@@ -141,9 +141,10 @@ def kinds_of(sensor: Sensor, frames: Frames, track: Track, trusts_empty: bool) -
     with np.errstate(divide="ignore"):
         steps = np.floor(np.log(np.maximum(size, 1.0)) / _STEP)
     kind = np.minimum(steps, _STEPS - 1).astype(np.int64)
-    kind[(track.outlier > 0.5) & ~track.misfit] = UNUSED
+    trusted = ~track.misfit | track.in_a_row
+    kind[(track.outlier > 0.5) & trusted] = UNUSED
     if trusts_empty:
-        kind[(track.present < _SURELY_EMPTY) & ~track.misfit] = EMPTY
+        kind[(track.present < _SURELY_EMPTY) & trusted] = EMPTY
     if frames.object_present is not None:
         kind[~frames.object_present] = EMPTY
     kind[frames.saturated(sensor)] = UNUSED

@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 from inference.estimates import Status
 from inference.tracking.empty_scene import learn_empty
 from inference.tracking.frame_density import TrackedFrame
-from inference.tracking.hypotheses import COUNT, PENDING, ROUGHNESS, RUNNING, TIME, Hypotheses
+from inference.tracking.hypotheses import (
+    COUNT,
+    PENDING,
+    ROUGHNESS,
+    RUNNING,
+    SAME,
+    TIME,
+    Hypotheses,
+    take_readings,
+)
 from inference.tracking.lasting import lasting_of
 from inference.tracking.prediction import predict
 from inference.tracking.readings_table import nuisance_count
@@ -25,6 +34,7 @@ from inference.tracking.report import (
     PRESENT,
     SD,
     STATUS,
+    STUCK,
     SURPRISE,
     UNSTEADY_MEAN,
     report,
@@ -91,6 +101,7 @@ def run_filter(
         frame = TrackedFrame(
             frames[i, _FIRST], frames[i, _SECOND], frames[i, _GAIN], known_m, known_rate
         )
+        take_readings(numbers, frames[i, _FIRST], frames[i, _SECOND])
         outlier, surprise = 0.0, math.nan
         if kinds[i] == USABLE:
             outlier, surprise = weigh_frame(frame, of, model, room, full)
@@ -106,7 +117,7 @@ def run_filter(
             numbers[RUNNING] += (1.0 - rules.memory) * (own - numbers[RUNNING])
             numbers[ROUGHNESS] += (min(own, 1.0) - numbers[ROUGHNESS]) / _LATE
         report(out, rows, i, of, rules)
-        out[i, OUTLIER], out[i, SURPRISE] = outlier, numbers[RUNNING]
+        out[i, OUTLIER], out[i, SURPRISE], out[i, STUCK] = outlier, numbers[RUNNING], numbers[SAME]
         if numbers.size > UNSTEADY:
             if kinds[i] == USABLE and outlier >= 0.5:
                 numbers[OUTLIERS] += 1.0

@@ -23,6 +23,7 @@ __all__ = [
     "PENDING",
     "ROUGHNESS",
     "RUNNING",
+    "SAME",
     "TIME",
     "WITHOUT_CROSSTALK",
     "Hypotheses",
@@ -34,6 +35,7 @@ __all__ = [
     "learns_crosstalk",
     "log_of",
     "scratch_for",
+    "take_readings",
     "variance_of",
 ]
 
@@ -43,7 +45,7 @@ Array = NDArray[np.float64]
 U, V, CROSSTALK1, CROSSTALK2, ANCHOR = range(5)
 WITHOUT_CROSSTALK = 2  # own states of a hypothesis that does not learn it
 # places in `Hypotheses.numbers`
-TIME, PENDING, RUNNING, COUNT, LOST, ROUGHNESS = range(6)
+TIME, PENDING, RUNNING, COUNT, LOST, ROUGHNESS, SAME, _READ1, _READ2 = range(9)
 _LEAST = -700.0  # log of a weight that underflows
 
 
@@ -56,10 +58,11 @@ class Hypotheses(NamedTuple):
     x: Array
     X: Array  # (rows, n, n + p): roots of the covariances
     weight: Array  # (rows,): probabilities
-    # (6,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
+    # (9,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
     # the last frame [s] (nan: none yet), probability of an object of which nothing is known yet,
     # running surprise, number of hypotheses, whether an object that was there may be anywhere by
-    # now, and the surprise of the last frames, each cut at 1
+    # now, the surprise of the last frames, each cut at 1, how many frames up to the last had the
+    # readings of the one before, and these readings
     numbers: Array
 
 
@@ -117,3 +120,11 @@ def variance_of(of: Hypotheses, row: int, state: int) -> float:
 def log_of(weight: float) -> float:
     """Return the log of a weight, of none that of one which underflows."""
     return math.log(weight) if weight > 0.0 else _LEAST
+
+
+@compiled
+def take_readings(numbers: Array, first: float, second: float) -> None:
+    """Count frames whose readings are to the last bit those of the frame before."""
+    same = first == numbers[_READ1] and second == numbers[_READ2]
+    numbers[SAME] = numbers[SAME] + 1.0 if same else 0.0
+    numbers[_READ1], numbers[_READ2] = first, second

@@ -36,6 +36,7 @@ __all__ = [
     "SCENE_SD",
     "SD",
     "STATUS",
+    "STUCK",
     "SURPRISE",
     "UNSTEADY_MEAN",
     "WEIGHT",
@@ -46,7 +47,7 @@ Array = NDArray[np.float64]
 
 # columns of a report
 STATUS, PRESENT, OUTLIER, SURPRISE, HYPOTHESES, BEST = range(6)
-CROSSTALK, UNSTEADY_MEAN, LASTING, OUTLIERS_RUN, REPORT_COLUMNS = 12, 16, 17, 18, 19
+CROSSTALK, UNSTEADY_MEAN, LASTING, OUTLIERS_RUN, STUCK, REPORT_COLUMNS = 12, 16, 17, 18, 19, 20
 # columns of a hypothesis, and of the best range: u, its sd, the parts of it that all frames share
 # because the scene and because the model may be wrong, rate, its sd, weight (of the best range
 # given that an object is there)

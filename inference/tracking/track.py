@@ -69,9 +69,10 @@ class Track:
         Probability that the frame's readings have nothing to do with the scene.
     surprise : ndarray, shape (n,)
         Running mean of the normalised innovation squared per reading: 1 where all is as modelled.
-    misfit : ndarray of bool, shape (n,)
+    misfit, in_a_row : ndarray of bool, shape (n,)
         Whether it, jumps, what lasts beside the curve or outliers in a row are above what chance
-        allows, or learnt crosstalk is far from its prior: scene, noise or motion are not as stated.
+        allows, readings do not change, or learnt crosstalk is far from its prior: scene, noise or
+        motion are not as stated. Whether outliers in a row alone say so.
     hypotheses_m, hypotheses_sd_m, hypotheses_weight : ndarray, shape (n, k)
         All ranges by ascending order, padded with nan [m].
     crosstalk, crosstalk_sd : ndarray, shape (n, 2), optional
@@ -89,6 +90,7 @@ class Track:
     outlier: Array
     surprise: Array
     misfit: NDArray[np.bool_]
+    in_a_row: NDArray[np.bool_]
     hypotheses_m: Array
     hypotheses_sd_m: Array
     hypotheses_weight: Array
@@ -215,7 +217,6 @@ def track(
 
 
 def _times(frames: Frames, last: float) -> Array:
-    """Return the times, checked."""
     if frames.time_s is None:
         raise InvalidInputError.at("/frames/time_s", "is missing: a tracker needs it")
     times = np.ascontiguousarray(frames.time_s, dtype=np.float64)
@@ -246,8 +247,7 @@ def _known(model: Tracker, frames: Frames) -> list[Array]:
             f"entry {beyond[0]} is {known[beyond[0]]:g} m, and the scene and the sensor allow "
             f"ranges from {low:.4g} to {high:.4g} m: state a wider range_m",
         )
-    told = np.isfinite(known)
-    return [np.where(told, known, 0.0), np.where(told, 1.0 / sd, 0.0)]
+    return [np.where(told := np.isfinite(known), known, 0.0), np.where(told, 1.0 / sd, 0.0)]
 
 
 def _observations(model: Tracker, frames: Frames) -> Array:
@@ -274,6 +274,7 @@ def _track(model: Tracker, out: Array, rows: Array) -> Track:
     range_m, ranges = np.exp(out[:, BEST + POSITION]), np.exp(rows[:, :, POSITION])
     sd, scene, error = (out[:, BEST + column] for column in (SD, SCENE_SD, MODEL_SD))
     added = model.added(out[:, BEST + POSITION])
+    lasting, in_a_row = misfits(out, model.limits, crosstalk, model.crosstalk_bounds)
     return Track(
         status=out[:, STATUS].astype(np.uint8),
         present=out[:, PRESENT].copy(),
@@ -289,7 +290,8 @@ def _track(model: Tracker, out: Array, rows: Array) -> Track:
         weight=out[:, BEST + WEIGHT].copy(),
         outlier=out[:, OUTLIER].copy(),
         surprise=out[:, SURPRISE].copy(),
-        misfit=misfits(out, model.limits, crosstalk, model.crosstalk_bounds),
+        misfit=lasting | in_a_row,
+        in_a_row=in_a_row & ~lasting,
         hypotheses_m=ranges,
         hypotheses_sd_m=ranges * np.hypot(rows[:, :, SD], model.added(rows[:, :, POSITION])),
         hypotheses_weight=rows[:, :, WEIGHT].copy(),

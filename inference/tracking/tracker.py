@@ -25,7 +25,6 @@ from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
 from inference.tracking.stated_priors import check_carried
 from inference.tracking.tabulate import empty_readings, knots_of, places_of, table_of
-from inference.tracking.unsteady import UNSTEADY
 from inference.tracking.weighing import Model
 from simulator.errors import InvalidInputError, Problem, RefusedError, listed
 from simulator.model_error import ModelError
@@ -260,9 +259,7 @@ def _law(stated: RangePrior, centre: Terms) -> Any:
 def _signature(table: ReadingsTable, places: Places, rules: Rules, hypotheses: Hypotheses) -> str:
     """Return a digest of everything that gives a state its meaning."""
     digest = hashlib.sha256()
-    shapes = np.array([*hypotheses.x.shape, *hypotheses.X.shape])
-    if hypotheses.numbers.size > UNSTEADY:
-        shapes = np.append(shapes, hypotheses.numbers.size)
+    shapes = np.array([*hypotheses.x.shape, *hypotheses.X.shape, hypotheses.numbers.size])
     for value in _leaves((table, places, rules, shapes)):
         array = np.asarray(value)
         digest.update(str((array.shape, array.dtype.str)).encode())

@@ -51,10 +51,11 @@ Array = NDArray[np.float64]
 # that was none its time, what is left of its two readings, the direction across the curve (of an
 # empty scene nan and the gain), and what every nuisance parameter does along that; behind them what
 # lasts
-UNSTEADY, OUTLIERS, _TIME, _LEFT1, _LEFT2, _ACROSS1, _ACROSS2, _SHARED = range(6, 14)
+UNSTEADY, OUTLIERS, _TIME, _LEFT1, _LEFT2, _ACROSS1, _ACROSS2, _SHARED = range(9, 17)
 _GAIN = _ACROSS2
 # standard deviations that an error which frames share may be off by: beyond it one in a million is
 _ALLOWED = 5.0
+_HIDES = 25.0  # variance of an empty scene's readings, in units of the noise, that hides an object
 _MOST = 15.1  # squared change at which a single frame is cut: noise exceeds it once in 10,000
 
 
@@ -144,6 +145,9 @@ def take_empty(
 ) -> None:
     """Take a frame without an object into the running mean of changes: both readings tell it.
 
+    Not where the readings of the empty scene are open by more than noise: an object that moves may
+    pass for one.
+
     Parameters
     ----------
     of : Hypotheses
@@ -164,15 +168,25 @@ def take_empty(
     # what was before: nothing, an object, or an empty scene
     change1, change2 = first - numbers[_LEFT1], second - numbers[_LEFT2]
     after_empty = math.isnan(numbers[_ACROSS1]) and not math.isnan(change1)
-    seconds, brighter, shared = time - numbers[_TIME], gain - numbers[_GAIN], 0.0
+    seconds, brighter = time - numbers[_TIME], gain - numbers[_GAIN]
+    shared, hidden = 0.0, 0.0
     numbers[_TIME], numbers[_LEFT1], numbers[_LEFT2] = time, first, second
     numbers[_ACROSS1], numbers[_GAIN] = math.nan, gain
     if not after_empty:
         return
-    if brighter != 0.0:
-        for j in range(nuisance_count(table)):
-            g1, g2 = brighter * empty[FIRST, 1 + j], brighter * empty[SECOND, 1 + j]
-            shared += g1 * g1 + g2 * g2
+    n, m = of.X.shape[1], of.X.shape[-1]
+    learns = learns_crosstalk(of)
+    for j in range(m):
+        f1, f2 = 0.0, 0.0
+        if learns:
+            f1, f2 = of.X[0, CROSSTALK1, j], of.X[0, CROSSTALK2, j]
+        if j >= n:
+            g1, g2 = empty[FIRST, 1 + j - n], empty[SECOND, 1 + j - n]
+            shared += brighter * brighter * (g1 * g1 + g2 * g2)
+            f1, f2 = f1 + gain * g1, f2 + gain * g2
+        hidden += f1 * f1 + f2 * f2
+    if hidden > _HIDES:
+        return
     root = UNIT
     if not table.noise.plain:
         m1, m2 = frame.first - first + table.crosstalk1, frame.second - second + table.crosstalk2

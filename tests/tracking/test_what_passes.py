@@ -5,6 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from inference.estimates import Status
+from inference.self_calibration.gathering import UNUSED, kinds_of
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.track import Track, track
 from simulator.parameters import parameters_of
@@ -45,6 +46,9 @@ def test_a_hand_on_the_glass_is_a_misfit_from_its_second_frame_on(kind: str) -> 
     found = tracked(kind, light)
     assert found.outlier[FROM] > 0.9
     assert found.misfit[FROM + 1 : TO].all()
+    # a calibration leaves such frames aside, until more than they speaks against the scene
+    frames = frames_of(light, STEP_S)
+    assert (kinds_of(sensor_of(NOISE, kind), frames, found, True)[FROM : FROM + 30] == UNUSED).all()
     # the surprise, cut in every frame, is back to 1 / e of what it was after 30 frames
     assert not found.misfit[TO + 30 :].any()
     assert (found.status[TO + 30 :] == Status.UNIQUE).all()
@@ -91,3 +95,41 @@ def test_another_object_that_has_gone_is_remembered_but_not_said_of_the_empty_sc
     assert (found.present[FROM + 1 : TO] < 0.1).all()
     assert not found.misfit[FROM + 30 : TO].any()
     assert found.misfit[TO : TO + 10].all()
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.parametrize("rounded", [0.0, 1.0])
+def test_a_sensor_that_is_stuck_is_said_until_it_reads_again(kind: str, rounded: float) -> None:
+    light = light_of(kind)
+    light[:FROM] = light[FROM]  # at rest: nothing but the noise changes
+    noise = NOISE * np.random.default_rng(1).standard_normal((FRAMES, 2))
+    readings = light + CROSSTALK + noise
+    if rounded:
+        readings = rounded * NOISE * np.round(readings / (rounded * NOISE))
+    readings[FROM:TO] = readings[FROM]
+    scene = parse_scene({**PLATE, "crosstalk": CROSSTALK.tolist()})
+    found = track(sensor_of(NOISE, kind), scene, frames_of(readings, STEP_S))
+    assert not found.misfit[: FROM + 20].any()
+    assert found.misfit[FROM + 29 : TO].all()
+    assert not found.misfit[TO + 2 :].any()
+
+
+def test_a_scene_that_reads_zero_where_nothing_is_is_no_misfit() -> None:
+    readings = np.zeros((FRAMES, 2))
+    found = track(sensor_of(NOISE), parse_scene(PLATE), frames_of(readings, STEP_S))
+    assert not found.misfit.any()
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_an_object_that_passes_for_unknown_crosstalk_is_no_noise(kind: str) -> None:
+    """A stream that calibrates itself begins so: what is carried of its priors hides what moves."""
+    light = light_of(kind)
+    light[:FROM] = 0.0
+    unknown = [{"prior": "halfnormal", "sd": 50.0}, {"prior": "halfnormal", "sd": 50.0}]
+    scene = parse_scene({**PLATE, "crosstalk": unknown})
+    rng = np.random.default_rng(1)
+    readings = light + CROSSTALK + NOISE * rng.standard_normal((FRAMES, 2))
+    draws = 50.0 * np.abs(rng.standard_normal((400, 2)))
+    found = track(sensor_of(NOISE, kind), scene, frames_of(readings, STEP_S), posterior=draws)
+    assert (found.present[FROM:] < 0.5).mean() > 0.5
+    assert not found.misfit.any()
