@@ -52,7 +52,17 @@ def _eliminated(problem: FitProblem, at: Point) -> Information:
     if told is not None:
         of_all = np.concatenate([told.errors, told.residual[:, :, None]], axis=2)
         told = told._replace(errors=of_all)
-    return eliminated(problem.names, at.jacobian, at.along, errors, told)
+    seen = eliminated(problem.names, at.jacobian, at.along, errors, told)
+    # what a range would gain beyond the ends of what is possible no step can take
+    low, high = np.log(problem.support)
+    step = -seen.error_response[:, -1]
+    ended = ((at.u <= low) & (step < 0.0)) | ((at.u >= high) & (step > 0.0))
+    if not ended.any():
+        return seen
+    along = np.where(ended[:, None], 0.0, at.along)
+    if told is not None:
+        told = told._replace(along=np.where(ended[:, None], 0.0, told.along))
+    return eliminated(problem.names, at.jacobian, along, errors, told)
 
 
 def _ranges(problem: FitProblem, at: Point, seen: Information, dx: Array, da: Array) -> Array:
