@@ -153,7 +153,7 @@ class Gate:
 
         async def receive_known() -> Message:
             nonlocal begun
-            if not begun:
+            if self._keys is None or not begun:
                 begun = True
                 return await receive()
             message = await _unless(out, receive)
