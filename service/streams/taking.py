@@ -37,6 +37,8 @@ from simulator.frames import Frames
 
 __all__ = ["take"]
 
+_SET_BACK_S = 1.0  # by more than that no line comes late
+
 # a frame that waits for the tracker, together with others of its shape: where its answer goes, its
 # number, time and arrival, its values, and what else is to be said
 _Waiting = tuple[int, int, float, float, tuple[Any, ...], dict[str, Any] | None]
@@ -209,6 +211,8 @@ class _Batch:
         time_s = float(frame["time_s"])
         if time_s <= self._time:
             message = f"{time_s:.9g} s is not later than the last frame, {self._time:.9g} s"
+            if self._time - time_s > _SET_BACK_S:
+                message += "; where a clock was set back, or that frame's was wrong: a new stream"
             raise InvalidInputError.at("/time_s", message)
         if self._alone and alone is None:
             alone = one_frame(self._model, frame, shape.columns)

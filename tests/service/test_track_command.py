@@ -71,6 +71,19 @@ def test_track_is_the_tracker(
     ]
 
 
+def test_times_that_go_far_back_say_that_a_new_stream_helps(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scene: Path
+) -> None:
+    times = 0.0, 1e9, 1e9 - 0.5, 0.1  # one line far ahead, one that is late, and the clock again
+    lines = (f'{{"time_s": {time_s}, "w1": 0.003866, "w2": 0.1159}}' for time_s in times)
+    given(monkeypatch, "\n".join(lines))
+    late, back = (line["error"]["detail"] for line in answers(
+        Said(capsys, "track", "-", "--scene", scene))[2:])  # fmt: skip
+    assert "new stream" not in late
+    assert "a clock was set back" in back
+    assert "a new stream" in back
+
+
 def test_a_bad_line_is_answered_and_changes_nothing(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scene: Path
 ) -> None:
