@@ -75,6 +75,8 @@ def derivatives_of(
     # the relative error is independent from frame to frame, so it does not cancel in a difference
     net = net_readings(sensor, crosstalk or (0.0, 0.0), frames, with_relative=True)
     usable = np.flatnonzero(net.state == 0)
+    if crosstalk is None and sensor.noise.relative > 0 and usable.size >= 3:
+        net = _with_larger_signals(sensor, frames, net, usable)
     gain = frames.gain if crosstalk is None else None
     n = len(frames)
     windows = Windows(*(np.full(n, np.nan) for _ in range(6)))
@@ -101,6 +103,37 @@ def derivatives_of(
     bad = (state == 0) & ~(np.isfinite(windows.first) & np.isfinite(windows.second))
     state[bad] = UNREPRESENTABLE
     return Net(windows.first, windows.second, windows.var1, windows.var2, windows.cov, 0.0, state)
+
+
+def _with_larger_signals(sensor: Sensor, frames: Frames, net: Net, usable: NDArray[np.intp]) -> Net:
+    """Return readings whose relative error is no less than that of what has changed.
+
+    Unknown crosstalk may cancel the light, of which the relative error is a share. The light is
+    more than that of the darkest frame by what a reading differs from it, whatever the crosstalk:
+    where that is more than the reading, crosstalk does. How dark the darkest one is nothing tells;
+    so the light is then taken for as large as what a reading differs by from any.
+    """
+    readings = np.column_stack([net.first, net.second])[usable]
+    one = int(np.argmax(_lengths(readings - readings[0])))
+    other = int(np.argmax(_lengths(readings - readings[one])))
+    # of the two that differ most the darker one is where readings change less
+    steps = _lengths(np.diff(readings, axis=0))
+    change = np.maximum(np.append(steps, 0.0), np.insert(steps, 0, 0.0))
+    dark, bright = (other, one) if change[other] < change[one] else (one, other)
+    from_dark, from_bright = (
+        net_readings(sensor, tuple(frames.readings[usable[end]]), frames, with_relative=True)
+        for end in (dark, bright)
+    )
+    size, more, most = (np.hypot(each.first, each.second) for each in (net, from_dark, from_bright))
+    parts = []
+    for name in ("var1", "var2", "cov"):
+        own, its, far = (getattr(each, name) for each in (net, from_dark, from_bright))
+        parts.append(np.where(more > size, np.where(most > more, far, its), own))
+    return net._replace(var1=parts[0], var2=parts[1], cov=parts[2])
+
+
+def _lengths(vectors: Array) -> Array:
+    return np.asarray(np.hypot(vectors[:, 0], vectors[:, 1]))
 
 
 def _of_frames(
