@@ -86,7 +86,9 @@ def measure(job: fold.Job, max_seconds: float, look: bool) -> Outcome:
     checkpoint, clock = _timed(fold.start, job)
     seen: list[tuple[float, Posterior]] = []
     while clock < max_seconds:
-        if look and (not seen or _ess(seen[-1][1]) < _ESS or not seen[-1][1].drawn):
+        # what is looked at before it is begun would be computed beside the clock
+        begun = fold.progress(job, checkpoint).phase != "starting"
+        if look and begun and (not seen or _ess(seen[-1][1]) < _ESS or not seen[-1][1].drawn):
             seen.append((clock, fold.summarise(job, checkpoint, 0.0, 0.0)))
         pieces = [_timed(fold.run, task) for task in fold.tasks(job, checkpoint)]
         if not pieces:

@@ -11,10 +11,11 @@
 Between chunks a checkpoint may be stored and read again: the result is the same to the last bit.
 
 Where weighted draws from the Laplace shapes at the optima, or from maps fitted to them, are even
-and points from the prior do not contradict them, ensembles walk at once. Where not, populations are
-first carried from the prior to the posterior, and maps are fitted to them and to weighted draws
-from these maps, in rounds. Such draws are the answer with the method `auto`, where they agree with
-the populations; otherwise ensembles walk in the last map's coordinates. What each stage does is in
+and points from the prior do not contradict them, they are the answer with the method `auto`, and
+ensembles walk at once with `emcee`. Where not, rounds of weighted draws follow from the points from
+the prior, and where these do not do from populations that are carried from the prior to the
+posterior. Such draws are the answer with `auto`, where the points or populations agree with them;
+otherwise ensembles walk in the last map's coordinates. What each stage does is in
 `inference.posterior.stages`.
 """
 

@@ -16,7 +16,8 @@ class SamplerSettings(Validated):
     ----------
     method : "emcee", "importance" or "auto"
         Ensembles of walkers; Laplace with Student-t importance sampling, refused above a Pareto
-        k-hat of 0.5; or importance sampling where it is good enough, ensembles otherwise.
+        k-hat of 0.5; or importance sampling where its weights, and points that came from the
+        prior, say that it is good enough, ensembles otherwise.
     ensembles : int
         Independent ensembles; fewer than four cannot show much disagreement.
     target_ess : int
@@ -31,7 +32,7 @@ class SamplerSettings(Validated):
         Left out: drawn, and returned with the answer.
     """
 
-    method: Literal["emcee", "importance", "auto"] = "emcee"
+    method: Literal["emcee", "importance", "auto"] = "auto"
     ensembles: Annotated[int, pydantic.Field(ge=2, le=32)] = 4
     target_ess: Annotated[int, pydantic.Field(ge=10, le=1_000_000)] = 400
     max_seconds: Annotated[float, pydantic.Field(gt=0, le=86_400)] = 120.0

@@ -25,7 +25,10 @@ UNKNOWN_WALL: dict[str, Any] = {
 def job_of(scene: dict[str, Any], seed: int, snr: float = 1e6) -> fold.Job:
     frames = data(sensor_of("pulsed", snr), {"background": WALL}, 40, span=(1.0, 2.0)).frames
     return fold.prepare(
-        sensor_of("pulsed", snr), parse_scene(scene), frames, SamplerSettings(seed=seed)
+        sensor_of("pulsed", snr),
+        parse_scene(scene),
+        frames,
+        SamplerSettings(method="emcee", seed=seed),
     )
 
 

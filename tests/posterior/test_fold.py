@@ -23,7 +23,7 @@ from simulator.sensor import parse_sensor
 from tests.posterior.scenes import OBJECT, UNKNOWN_CROSSTALK, data, example, sensor_of
 
 WIDE_HALF = {"prior": "halfnormal", "sd": 1.3}
-QUICK = SamplerSettings(seed=7, target_ess=50, max_seconds=3600)
+QUICK = SamplerSettings(method="emcee", seed=7, target_ess=50, max_seconds=3600)
 
 
 def same(a: Posterior, b: Posterior) -> bool:

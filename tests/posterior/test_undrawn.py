@@ -18,7 +18,7 @@ from service.store.record import QUEUED, JobRecord
 from simulator.scene import parse_scene
 from tests.posterior.scenes import UNKNOWN_CROSSTALK, data, sensor_of
 
-NO_TIME = SamplerSettings(seed=1, max_seconds=1e-3)
+NO_TIME = SamplerSettings(method="emcee", seed=1, max_seconds=1e-3)
 SENSOR = sensor_of("pulsed")
 # with crosstalk no law fits their posterior at once
 UNKNOWN_WALL = {

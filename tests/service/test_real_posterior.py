@@ -45,7 +45,7 @@ def request_body() -> dict[str, Any]:
     simulated = simulation_of(
         parse(SimulationRequest, system | {"scene": known, "trajectory": trajectory, "seed": 1})
     )
-    sampler = {"seed": 2, "max_seconds": 86_400.0, "target_ess": 100}
+    sampler = {"method": "emcee", "seed": 2, "max_seconds": 86_400.0, "target_ess": 100}
     return system | {"frames": simulated["frames"], "sampler": sampler}
 
 
@@ -110,7 +110,9 @@ async def test_killed_workers_change_nothing(tmp_path: Path) -> None:
     """The answer is that of one call in a process that nobody disturbs."""
     request = parse(PosteriorRequest, request_body())
     frames = frames_from_columns(request.sensor, request.frames)
-    settings = SamplerSettings(seed=2, ensembles=2, target_ess=2_000, max_seconds=86_400)
+    settings = SamplerSettings(
+        method="emcee", seed=2, ensembles=2, target_ess=2_000, max_seconds=86_400
+    )
     pool = ProcessPool(2)
     store = JobStore(f"sqlite:///{tmp_path}/jobs.sqlite", Retention(1))
     jobs = Jobs(fold, store, pool, running=1)

@@ -125,17 +125,20 @@ class Rounds:
         than at any draw.
     calls : int
         Density evaluations.
+    tolerated : float
+        Dissent below which the draws stand.
     """
 
     proposal: Proposal
     draws: WeightedDraws
     dissent: float
     calls: int
+    tolerated: float
 
     @property
     def trusted(self) -> bool:
         """Whether the draws stand for the posterior, however many they are."""
-        return self.draws.k_hat < MAX_K_HAT and self.dissent < _MOST_DISSENT
+        return self.draws.k_hat < MAX_K_HAT and self.dissent < self.tolerated
 
 
 def in_rounds(
@@ -145,6 +148,7 @@ def in_rounds(
     rng: np.random.Generator,
     target_ess: int,
     most: int,
+    tolerated: float = _MOST_DISSENT,
 ) -> Rounds:
     """Draw by importance, in rounds that follow what was drawn.
 
@@ -162,6 +166,8 @@ def in_rounds(
         Effective sample size wanted.
     most : int
         Draws that may be spent; those that count are 2000 in any case.
+    tolerated : float
+        Share of a population's members beyond every weight, below which draws stand.
 
     Returns
     -------
@@ -178,15 +184,16 @@ def in_rounds(
         beyond = excess > log_weights.max()
         share = _effective(log_weights) / len(log_weights)
         count = int(min(max(_SPARE * target_ess / share, _LEAST), most))
-        over = calls + _DRAWS + count > most
-        settled = pareto_k_hat(log_weights) < _SURE and _worst(beyond, ends) < _MOST_DISSENT
+        # no room for another round, or nothing that it could follow
+        over = calls + _DRAWS + _LEAST > most or not np.isfinite(log_weights).any()
+        settled = pareto_k_hat(log_weights) < _SURE and _worst(beyond, ends) < tolerated
         settled = settled and len(pool.laws) > _FEWEST * _LAWS
         if over or (settled and count <= _LONGEST * _LEAST):
             count = max(min(count, most - calls), _LEAST)
             draws = draw_weighted(density, pool.blend, rng, count).that_count
             calls += count
             most_drawn = np.max(draws.log_density - pool.blend.log_density(draws.z))
-            found = Rounds(proposal, draws, _worst(excess > most_drawn, ends), calls)
+            found = Rounds(proposal, draws, _worst(excess > most_drawn, ends), calls, tolerated)
             if over or (found.trusted and draws.ess >= target_ess):
                 if not found.trusted:
                     return found

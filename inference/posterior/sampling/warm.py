@@ -17,7 +17,7 @@ from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, dr
 from inference.posterior.sampling.proposal import Proposal
 from inference.posterior.sampling.transport import fit_map
 
-__all__ = ["MAP_SHARE", "Warm", "warm_start"]
+__all__ = ["MAP_SHARE", "Warm", "beyond", "warm_start"]
 
 Array = NDArray[np.float64]
 
@@ -80,7 +80,6 @@ def warm_start(
     n : int
         Draws of each round.
     """
-    at_others = density(others) if len(others) else np.empty(0)
     calls = len(others)
     for turn in range(_ROUNDS):
         draws = draw_weighted(density, proposal, rng, n)
@@ -93,6 +92,22 @@ def warm_start(
         proposal = dataclasses.replace(proposal, transport=transport, share=MAP_SHARE)
     if draws.ess > _EVEN * n:
         proposal = dataclasses.replace(proposal, share=_FITTING_SHARE)
+    return Warm(proposal, draws, beyond(density, proposal, draws, others), calls)
+
+
+def beyond(
+    density: CollapsedDensity, proposal: Proposal, draws: WeightedDraws, others: Array
+) -> float:
+    """Return the share of other points at which no draw's weight says that there may be so much.
+
+    Parameters
+    ----------
+    proposal : Proposal
+        That the draws came from.
+    others : ndarray, shape (m, d)
+        Points that came from the prior and know nothing of the proposal.
+    """
+    if not len(others):
+        return 0.0
     most = np.max(draws.log_density - proposal.log_density(draws.z))
-    beyond = at_others - proposal.log_density(others) > most
-    return Warm(proposal, draws, float(beyond.mean()) if len(others) else 0.0, calls)
+    return float(np.mean(density(others) - proposal.log_density(others) > most))

@@ -4,11 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.posterior.sampling.ensemble import WALKERS, Ensemble, new_ensemble
+from inference.posterior.job import Job
+from inference.posterior.sampling.ensemble import WALKERS, Ensemble, new_ensemble, warm_walkers
+from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.proposal import Proposal
+from inference.posterior.streams import Stream
 from simulator.errors import RefusedError
 
-__all__ = ["POPULATIONS", "new_ensembles"]
+__all__ = ["POPULATIONS", "from_weighted", "new_ensembles"]
 
 Array = NDArray[np.float64]
 
@@ -61,3 +64,22 @@ def new_ensembles(
             raise RefusedError("the prior leaves no room around its best parameters")
         ensembles.append(new_ensemble(proposal, coords[:walkers], log_prob[:walkers], seed))
     return tuple(ensembles)
+
+
+def from_weighted(
+    job: Job, density: CollapsedDensity, proposal: Proposal, draws: WeightedDraws, others: Array
+) -> tuple[Ensemble, ...]:
+    """Start the last ensemble from other points, the rest from different weighted draws.
+
+    Parameters
+    ----------
+    others : ndarray, shape (n, d)
+        Points that came from the prior and know nothing of the draws.
+    """
+    count = job.settings.ensembles - 1
+    rng, walkers = job.stream(Stream.MEMBERS), warm_walkers(len(density.parameters))
+    most = min(walkers * count, int(np.count_nonzero(draws.weights)))
+    order = rng.choice(len(draws.z), size=most, replace=False, p=draws.weights)
+    starts = tuple(draws.z[order[k::count]] for k in range(count))
+    seeds = job.seeds(Stream.ENSEMBLES)
+    return new_ensembles(density, proposal, (*starts, others), seeds, walkers)

@@ -101,6 +101,10 @@ class Tempering(_NotBegun):
         On what was drawn so far, which is nothing.
     weighted : WeightedDraws or None
         Importance draws that points from the prior do not contradict; None where they do.
+    scouted : bool
+        Whether the populations are the scouts, and where these stood on their way from the prior:
+        they find every branch and weigh none. Rounds of importance sampling are tried from them
+        before populations are carried.
     """
 
     phase: ClassVar[Phase] = "tempering"
@@ -109,6 +113,7 @@ class Tempering(_NotBegun):
     populations: tuple[Population | None, ...]
     verdict: Verdict
     weighted: WeightedDraws | None = None
+    scouted: bool = False
 
     @property
     def arrived(self) -> bool:

@@ -10,18 +10,16 @@ from inference.posterior.checks import check_best_fit, check_ranges
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
 from inference.posterior.sampling.aliases import aliases_of, with_aliases
-from inference.posterior.sampling.effort import scouts
-from inference.posterior.sampling.ensemble import WALKERS, Ensemble, warm_walkers
 from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
-from inference.posterior.sampling.population import carried
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.represent import represent
 from inference.posterior.sampling.start import Optimum, climb, climbed, optima_of, refine
 from inference.posterior.sampling.verdict import Verdict
-from inference.posterior.sampling.warm import Warm, warm_start
+from inference.posterior.sampling.warm import beyond, warm_start
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.chunk import evaluations
-from inference.posterior.stages.ensembles import POPULATIONS, new_ensembles
+from inference.posterior.stages.ensembles import POPULATIONS, from_weighted
+from inference.posterior.stages.scouting import Scouts, from_scouts, send_scouts, thinned
 from inference.posterior.stages.stage import (
     Drawing,
     Settled,
@@ -30,6 +28,7 @@ from inference.posterior.stages.stage import (
     Walking,
     Weighted,
 )
+from inference.posterior.stages.tempering import TOLERATED
 from inference.posterior.streams import Stream
 from simulator.errors import RefusedError
 
@@ -37,8 +36,6 @@ __all__ = ["StartTask", "begin"]
 
 Array = NDArray[np.float64]
 
-_SCOUTED_FRAMES = 200  # at most; the walkers then start the wider, the more frames there are
-_SCOUTS = 2 * WALKERS
 _IMPORTANCE_DRAWS = 2000
 _MOST_IMPORTANCE_DRAWS = 200_000
 _MOST_IMPORTANCE_FRAMES = 8_000_000  # draws times frames: ten seconds that nothing interrupts
@@ -131,7 +128,7 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum]) -> Checkpo
         Found so far.
     """
     whole = density = job.density()
-    optima, scouted, calls = _with_scouts(job, some, optima)
+    optima, scouts, calls = _with_scouts(job, some, optima)
     if job.is_large and optima:
         by, optima, used = represent(density, optima, job.stream(Stream.REPRESENTATIVES))
         job, calls = dataclasses.replace(job, representatives=by), calls + used
@@ -146,7 +143,7 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum]) -> Checkpo
         optima = with_aliases(aliases, density, optima)
     check_ranges(whole, job.scene, optima[0].z)
     check_best_fit(whole, optima[0].z)
-    stage, used = _first_stage(job, density, optima, scouted)
+    stage, used = _first_stage(job, density, optima, scouts)
     return Checkpoint(stage, calls + used, None, job.representatives)
 
 
@@ -160,74 +157,42 @@ def _of_some_frames(job: Job) -> Job:
 
 
 def _first_stage(
-    job: Job, density: CollapsedDensity, optima: list[Optimum], scouted: Array
+    job: Job, density: CollapsedDensity, optima: list[Optimum], scouts: Scouts
 ) -> tuple[Drawing, int]:
     """Set up ensembles or draw weighted samples, from optima; with the evaluations it took."""
-    calls, proposal = 0, Proposal(mixture_of(optima), None, _SHARE)
-    if job.settings.method in ("importance", "auto"):
-        weighted, used = _importance(density, proposal, job)
-        calls += used
-        if weighted is not None:
-            return weighted, calls
+    proposal = Proposal(mixture_of(optima), None, _SHARE)
+    if job.settings.method == "importance":
+        return _importance(density, proposal, job)
     draws = int(np.clip(evaluations(job) // 4, *_WARM_DRAWS))
-    warm = warm_start(density, proposal, scouted, job.stream(Stream.WARM), draws)
-    calls += warm.calls
+    warm = warm_start(density, proposal, scouts.z, job.stream(Stream.WARM), draws)
+    calls = warm.calls
     pending = Verdict(False, ("no steps were made",))
     if not warm.fits:
         known = None if warm.contradicted else warm.draws
-        return Tempering(proposal, (None,) * POPULATIONS, pending, known), calls
-    ensembles = _ensembles(job, density, warm, scouted)
+        stage = from_scouts(job, density, proposal, scouts, known)
+        return stage or Tempering(proposal, (None,) * POPULATIONS, pending, known), calls
+    if job.settings.method == "auto" and not _has_too_many(density):
+        weighted, used = _weighted_draws(density, warm.proposal, job)
+        calls += used
+        contradicted = beyond(density, warm.proposal, weighted, scouts.hot) >= TOLERATED
+        if _enough(weighted, job) and not contradicted:
+            return Weighted(proposal.optima, weighted.that_count, Verdict(True, ())), calls
+        if contradicted and (stage := from_scouts(job, density, warm.proposal, scouts, warm.draws)):
+            return stage, calls
+    ensembles = from_weighted(job, density, warm.proposal, warm.draws, scouts.z)
     walking = Walking(warm.proposal, ensembles, pending, adaptations=0, weighted=warm.draws)
     return walking, calls + ensembles[0].walkers * len(ensembles)
 
 
-def _ensembles(
-    job: Job, density: CollapsedDensity, warm: Warm, scouted: Array
-) -> tuple[Ensemble, ...]:
-    """Start the last ensemble from the scouts, the others from different weighted draws."""
-    draws, count = warm.draws, job.settings.ensembles - 1
-    rng, walkers = job.stream(Stream.MEMBERS), warm_walkers(len(density.parameters))
-    most = min(walkers * count, int(np.count_nonzero(draws.weights)))
-    order = rng.choice(len(draws.z), size=most, replace=False, p=draws.weights)
-    starts = tuple(draws.z[order[k::count]] for k in range(count))
-    seeds = job.seeds(Stream.ENSEMBLES)
-    return new_ensembles(density, warm.proposal, (*starts, scouted), seeds, walkers)
-
-
 def _with_scouts(
     job: Job, density: CollapsedDensity, optima: list[Optimum]
-) -> tuple[list[Optimum], Array, int]:
+) -> tuple[list[Optimum], Scouts, int]:
     """Add optima that scouts find, and return these, told to none; with the evaluations."""
-    found, calls = _scouted(_thinned(density), job.stream(Stream.SCOUTS))
-    if len(found):
-        optima = _with(optima, refine(density, climb(density, found[0])[0]))
-        optima = _with(optima, refine(density, found[0]))
+    found, calls = send_scouts(thinned(density), job.stream(Stream.SCOUTS))
+    if len(found.z):
+        optima = _with(optima, refine(density, climb(density, found.z[0])[0]))
+        optima = _with(optima, refine(density, found.z[0]))
     return optima, found, calls
-
-
-def _scouted(density: CollapsedDensity, rng: np.random.Generator) -> tuple[Array, int]:
-    """Return where scouts stand, the best first, and the evaluations that it took.
-
-    They come from the prior alone: an ensemble that starts from them can contradict those that
-    start from the optima.
-    """
-    found = carried(density, rng, scouts(_SCOUTS))
-    total = found.log_likelihood + found.log_prior
-    # a random half: the better half would lose a mode of little density, however wide
-    _, first = np.unique(found.z, axis=0, return_index=True)
-    kept = rng.permutation(first)[:WALKERS]
-    return found.z[kept[np.argsort(-total[kept])]], found.calls
-
-
-def _thinned(density: CollapsedDensity) -> CollapsedDensity:
-    """Return the density of some of the frames, spread over all: enough to show every branch."""
-    n = len(density.frames)
-    if n <= _SCOUTED_FRAMES:
-        return density
-    chosen = np.linspace(0, n - 1, _SCOUTED_FRAMES).round().astype(int)
-    present = None if density.present is None else density.present[chosen]
-    frames = np.ascontiguousarray(density.frames[chosen])
-    return dataclasses.replace(density, frames=frames, present=present, weights=None)
 
 
 def _with(optima: list[Optimum], found: Optimum | None) -> list[Optimum]:
@@ -240,30 +205,32 @@ def _with(optima: list[Optimum], found: Optimum | None) -> list[Optimum]:
     return [o for o in every if o.log_density > every[0].log_density - 20.0]
 
 
-def _importance(
-    density: CollapsedDensity, proposal: Proposal, job: Job
-) -> tuple[Weighted | None, int]:
-    """Sample by importance; None where ensembles are to do it instead."""
-    target, forced = job.settings.target_ess, job.settings.method == "importance"
+def _has_too_many(density: CollapsedDensity) -> bool:
+    """Tell whether there are more aliases of an optimum than a proposal has laws for."""
+    aliases = aliases_of(density)
+    return aliases is not None and aliases.are_too_many
+
+
+def _enough(weighted: WeightedDraws, job: Job) -> bool:
+    return weighted.k_hat < MAX_K_HAT and weighted.ess >= job.settings.target_ess
+
+
+def _importance(density: CollapsedDensity, proposal: Proposal, job: Job) -> tuple[Weighted, int]:
+    """Sample by importance alone, as was asked for; with the evaluations it took."""
     aliases = aliases_of(density)
     if aliases is not None and aliases.are_too_many:
-        if not forced:
-            return None, 0
         raise RefusedError(
             "importance sampling cannot hold all distances of the background that give the same "
             f"readings, each {aliases.turn_m:.4g} m behind the last; narrow the prior of its "
             "distance_m, or use the method emcee"
         )
     weighted, calls = _weighted_draws(density, proposal, job)
-    trusted = weighted.k_hat < MAX_K_HAT
-    if forced and not trusted:
+    if not weighted.k_hat < MAX_K_HAT:
         raise RefusedError(
             f"importance sampling cannot be trusted here: Pareto k-hat is {weighted.k_hat:.2f}, "
             f"above {MAX_K_HAT}; use the method emcee"
         )
-    enough = trusted and weighted.ess >= target
-    if not (enough or forced):
-        return None, calls
+    enough = _enough(weighted, job)
     reason = f"the effective sample size is {weighted.ess:.0f}, below the target"
     verdict = Verdict(enough, () if enough else (reason,))
     return Weighted(proposal.optima, weighted, verdict), calls

@@ -20,14 +20,16 @@ from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.sampling.warm import MAP_SHARE
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.chunk import evaluations
-from inference.posterior.stages.ensembles import new_ensembles
+from inference.posterior.stages.ensembles import POPULATIONS, from_weighted, new_ensembles
 from inference.posterior.stages.stage import Tempering, Walking, Weighted
 from inference.posterior.streams import Stream
 
-__all__ = ["SetOutTask", "TemperTask", "merge", "tasks"]
+__all__ = ["SCOUTED_DRAWS", "TOLERATED", "SetOutTask", "TemperTask", "merge", "tasks"]
 
 _SHARE = 0.5  # of what the populations took, that importance sampling behind them may take
 _MOST_DRAWS = (12_000, 40_000)  # but so many at least, and at most
+SCOUTED_DRAWS = 20_000  # that rounds from scouts may take: as many as carry one population
+TOLERATED = 0.01  # of what scouts met on their way from the prior, beyond every weight
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -125,23 +127,31 @@ def merge(
     return walking, calls + WALKERS * len(walking.ensembles)
 
 
-def _set_out(job: Job, stage: Tempering) -> tuple[Weighted | Walking, int]:
+def _set_out(job: Job, stage: Tempering) -> tuple[Tempering | Weighted | Walking, int]:
     """Sample by importance from the populations that arrived; set up ensembles where it fails."""
     members = [each for each in stage.populations if each is not None and len(each.z)]
     density = job.density()
-    most = int(_SHARE * sum(each.calls for each in members))
+    most = int(np.clip(_SHARE * sum(each.calls for each in members), *_MOST_DRAWS))
     found = in_rounds(
         density,
         dataclasses.replace(stage.proposal, share=MAP_SHARE),
         tuple(each.z for each in members),
-        job.stream(Stream.ROUNDS),
+        job.stream(Stream.ROUNDS, *([0] if stage.scouted else [])),
         job.settings.target_ess,
-        int(np.clip(most, *_MOST_DRAWS)),
+        SCOUTED_DRAWS if stage.scouted else most,
+        *([TOLERATED] if stage.scouted else []),
     )
     enough = found.trusted and found.draws.ess >= job.settings.target_ess
     if enough and job.settings.method == "auto":
         return Weighted(found.proposal.optima, found.draws, Verdict(True, ())), found.calls
-    walking = _walking(job, stage, members, found)
+    if not stage.scouted:
+        walking = _walking(job, stage, members, found)
+    elif found.trusted:
+        ensembles = from_weighted(job, density, found.proposal, found.draws, members[0].z)
+        walking = Walking(found.proposal, ensembles, stage.verdict, 2, weighted=found.draws)
+    else:
+        pending = (None,) * POPULATIONS
+        return dataclasses.replace(stage, populations=pending, scouted=False), found.calls
     return walking, found.calls + walking.ensembles[0].walkers * len(walking.ensembles)
 
 

@@ -18,7 +18,7 @@ from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor
 from tests.posterior.scenes import OBJECT, UNKNOWN_CROSSTALK, data, sensor_of
 
-QUICK = SamplerSettings(seed=7, target_ess=50, max_seconds=3600)
+QUICK = SamplerSettings(method="emcee", seed=7, target_ess=50, max_seconds=3600)
 CROSSTALK = {"values": UNKNOWN_CROSSTALK, "optional": True}
 WALL = {
     "strength": {"prior": "lognormal", "median": 0.02, "sigma": 1.0},

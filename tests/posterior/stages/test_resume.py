@@ -101,7 +101,7 @@ def test_in_every_stage(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_pieces_of_another_stage_are_a_mistake() -> None:
     sensor = sensor_of("pulsed")
-    settings = SamplerSettings(seed=7, target_ess=50)
+    settings = SamplerSettings(method="emcee", seed=7, target_ess=50)
     job = fold.prepare(sensor, parse_scene({}), data(sensor).frames, settings)
     checkpoint = begin(job, Starting())
     with pytest.raises(TypeError, match="another stage"):

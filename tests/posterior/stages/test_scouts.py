@@ -11,8 +11,8 @@ from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.sampling.importance import MAX_K_HAT, draw_weighted
 from inference.posterior.sampling.proposal import mixture_of
 from inference.posterior.sampling.start import find_optima
-from inference.posterior.stages import starting
-from inference.posterior.stages.starting import _scouted, _thinned
+from inference.posterior.stages import scouting
+from inference.posterior.stages.scouting import send_scouts, thinned
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import parse_scene
 from tests.posterior.scenes import KINDS, example, sensor_of
@@ -22,8 +22,8 @@ WALKERS = 256
 
 @pytest.fixture
 def many(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(starting, "WALKERS", WALKERS)
-    monkeypatch.setattr(starting, "_SCOUTS", 2 * WALKERS)
+    monkeypatch.setattr(scouting, "WALKERS", WALKERS)
+    monkeypatch.setattr(scouting, "_SCOUTS", 2 * WALKERS)
 
 
 @pytest.mark.usefixtures("many")
@@ -39,7 +39,7 @@ def test_the_same_mean_as_importance_sampling(kind: str, crosstalk: bool) -> Non
     assert weighted.k_hat < MAX_K_HAT
     mean = weighted.weights @ weighted.z
     sd = np.sqrt(weighted.weights @ (weighted.z - mean) ** 2)
-    walkers, calls = _scouted(density, np.random.default_rng(112))
+    (walkers, _), calls = send_scouts(density, np.random.default_rng(112))
     assert walkers.shape == (WALKERS, len(mean))
     assert calls > WALKERS
     off = np.abs(walkers.mean(axis=0) - mean) / sd
@@ -52,7 +52,7 @@ def test_the_same_mean_as_importance_sampling(kind: str, crosstalk: bool) -> Non
 
 def test_walkers_are_distinct_and_stand_where_the_density_is_positive() -> None:
     density = collapsed_density(*example("pulsed", crosstalk=True))
-    walkers, _ = _scouted(density, np.random.default_rng(113))
+    (walkers, _), _ = send_scouts(density, np.random.default_rng(113))
     assert len(np.unique(walkers, axis=0)) == len(walkers)
     assert np.isfinite(density(walkers)).all()
 
@@ -75,7 +75,7 @@ def test_both_of_two_modes_are_kept() -> None:
     draws: five standard errors are 0.3, and none may be lost."""
     scene = parse_scene({"object": {"c0": 0.08, "c1": 0.1}})
     bumps = Bumps(parameters_of(sensor_of("pulsed"), scene))
-    walkers, _ = _scouted(cast("CollapsedDensity", bumps), np.random.default_rng(114))
+    (walkers, _), _ = send_scouts(cast("CollapsedDensity", bumps), np.random.default_rng(114))
     assert walkers.shape[1] == 1
     share = float((walkers[:, 0] > 0).mean())
     assert 0.45 < share < 1.0
@@ -89,17 +89,17 @@ def test_an_impossible_density_has_no_walkers() -> None:
 
     scene = parse_scene({"object": {"c0": 0.08, "c1": 0.1}})
     nowhere = Nowhere(parameters_of(sensor_of("pulsed"), scene))
-    walkers, calls = _scouted(cast("CollapsedDensity", nowhere), np.random.default_rng(115))
+    (walkers, _), calls = send_scouts(cast("CollapsedDensity", nowhere), np.random.default_rng(115))
     assert walkers.shape == (0, 1)
     assert calls > 0
 
 
-def test_many_frames_are_thinned_over_all_of_them() -> None:
+def test_many_frames_arethinned_over_all_of_them() -> None:
     """Those that are kept keep their readings, their gain and whether they hold an object."""
     sensor, scene, frames = example("pulsed", False, frames=500)
     present = np.arange(500) % 7 != 0
     density = collapsed_density(sensor, scene, dataclasses.replace(frames, object_present=present))
-    thin = _thinned(density)
+    thin = thinned(density)
     assert thin.present is not None
     assert len(thin.frames) == len(thin.present) == 200
     places = [int(np.flatnonzero((density.frames == row).all(axis=1))[0]) for row in thin.frames]
@@ -108,4 +108,4 @@ def test_many_frames_are_thinned_over_all_of_them() -> None:
     assert max(np.diff(places)) <= 3
     np.testing.assert_array_equal(thin.present, present[places])
     few = collapsed_density(*example("pulsed", False, frames=200))
-    assert _thinned(few) is few
+    assert thinned(few) is few

@@ -19,7 +19,8 @@ def test_stopped_before_the_first_chunk_the_weighted_draws_answer() -> None:
 
     Quantiles of 5 % of 400 draws err by 0.1 sd; five times that, with those of the ensembles.
     """
-    job = fold.prepare(*example("pulsed", crosstalk=False), SamplerSettings(seed=7))
+    settings = SamplerSettings(method="emcee", seed=7)
+    job = fold.prepare(*example("pulsed", crosstalk=False), settings)
     checkpoint = begin(job, Starting())
     assert isinstance(checkpoint.stage, Walking)
     assert isinstance(standing(checkpoint.stage), Weighted)

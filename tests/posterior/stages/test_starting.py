@@ -23,7 +23,8 @@ from tests.posterior.scenes import UNKNOWN_CROSSTALK, example, sensor_of
 
 def test_ensembles_begin_in_different_members_from_all_over_a_population() -> None:
     sensor, scene, frames = example("pulsed", crosstalk=True)
-    job = fold.prepare(sensor, scene, frames, SamplerSettings(seed=1, ensembles=14))
+    settings = SamplerSettings(method="emcee", seed=1, ensembles=14)
+    job = fold.prepare(sensor, scene, frames, settings)
     density = collapsed_density(sensor, scene, frames)
     optima = mixture_of(find_optima(density, np.random.default_rng(1)))
     members = optima.draw(np.random.default_rng(2), 1000)

@@ -1,0 +1,98 @@
+"""Weak signals: a spine that Laplace shapes follow, and a wide tail that they miss."""
+
+import functools
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.answer_times import _case
+from inference.posterior import fold
+from inference.posterior.sampling.rounds import Rounds, in_rounds
+from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages import tempering
+from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.ensembles import POPULATIONS
+from inference.posterior.stages.stage import Starting, Tempering, Walking, Weighted
+from inference.posterior.stages.starting import begin
+
+SEED = 0
+# of standard coordinates, by 4 ensembles that came from populations and made 1332 steps
+MEAN = np.array([-0.0662, -0.4954, -0.0194, -0.0144, 0.0974])
+SD = np.array([0.1969, 0.2465, 0.0529, 0.1166, 0.0203])
+ESS = 2000
+
+
+def _job(method: str = "auto") -> fold.Job:
+    sensor, scene, simulation = _case("sine_wave", "object, crosstalk", 10.0, SEED)
+    settings = SamplerSettings.model_validate({"seed": SEED, "method": method})
+    return fold.prepare(sensor, scene, simulation.frames, settings)
+
+
+@functools.cache
+def _started() -> Checkpoint:
+    return begin(_job(), Starting())
+
+
+@functools.cache
+def _rounds(*_: Any) -> Rounds:
+    stage = _started().stage
+    assert isinstance(stage, Tempering)
+    job = _job()
+    populations = tuple(each.z for each in stage.populations if each is not None)
+    rng, most = np.random.default_rng(1), tempering.SCOUTED_DRAWS
+    return in_rounds(
+        job.density(), stage.proposal, populations, rng, 400, most, tempering.TOLERATED
+    )
+
+
+def _after(method: str, monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.setattr(tempering, "in_rounds", lambda *_: _rounds())
+    job = _job(method)
+    (task,) = fold.tasks(job, _started())
+    return fold.merge(job, _started(), [fold.run(task)]).stage
+
+
+def test_points_from_the_prior_are_where_rounds_begin() -> None:
+    stage = _started().stage
+    assert isinstance(stage, Tempering)
+    assert stage.scouted
+    assert stage.arrived
+
+
+def test_rounds_that_begin_at_these_points_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two planted faults.
+
+    Rounds gave up after the first, whose draws foresaw too many that count. From the scouts' last
+    places alone they left out a tail of some thousandths, a third of a variance, without a sign.
+    """
+    stage = _after("auto", monkeypatch)
+    assert isinstance(stage, Weighted)
+    assert stage.verdict.converged
+    draws = stage.draws
+    mean = draws.weights @ draws.z
+    error = np.sqrt(np.square(draws.weights) @ np.square(draws.z - mean))
+    # six standard errors of five means
+    assert (np.abs(mean - MEAN) < 6 * np.hypot(error, SD / np.sqrt(ESS))).all()
+    squares = np.square(draws.z - mean)
+    variance = draws.weights @ squares
+    error = np.sqrt(np.square(draws.weights) @ np.square(squares - variance))
+    # the tail holds a few percent: what variances err by is that of its weight, in both
+    assert (np.abs(variance - SD**2) < 6 * error * np.sqrt(1 + draws.ess / ESS)).all()
+
+
+def test_ensembles_start_from_their_draws(monkeypatch: pytest.MonkeyPatch) -> None:
+    stage = _after("emcee", monkeypatch)
+    assert isinstance(stage, Walking)
+    assert stage.weighted is _rounds().draws
+    assert stage.adaptations > 0  # what jumps propose from was held to the draws
+
+
+def test_rounds_that_cannot_be_trusted_call_for_populations(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(Rounds, "trusted", property(lambda _: False))
+    stage = _after("auto", monkeypatch)
+    assert isinstance(stage, Tempering)
+    assert not stage.scouted
+    assert stage.populations == (None,) * POPULATIONS
