@@ -191,7 +191,8 @@ def check_bulk(value: Any) -> None:
     InvalidInputError
         For a list of more than `SHORT` entries that is not all finite numbers (or null, in a column
         that may hold it) or all booleans (the first offending entry is named), for one of more than
-        `MAX_ENTRIES`, and for an object of more than `SHORT` members.
+        `MAX_ENTRIES`, for one of more than `SHORT` that are text, and for an object of more
+        than `SHORT` members.
     """
     if _is_plain(value):
         return
@@ -203,6 +204,8 @@ def check_bulk(value: Any) -> None:
             problems.append(Problem(pointer, f"has more than {SHORT} members"))
         elif len(container) > MAX_ENTRIES:
             problems.append(Problem(pointer, f"has more than {MAX_ENTRIES} entries"))
+        elif all(isinstance(entry, str) for entry in container):  # names, not a column
+            problems.append(Problem(pointer, f"has more than {SHORT} entries that are text"))
         elif (index := _first_odd(container, pointer.endswith(_NULLABLE))) is not None:
             wanted = "true or false" if isinstance(container[0], bool) else "a finite number"
             problems.append(Problem(f"{pointer}/{index}", f"must be {wanted}"))

@@ -196,8 +196,8 @@ def _settled(
             off[:, :2] = np.einsum("nij,nj->ni", whitener, off[:, :2])
             if rates is not None:
                 off[:, 2:] *= rates
-        pulls = of_prior - by.z, by.error
-        value = float(np.square(off).sum() + sum(np.square(pull).sum() for pull in pulls))
+            pulls = of_prior - by.z, by.error
+            value = float(np.square(off).sum() + sum(np.square(pull).sum() for pull in pulls))
         return value if math.isfinite(value) else math.inf
 
     start, none = point, _Point(np.zeros(d), np.zeros(n), np.zeros(point.error.size))

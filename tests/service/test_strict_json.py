@@ -141,6 +141,12 @@ def test_many_members() -> None:
         check_bulk({"scene": {str(i): 1 for i in range(SHORT + 1)}})
 
 
+def test_many_names() -> None:
+    check_bulk({"techniques": ["conventional"] * SHORT})
+    with pytest.raises(InvalidInputError, match="/techniques: has more than 64 entries"):
+        check_bulk({"techniques": ["conventional"] * (SHORT + 1)})
+
+
 @given(st.lists(st.sampled_from([1.0, 2, True, None, "1", math.nan]), min_size=65, max_size=70))
 def test_bulk_check_agrees_with_the_validator(column: list[Any]) -> None:
     """The fast check refuses a column of numbers exactly where pydantic does."""
