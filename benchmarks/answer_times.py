@@ -117,6 +117,7 @@ def main() -> None:
     parser.add_argument("--kinds", nargs="+", default=kinds, choices=kinds)
     parser.add_argument("--scenes", nargs="+", default=list(SCENES), choices=list(SCENES))
     parser.add_argument("--max-seconds", type=float, default=60.0)
+    parser.add_argument("--method", default="emcee", choices=["emcee", "auto"])
     parser.add_argument("--no-look", action="store_true", help="the whole verdict alone")
     given = parser.parse_args()
     print(
@@ -129,7 +130,7 @@ def main() -> None:
             for snr in given.snrs:
                 for seed in range(given.seeds):
                     sensor, scene, simulation = _case(kind, name, snr, seed)
-                    settings = SamplerSettings(seed=seed)
+                    settings = SamplerSettings(method=given.method, seed=seed)
                     job = fold.prepare(sensor, scene, simulation.frames, settings)
                     if (kind, name) not in warmed:  # machine code is read or made
                         measure(job, 5.0, look=False)

@@ -32,7 +32,7 @@ class SamplerSettings(Validated):
         Left out: drawn, and returned with the answer.
     """
 
-    method: Literal["emcee", "importance", "auto"] = "auto"
+    method: Literal["emcee", "importance", "auto"] = "emcee"
     ensembles: Annotated[int, pydantic.Field(ge=2, le=32)] = 4
     target_ess: Annotated[int, pydantic.Field(ge=10, le=1_000_000)] = 400
     max_seconds: Annotated[float, pydantic.Field(gt=0, le=86_400)] = 120.0

@@ -94,7 +94,7 @@ def test_an_impossible_density_has_no_walkers() -> None:
     assert calls > 0
 
 
-def test_many_frames_arethinned_over_all_of_them() -> None:
+def test_many_frames_are_thinned_over_all_of_them() -> None:
     """Those that are kept keep their readings, their gain and whether they hold an object."""
     sensor, scene, frames = example("pulsed", False, frames=500)
     present = np.arange(500) % 7 != 0
