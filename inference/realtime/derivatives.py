@@ -121,8 +121,8 @@ def _with_larger_signals(sensor: Sensor, frames: Frames, net: Net, usable: NDArr
     change = np.maximum(np.append(steps, 0.0), np.insert(steps, 0, 0.0))
     dark, bright = (other, one) if change[other] < change[one] else (one, other)
     from_dark, from_bright = (
-        net_readings(sensor, tuple(frames.readings[usable[end]]), frames, with_relative=True)
-        for end in (dark, bright)
+        net_readings(sensor, (first, second), frames, with_relative=True)
+        for first, second in frames.readings[usable[[dark, bright]]].tolist()
     )
     size, more, most = (np.hypot(each.first, each.second) for each in (net, from_dark, from_bright))
     parts = []

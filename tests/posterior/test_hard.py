@@ -53,9 +53,9 @@ def begun(job: Job) -> Checkpoint:
     return begin(job, Starting())
 
 
-def test_populations_are_called_for(begun: Checkpoint) -> None:
+def test_more_is_called_for_than_a_warm_start(begun: Checkpoint) -> None:
     assert isinstance(begun.stage, Tempering)
-    assert begun.stage.populations == (None, None)
+    assert begun.stage.scouted
 
 
 def test_stopped_before_any_draw_it_says_so(job: Job, begun: Checkpoint) -> None:
