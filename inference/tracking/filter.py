@@ -17,9 +17,9 @@ from inference.tracking.hypotheses import (
     PENDING,
     ROUGHNESS,
     RUNNING,
-    SAME,
     TIME,
     Hypotheses,
+    stuck_for,
     take_readings,
 )
 from inference.tracking.lasting import lasting_of
@@ -117,7 +117,8 @@ def run_filter(
             numbers[RUNNING] += (1.0 - rules.memory) * (own - numbers[RUNNING])
             numbers[ROUGHNESS] += (min(own, 1.0) - numbers[ROUGHNESS]) / _LATE
         report(out, rows, i, of, rules)
-        out[i, OUTLIER], out[i, SURPRISE], out[i, STUCK] = outlier, numbers[RUNNING], numbers[SAME]
+        out[i, OUTLIER], out[i, SURPRISE] = outlier, numbers[RUNNING]
+        out[i, STUCK] = stuck_for(numbers)
         if numbers.size > UNSTEADY:
             if kinds[i] == USABLE and outlier >= 0.5:
                 numbers[OUTLIERS] += 1.0

@@ -69,7 +69,8 @@ def first_state(
     weight = np.zeros(rows)
     there = settings.visit_s / (settings.visit_s + settings.absence_s)
     weight[0] = 1.0 - there
-    numbers = [math.nan, there, 1.0, 0.0, 0.0, ROUGH, 0.0, math.nan, math.nan]
+    numbers = [math.nan, there, 1.0, 0.0, 0.0, ROUGH, 0.0]
+    numbers += [math.nan, math.nan, math.inf, math.inf]
     if steady:
         numbers += first_unsteady(directions)
     return TrackState(Hypotheses(x, X, weight, np.array(numbers)))

@@ -35,6 +35,7 @@ __all__ = [
     "learns_crosstalk",
     "log_of",
     "scratch_for",
+    "stuck_for",
     "take_readings",
     "variance_of",
 ]
@@ -45,8 +46,12 @@ Array = NDArray[np.float64]
 U, V, CROSSTALK1, CROSSTALK2, ANCHOR = range(5)
 WITHOUT_CROSSTALK = 2  # own states of a hypothesis that does not learn it
 # places in `Hypotheses.numbers`
-TIME, PENDING, RUNNING, COUNT, LOST, ROUGHNESS, SAME, _READ1, _READ2 = range(9)
+TIME, PENDING, RUNNING, COUNT, LOST, ROUGHNESS, SAME, _READ1, _READ2, _STEP1, _STEP2 = range(11)
 _LEAST = -700.0  # log of a weight that underflows
+_ROOT_8 = math.sqrt(8.0)
+# probability of no change at all from which on readings that do not change say nothing: thirty
+# frames of the same readings then have a probability of 6e-7
+_STAY = 0.62
 
 
 class Hypotheses(NamedTuple):
@@ -58,11 +63,12 @@ class Hypotheses(NamedTuple):
     x: Array
     X: Array  # (rows, n, n + p): roots of the covariances
     weight: Array  # (rows,): probabilities
-    # (9,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
+    # (11,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
     # the last frame [s] (nan: none yet), probability of an object of which nothing is known yet,
     # running surprise, number of hypotheses, whether an object that was there may be anywhere by
     # now, the surprise of the last frames, each cut at 1, how many frames up to the last had the
-    # readings of the one before, and these readings
+    # readings of the one before, these readings, and the shortest step of each from one frame to
+    # the next (inf: none yet)
     numbers: Array
 
 
@@ -125,6 +131,24 @@ def log_of(weight: float) -> float:
 @compiled
 def take_readings(numbers: Array, first: float, second: float) -> None:
     """Count frames whose readings are to the last bit those of the frame before."""
-    same = first == numbers[_READ1] and second == numbers[_READ2]
+    change1, change2 = abs(first - numbers[_READ1]), abs(second - numbers[_READ2])
+    same = change1 == 0.0 and change2 == 0.0
     numbers[SAME] = numbers[SAME] + 1.0 if same else 0.0
     numbers[_READ1], numbers[_READ2] = first, second
+    if 0.0 < change1 < numbers[_STEP1]:
+        numbers[_STEP1] = change1
+    if 0.0 < change2 < numbers[_STEP2]:
+        numbers[_STEP2] = change2
+
+
+@compiled
+def stuck_for(numbers: Array) -> float:
+    """Return how many frames had the readings of the one before, where noise does not allow that.
+
+    Readings are rounded to steps no longer than the shortest one seen. Noise leaves a reading in
+    the middle of a step of length L with probability erf(L / sqrt(8)), L in units of the noise.
+    """
+    if numbers[SAME] == 0.0:
+        return 0.0
+    stay = math.erf(numbers[_STEP1] / _ROOT_8) * math.erf(numbers[_STEP2] / _ROOT_8)
+    return numbers[SAME] if stay < _STAY else 0.0

@@ -17,8 +17,8 @@ __all__ = ["misfits"]
 
 Array = NDArray[np.float64]
 
-# frames on end with the same two readings, an object being there, from which on a sensor is stuck:
-# rounding by three times the noise repeats both in 0.58 of frames at most, and 29 times in 1.4e-7
+# frames on end with the readings of the one before, an object being there, from which on a sensor
+# is stuck, where rounding does not explain it (`hypotheses.stuck_for`)
 _STUCK = 29
 
 

@@ -114,6 +114,21 @@ def test_a_sensor_that_is_stuck_is_said_until_it_reads_again(kind: str, rounded:
     assert not found.misfit[TO + 2 :].any()
 
 
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_coarse_readings_at_rest_are_not_stuck(kind: str) -> None:
+    """Rounding by four times the noise, whose own standard deviation it is, leaves all the same."""
+    light = light_of(kind)
+    light[FROM:] = light[FROM]  # moves, then comes to rest
+    step = np.sqrt(12.0) * NOISE
+    rng = np.random.default_rng(1)
+    noise = 0.05 * step * rng.standard_normal((FRAMES, 2))
+    readings = step * np.round((light + CROSSTALK + noise) / step)
+    assert (readings[FROM + 60 :] == readings[FROM + 30]).all(axis=1).mean() > 0.5
+    scene = parse_scene({**PLATE, "crosstalk": CROSSTALK.tolist()})
+    found = track(sensor_of(NOISE, kind), scene, frames_of(readings, STEP_S))
+    assert not found.misfit.any()
+
+
 def test_a_scene_that_reads_zero_where_nothing_is_is_no_misfit() -> None:
     readings = np.zeros((FRAMES, 2))
     found = track(sensor_of(NOISE), parse_scene(PLATE), frames_of(readings, STEP_S))
