@@ -17,7 +17,7 @@ from inference.tracking.hypotheses import CROSSTALK1, CROSSTALK2, Hypotheses, le
 from inference.tracking.readings_table import ReadingsTable, mean_at
 from simulator.compiled import compiled
 
-__all__ = ["crosstalk_variance", "first_lasting", "lasting_of", "sagitta", "take_lasting"]
+__all__ = ["STATED", "crosstalk_variance", "first_lasting", "lasting_of", "sagitta", "take_lasting"]
 
 Array = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 _DEVIATION, _BEND, _CROSSTALK, _SHARES = range(4)
 _MOST = 3.9  # noise of a single frame beyond which its deviation is cut: once in 10,000
 _REACH = 2.0  # standard deviations of log r over which the curve's bend is taken
-_STATED = 0.2  # noise by which crosstalk is off that is stated as the mean of 25 frames
+STATED = 0.2  # noise by which crosstalk is off that is stated as the mean of 25 frames
 _BENT = 0.5  # noise beyond which the bend hides what is looked for, and a frame is left out
 
 
@@ -60,7 +60,7 @@ def crosstalk_variance(
     """
     variance = 0.0
     if table.crosstalk1 != 0.0 or table.crosstalk2 != 0.0:
-        variance = _STATED * _STATED
+        variance = STATED * STATED
     if learns_crosstalk(of):
         for k in range(of.X.shape[-1]):
             part = across1 * of.X[row, CROSSTALK1, k] + across2 * of.X[row, CROSSTALK2, k]

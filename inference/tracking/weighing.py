@@ -51,6 +51,7 @@ from inference.tracking.motion import Rules
 from inference.tracking.places import Places, mass_bound
 from inference.tracking.prediction import born_prior, own_prior, prior_of
 from inference.tracking.readings_table import ReadingsTable
+from inference.tracking.too_faint import MOST_EMPTY, doubt_the_faint
 from inference.tracking.unread import add_unread, learn_unread, odd_weight
 from simulator.compiled import compiled
 
@@ -304,6 +305,8 @@ def weigh_frame(
     if learns_crosstalk(of) and empty.usual > empty.odd:
         learn_empty(of, frame, model.table, model.places.empty, room.scratch)
     total = _settle(of, model, room, kept, pending, found, best)
+    if of.weight[0] < MOST_EMPTY:
+        doubt_the_faint(frame, of, model.table, model.places, empty.surprise)
     return kept.outlying / total, kept.surprise
 
 
