@@ -16,10 +16,12 @@ from inference.fits.answer.determined import (
     refuse_if_undetermined,
 )
 from inference.fits.answer.inflation import inflation, shift_of
+from inference.fits.answer.larger_error import DOUBLINGS, evidence_of, is_default, twice_as_large
 from inference.fits.answer.model_checks import model_checks
 from inference.fits.answer.profile_scan import profile_scan
 from inference.fits.answer.ranges import CONTRADICTION, DECIDED, WITHIN, Answer, frame_ranges
 from inference.fits.answer.report import (
+    DOUBTFUL,
     FALSE_ALARM,
     describe,
     doubt_of,
@@ -172,10 +174,31 @@ def _exact_answer(
     )
 
 
-def _erring_answer(
-    name: str, problem: FitProblem, starts: Sequence[Maximum], state: NDArray[np.uint8]
-) -> TechniqueResult:
-    """Build the result where the model errs."""
+def _believed(
+    problem: FitProblem, starts: Sequence[Maximum]
+) -> tuple[FitProblem, list[Erring], list[Erring]]:
+    """Return the problem, with a larger error of the model where the frames ask, and its maxima."""
+    found, along = _searched(problem, starts)
+    if not is_default(problem) or not FALSE_ALARM <= _probability(problem, found[0]) < DOUBTFUL:
+        return problem, found, along
+    for _ in range(DOUBLINGS):
+        larger = twice_as_large(problem)
+        more, beside = _searched(larger, [*starts, *found])
+        if not evidence_of(more[0]) > evidence_of(found[0]):
+            break
+        problem, found, along = larger, more, beside
+    return problem, found, along
+
+
+def _probability(problem: FitProblem, top: Erring) -> float:
+    """Return the p-value of a best fit, by all its checks."""
+    checks = model_checks(problem, top)
+    p_value = fit_report(problem, [top], top.chi_square, 0, 1.0, checks)["p_value"]
+    return float(p_value)
+
+
+def _searched(problem: FitProblem, starts: Sequence[Maximum]) -> tuple[list[Erring], list[Erring]]:
+    """Return the maxima, the best first, and points along their valleys."""
     modes = law_modes(problem.parameters.law) if problem.law else (None,)
     found = [
         end
@@ -193,6 +216,14 @@ def _erring_answer(
         if better is None or not better.deviance < found[0].deviance:
             break
         found.insert(0, better)
+    return found, along
+
+
+def _erring_answer(
+    name: str, problem: FitProblem, starts: Sequence[Maximum], state: NDArray[np.uint8]
+) -> TechniqueResult:
+    """Build the result where the model errs."""
+    problem, found, along = _believed(problem, starts)
     top = found[0]
     _, facts = residuals_and_information(top.clean, top.x, top.positions)
     if not problem.law and problem.known is None:
