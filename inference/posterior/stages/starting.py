@@ -171,14 +171,16 @@ def _first_stage(
         known = None if warm.contradicted else warm.draws
         stage = from_scouts(job, density, proposal, scouts, known)
         return stage or Tempering(proposal, (None,) * POPULATIONS, pending, known), calls
-    if job.settings.method == "auto" and not _has_too_many(density):
-        weighted, used = _weighted_draws(density, warm.proposal, job)
+    drawn, may_answer = warm.draws, job.settings.method == "auto" and not _has_too_many(density)
+    if may_answer:
+        drawn, used = _weighted_draws(density, warm.proposal, job)
         calls += used
-        contradicted = beyond(density, warm.proposal, weighted, scouts.hot) >= TOLERATED
-        if _enough(weighted, job) and not contradicted:
-            return Weighted(proposal.optima, weighted.that_count, Verdict(True, ())), calls
-        if contradicted and (stage := from_scouts(job, density, warm.proposal, scouts, warm.draws)):
-            return stage, calls
+    contradicted = beyond(density, warm.proposal, drawn, scouts.hot) >= TOLERATED
+    if may_answer and _enough(drawn, job) and not contradicted:
+        return Weighted(proposal.optima, drawn.that_count, Verdict(True, ())), calls
+    # walkers, too, would hardly ever jump to where no weight leads
+    if contradicted and (stage := from_scouts(job, density, warm.proposal, scouts, warm.draws)):
+        return stage, calls
     ensembles = from_weighted(job, density, warm.proposal, warm.draws, scouts.z)
     walking = Walking(warm.proposal, ensembles, pending, adaptations=0, weighted=warm.draws)
     return walking, calls + ensembles[0].walkers * len(ensembles)

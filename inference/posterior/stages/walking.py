@@ -58,7 +58,7 @@ def tasks(job: Job, stage: Walking) -> tuple[WalkTask, ...]:
     """Return the steps of every ensemble; none where more would serve nothing."""
     if stage.finished:
         return ()
-    warm, walkers = stage.adaptations == 0, stage.ensembles[0].walkers
+    warm, walkers = stage.weighted is not None, stage.ensembles[0].walkers
     steps = steps_from(job, stage.steps, walkers, warm)
     return tuple(WalkTask(job, stage.proposal, ensemble, steps) for ensemble in stage.ensembles)
 

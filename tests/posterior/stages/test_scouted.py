@@ -10,7 +10,7 @@ from benchmarks.answer_times import _case
 from inference.posterior import fold
 from inference.posterior.sampling.rounds import Rounds, in_rounds
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages import tempering
+from inference.posterior.stages import tempering, walking
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.ensembles import POPULATIONS
 from inference.posterior.stages.stage import Starting, Tempering, Walking, Weighted
@@ -60,6 +60,15 @@ def test_points_from_the_prior_are_where_rounds_begin() -> None:
     assert stage.arrived
 
 
+def test_ensembles_do_not_start_from_draws_that_leave_out_where_scouts_stood() -> None:
+    """Planted fault: they did, stayed in the tail and called for populations."""
+    sensor, scene, simulation = _case("pulsed", "object, crosstalk", 100.0, SEED)
+    settings = SamplerSettings.model_validate({"seed": SEED, "method": "emcee"})
+    stage = begin(fold.prepare(sensor, scene, simulation.frames, settings), Starting()).stage
+    assert isinstance(stage, Tempering)
+    assert stage.scouted
+
+
 def test_rounds_that_begin_at_these_points_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two planted faults.
 
@@ -86,6 +95,8 @@ def test_ensembles_start_from_their_draws(monkeypatch: pytest.MonkeyPatch) -> No
     assert isinstance(stage, Walking)
     assert stage.weighted is _rounds().draws
     assert stage.adaptations > 0  # what jumps propose from was held to the draws
+    # the first chunk is what the easiest posterior takes: 50 times of a little more than one step
+    assert {task.steps for task in walking.tasks(_job("emcee"), stage)} == {90}
 
 
 def test_rounds_that_cannot_be_trusted_call_for_populations(
