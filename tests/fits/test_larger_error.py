@@ -5,51 +5,61 @@ import pytest
 
 from benchmarks.random_sets.sets import random_set
 from inference.estimate import estimate
-from inference.estimates import Estimates
+from inference.fits.answer import likelihood_answer
+from inference.fits.answer.larger_error import is_default
 from inference.fits.answer.report import DOUBTFUL
+from inference.fits.likelihood.problem import FitProblem
+from service.adapters.histograms import pulsed
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
-
-TRUTH = [0.1025, 0.1425, 0.185, 0.2225, 0.2625, 0.305, 0.3425, 0.3825]
-# recorded photons, whose flux errs by three times the default, behind a tenth of crosstalk
-W1 = [847011.8, 792604.8, 705754.4, 631321.9, 566848.8, 509212.9, 468333.0, 432718.2]
-W2 = [14214782.3, 9510922.4, 6595955.7, 4992841.6, 3890302.6, 3095053.3, 2610657.0, 2231831.1]
-SIGNAL = 613364.9, 5330125.7
-READ = 259.834, 852.894
+from tests.recorded.experiment import GAIN, PATH, calibration_of, near_recording
 
 
-def asked(unit: float, discrepancy: object) -> Estimates:
-    sensor = parse_sensor(
-        {
-            "kind": "pulsed",
-            "pulse_width_s": 1.1648e-8,
-            "gain": 1e6 * unit,
-            "noise": {"read": [unit * sd for sd in READ], "relative": 7.95672e-4},
-        }
-    )
+@pytest.mark.recorded
+@pytest.mark.skipif(not PATH.exists(), reason="../shared/data/tmf8820_plane.json is absent")
+@pytest.mark.parametrize("unit", [1.0, 1e-12])
+def test_recorded_photons_without_empty_frames_are_refused(unit: float) -> None:
+    """Flux that errs by three times the default, behind a tenth of crosstalk.
+
+    Ranges were 15 to 27 sd off in every frame, without a misfit.
+    """
+    recording = near_recording()
+    sensor, clean = pulsed(recording, calibration_of(recording), gain=GAIN)
+    signal = clean.readings[int(np.argmin(np.abs(recording.distance_m - 0.2)))]
+    # from 0.1025 m, every four centimetres
+    chosen = np.searchsorted(recording.distance_m, 0.1025 + 0.04 * np.arange(8) - 1e-6)
+    document = sensor.model_dump(mode="json", exclude_none=True)
+    document["gain"] *= unit
+    read = [unit * sd for sd in sensor.noise.read]
+    document["noise"] = {**document["noise"], "read": read, "shot": unit * sensor.noise.shot}
     scene = parse_scene(
         {
             "object": {"c2": {"prior": "lognormal", "median": 1.0, "sigma": 3.0}},
-            "crosstalk": [{"prior": "halfnormal", "sd": unit * sd} for sd in SIGNAL],
-            "discrepancy": discrepancy,
+            "crosstalk": [{"prior": "halfnormal", "sd": unit * float(sd)} for sd in signal],
         }
     )
-    frames = Frames(unit * np.column_stack([W1, W2]))
-    return estimate(sensor, scene, frames, ["joint_fit"])
-
-
-@pytest.mark.parametrize("unit", [1e-12])
-def test_recorded_photons_without_empty_frames_are_refused(unit: float) -> None:
-    """Was 15 to 27 sd off in every frame, without a misfit."""
-    said = asked(unit, "default")
+    frames = Frames(unit * (clean.readings[chosen] + 0.1 * signal))
+    said = estimate(parse_sensor(document), scene, frames, ["joint_fit"])
     assert not said.results
     assert "without the object" in (said.do_first or "")
 
 
-def test_a_size_that_is_stated_stands() -> None:
-    said, *_ = asked(1.0, {"flux": 0.072, "range_m": 8e-4, "shadow": 0.2}).results
-    assert (np.abs(said.range_m - TRUTH) > 5.0 * said.sd_m).all()
+@pytest.mark.parametrize("stated", [None, {"flux": 0.072, "range_m": 8e-4, "shadow": 0.2}])
+def test_a_size_that_is_stated_stands(stated: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A default is the size of most objects and may be larger; what is stated is known."""
+    asked: list[bool] = []
+
+    def noted(problem: FitProblem) -> bool:
+        asked.append(is_default(problem))
+        return asked[-1]
+
+    monkeypatch.setattr(likelihood_answer, "is_default", noted)
+    case = random_set(4711, 2)
+    scene = {**case.scene, **({} if stated is None else {"discrepancy": stated})}
+    estimate(case.sensor, parse_scene(scene), case.frames, ["joint_fit"])
+    assert asked
+    assert all(asked) is (stated is None)
 
 
 def test_a_fit_that_is_nearly_a_misfit_takes_the_error_as_larger() -> None:
