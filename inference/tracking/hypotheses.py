@@ -150,5 +150,6 @@ def stuck_for(numbers: Array) -> float:
     """
     if numbers[SAME] == 0.0:
         return 0.0
-    stay = math.erf(numbers[_STEP1] / _ROOT_8) * math.erf(numbers[_STEP2] / _ROOT_8)
+    stay = 1.0 - math.erfc(numbers[_STEP1] / _ROOT_8)
+    stay *= 1.0 - math.erfc(numbers[_STEP2] / _ROOT_8)
     return numbers[SAME] if stay < _STAY else 0.0
