@@ -23,7 +23,18 @@ SERVE = (sys.executable, "-m", "service.cli", "serve", "--port", "0")
 
 
 class Service:
-    """A service in a process of its own, on a port that the system picks."""
+    """A service in a process of its own, on a port that the system picks.
+
+    Attributes
+    ----------
+    address : str
+        Where it listens, for as long as it is ``alive``: the port of one that was killed may be
+        another service's a moment later, which knows nothing of what the first one kept.
+    alive : bool
+        Whether it was not killed yet.
+    """
+
+    alive = True
 
     def __init__(self, command: Sequence[str], settings: Mapping[str, str]) -> None:
         kept = {k: v for k, v in os.environ.items() if not k.startswith("HYBRIDTOF_")}
@@ -50,6 +61,7 @@ class Service:
 
     def kill(self) -> None:
         """End it as a power cut would."""
+        self.alive = False
         self.process.kill()
         self.process.wait()
         self._drain.wait()

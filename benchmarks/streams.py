@@ -246,14 +246,19 @@ def survived(
         while at < len(lines[index]):
             batch = lines[index][at : at + size]
             got = b""
+            service = running[0]
+            if not service.alive:
+                time.sleep(0.02)
+                continue
             with contextlib.suppress(httpx.HTTPError):
-                address = running[0].address + paths[index]
+                address = service.address + paths[index]
                 content = b"\n".join(batch)
                 with httpx.stream(
                     "POST", address, content=content, headers=NDJSON, timeout=60
                 ) as response:
                     if response.status_code not in (200, 503, 409):
-                        problems.append(f"{response.status_code}")
+                        said = response.read().decode(errors="replace")
+                        problems.append(f"{address}: {response.status_code} {said}")
                     if response.status_code == 200:
                         for part in response.iter_raw():
                             got += part
