@@ -1,8 +1,11 @@
 """What an answer supposes without a check, and what looks like a mistake in what is stated."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.empty_scatter import scatter_of_empty
 from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK, taken_for_crosstalk
 from simulator.frames import Frames
 from simulator.scene import Scene
@@ -22,6 +25,7 @@ _TEMPERATURE = (
 # unambiguous ranges that a sensor of this kind may have [m]: it ends neither where scenes begin by
 # default nor beyond a horizon
 _SHORTEST, _LONGEST = 2e-2, 1e5
+_TURN = 2 * math.pi * (1 + 1e-6)  # of a whole turn that was typed with seven digits
 # temperatures at which no sensor is run [K]
 _COLDEST_K, _HOTTEST_K = 200.0, 500.0
 _TIMES = (
@@ -48,6 +52,8 @@ def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, .
         supposed = (*supposed, _TIMES)
     if taken_for_crosstalk(scene, frames):
         supposed = (*supposed, TAKEN_FOR_CROSSTALK)
+    if doubt := scatter_of_empty(sensor, frames):
+        supposed = (*supposed, doubt)
     if doubt := doubtful_unit(sensor):
         supposed = (*supposed, doubt)
     return supposed
@@ -73,6 +79,8 @@ def doubtful_unit(sensor: Sensor) -> str | None:
         As stated.
     """
     farthest = sensor.max_range_m
+    if doubt := _doubtful_phase(sensor):
+        return doubt
     if _SHORTEST <= farthest <= _LONGEST:
         return None
     if isinstance(sensor, PulsedSensor):
@@ -80,6 +88,17 @@ def doubtful_unit(sensor: Sensor) -> str | None:
     else:
         stated, unit = f"frequency_hz {sensor.frequency_hz:g}", "hertz"
     return f"{stated} gives an unambiguous range of {farthest:.3g} m: is it in {unit}?"
+
+
+def _doubtful_phase(sensor: Sensor) -> str | None:
+    """Return the doubt whether a phase offset is in radians, None without one."""
+    if isinstance(sensor, PulsedSensor) or not isinstance(sensor.phase_offset_rad, float | int):
+        return None
+    if abs(sensor.phase_offset_rad) <= _TURN:
+        return None
+    return (
+        f"phase_offset_rad {sensor.phase_offset_rad:g} is more than a turn, 2 pi: is it in radians?"
+    )
 
 
 def unused_temperature(sensor: Sensor, frames: Frames) -> tuple[int, str] | None:

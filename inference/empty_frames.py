@@ -12,7 +12,7 @@ from simulator.joint_scene import around, centre
 from simulator.scene import Scene
 from simulator.sensor import PulsedSensor, Sensor
 
-__all__ = ["Contradiction", "contradiction"]
+__all__ = ["Contradiction", "contradiction", "covariance_of_empty"]
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ def contradiction(
         strength = max(float(beyond @ stated.wall / (stated.wall @ stated.wall)), 0.0)
     of_wall = np.zeros(2) if stated.wall is None else (strength or 0.0) * stated.wall
     beyond = beyond - of_wall
-    variance = _noise(sensor, stated.crosstalk + of_wall) / n
+    variance = covariance_of_empty(sensor, stated.crosstalk + of_wall) / n
     if open_ is not None:
         variance += np.diag(np.square(open_))
     for change in _shared(scene, sensor, empty, stated, strength):
@@ -124,8 +124,8 @@ def _read(sensor: Sensor, mean: Array, away: float) -> str:
     )
 
 
-def _noise(sensor: Sensor, light: Array) -> Array:
-    """Return the covariance of one empty frame, shape (2, 2)."""
+def covariance_of_empty(sensor: Sensor, light: Array) -> Array:
+    """Return the covariance of one empty frame that reads some light, shape (2, 2)."""
     shot = sensor.noise.shot * np.abs(light)
     matrix = np.diag(np.square(sensor.noise.read) + shot)
     if isinstance(sensor, PulsedSensor):

@@ -225,6 +225,11 @@ def test_a_range_may_move_by_its_standard_deviation_and_no_root_may_come_or_go()
         ({"kind": "pulsed", "pulse_width_s": 1e-10}, "pulse_width_s 1e-10 gives"),
         ({"kind": "sine_wave", "frequency_hz": 1e9}, None),
         ({"kind": "pulsed", "pulse_width_s": 1e-9}, None),
+        (
+            {"kind": "sine_wave", "frequency_hz": 2e7, "phase_offset_rad": 25.0},
+            "phase_offset_rad 25 is",
+        ),
+        ({"kind": "sine_wave", "frequency_hz": 2e7, "phase_offset_rad": -6.283185}, None),
     ],
 )
 def test_units_that_cannot_be_meant_are_doubted(sensor: dict[str, Any], words: str | None) -> None:
