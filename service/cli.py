@@ -77,6 +77,8 @@ def _begin_quickly() -> None:
     atexit.register(gc.freeze)
     # pydantic would read the metadata of all that is installed for hooks into checking
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    # small systems, which threads would wait for where the machine is busy (simulator.one_thread)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def _say(text: str) -> None:

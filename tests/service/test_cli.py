@@ -1,6 +1,7 @@
 """The command line in this process; what needs a process of its own is in test_server.py."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -268,3 +269,21 @@ assert not brought, brought
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(("stated", "taken"), [(None, "1"), ("4", "4")])
+def test_a_command_computes_by_one_thread(stated: str | None, taken: str) -> None:
+    """OpenBLAS reads it as numpy is imported; what a person has stated stays."""
+    code = """
+import os, sys
+from service import cli
+assert "numpy" not in sys.modules
+sys.argv = ["hybridtof", "schema", "frames"]
+cli.main()
+print(os.environ["OPENBLAS_NUM_THREADS"], file=sys.stderr)
+"""
+    variable = "OPENBLAS_NUM_THREADS"
+    own = {name: value for name, value in os.environ.items() if name != variable}
+    own |= {} if stated is None else {variable: stated}
+    done = subprocess.run([sys.executable, "-c", code], env=own, capture_output=True, text=True)
+    assert done.stderr == f"{taken}\n"

@@ -41,6 +41,7 @@ from inference.fits.likelihood.told import known_ranges
 from inference.realtime.net import SATURATED, rule_out
 from inference.technique import Task
 from simulator.errors import RefusedError
+from simulator.one_thread import one_thread
 
 __all__ = ["likelihood_answer"]
 
@@ -51,6 +52,7 @@ _NO_LIKELIHOOD = (
 )
 
 
+@one_thread()
 def likelihood_answer(
     name: str, task: Task, values: dict[str, float] | None = None
 ) -> TechniqueResult:
