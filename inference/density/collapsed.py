@@ -11,7 +11,7 @@ from inference.density.best_ranges import fill_best_ranges
 from inference.density.frame_integrals import fill_log_likelihoods
 from inference.density.pieces import pieces
 from inference.density.range_draw import fill_range_draws
-from inference.frame.arguments import Instrument, ReferencePrior, Rows, instrument_of
+from inference.frame.arguments import Instrument, Rows, instrument_of
 from inference.frame.blocks import Data, own_blocks
 from inference.frame.known_range import columns_of, with_displacements
 from inference.frame.warmth import with_warmth, without_warmth
@@ -100,15 +100,13 @@ class CollapsedDensity:
             crosstalk,
             terms.background,
             terms.ranges,
-            ReferencePrior(False) if self._reference else None,
             offsets=terms.offset,
             lags=terms.lag,
         )
 
     def integral_rows(self, terms: Terms) -> Rows:
         """Return parameter vectors for kernels that integrate ranges out, or draw them."""
-        rows = self.rows(terms)
-        return rows._replace(reference=ReferencePrior(True)) if self._reference else rows
+        return self.rows(terms)._replace(resolves=self._reference)
 
     @property
     def _reference(self) -> bool:

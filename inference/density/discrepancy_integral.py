@@ -213,7 +213,7 @@ def _without_reference(scene: FrameScene) -> FrameScene:
         scene.shape,
         scene.crosstalk,
         scene.background,
-        RangePrior(constant, power, mean, inverse_sd, log_mean, log_inverse_sd, low, high, None),
+        RangePrior(constant, power, mean, inverse_sd, log_mean, log_inverse_sd, low, high, False),
         scene.instrument,
         scene.flux_error,
         scene.offset,

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.range_integral import falls_off
-from inference.frame.arguments import FluxError, FrameScene, Instrument, ReferencePrior
+from inference.frame.arguments import FluxError, FrameScene, Instrument
 from inference.frame.blocks import Block, frame_of
 from inference.frame.flux_error import cubic_weights, slope_weights
 from inference.frame.gaussian import (
@@ -118,29 +118,26 @@ def expand(u: float, block: Block, scene: FrameScene) -> Expansion:
         free = (cross + held * stiff) / bend
     information = LEAST_INFORMATION + told_by_light + told
     resolved, pushed, turn = _resolution(
-        information, Along(signal, signal_slope, mean, slope), instrument, prior.reference
+        information, Along(signal, signal_slope, mean, slope), instrument, prior.resolves
     )
     return Expansion(density + resolved, along, bend, flux + pushed, mixed, stiff, free, turn)
 
 
 @compiled
 def _resolution(
-    information: float, along: Along, instrument: Instrument, reference: ReferencePrior | None
+    information: float, along: Along, instrument: Instrument, resolves: bool
 ) -> tuple[float, float, float]:
     """Return what a reference prior adds to density, slope along log flux, and turn."""
-    if reference is not None:
-        if not reference.resolves:
-            return 0.0, 0.0, 0.0
-        signal, signal_slope, mean, slope = along
-        pushed = precision_product(signal_slope, slope, mean, signal, instrument)
-        turned = precision_product(signal, slope, mean, signal, instrument)
-        return (
-            0.5 * math.log(information / LEAST_INFORMATION),
-            pushed / information,
-            turned / information,
-        )
-    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
+    if not resolves:
         return 0.0, 0.0, 0.0
+    signal, signal_slope, mean, slope = along
+    pushed = precision_product(signal_slope, slope, mean, signal, instrument)
+    turned = precision_product(signal, slope, mean, signal, instrument)
+    return (
+        0.5 * math.log(information / LEAST_INFORMATION),
+        pushed / information,
+        turned / information,
+    )
 
 
 @compiled

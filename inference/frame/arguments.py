@@ -23,7 +23,6 @@ __all__ = [
     "Instrument",
     "Pair",
     "RangePrior",
-    "ReferencePrior",
     "Rows",
     "Shape",
     "instrument_of",
@@ -81,19 +80,6 @@ class Background(NamedTuple):
     c1: float
 
 
-class ReferencePrior(NamedTuple):
-    """Marks ranges whose density is that of the reference prior: that of what a frame resolves.
-
-    Attributes
-    ----------
-    resolves : bool
-        False for maxima over ranges, where the density is flat in log r. It is a number and no
-        type, so that one machine code integrates and maximises.
-    """
-
-    resolves: bool
-
-
 class RangePrior(NamedTuple):
     """The prior density of a range, as a row of `simulator.parameters.Terms.ranges`.
 
@@ -108,8 +94,10 @@ class RangePrior(NamedTuple):
         [m].
     inverse_sd : float
         [1/m].
-    reference : ReferencePrior or None
-        Not None where the density is to be multiplied by what a frame resolves of its range.
+    resolves : bool
+        Whether the density is to be multiplied by what a frame resolves of its range: under a
+        reference prior, but for maxima over ranges, where that is flat in log r. It is a number and
+        no type, so that one machine code does for all priors, integrates and maximises.
     """
 
     constant: float
@@ -120,7 +108,7 @@ class RangePrior(NamedTuple):
     log_inverse_sd: float
     low: float
     high: float
-    reference: ReferencePrior | None
+    resolves: bool
 
 
 class FluxError(NamedTuple):
@@ -184,8 +172,8 @@ class Rows(NamedTuple):
         As `Background`.
     range_priors : ndarray, shape (n, 8)
         As the numbers of `RangePrior`.
-    reference : ReferencePrior or None
-        As `RangePrior.reference`, the same for all.
+    resolves : bool
+        As `RangePrior.resolves`, the same for all.
     flux_errors : ndarray, shape (n, knots, 2), or None
         Knots of a `FluxError` each.
     flux_grid : (float, float) or None
@@ -201,7 +189,7 @@ class Rows(NamedTuple):
     crosstalks: Array | None
     backgrounds: Array | None
     range_priors: Array
-    reference: ReferencePrior | None = None
+    resolves: bool = False
     flux_errors: Array | None = None
     flux_grid: Pair | None = None
     offsets: Array | None = None
@@ -218,7 +206,7 @@ def instrument_of(sensor: Sensor) -> Instrument:
 def prior_of(numbers: Array) -> RangePrior:
     """Return a row of `simulator.parameters.Terms.ranges` as a prior, not a reference prior."""
     constant, power, mean, inverse_sd, log_mean, log_inverse_sd, low, high = numbers.tolist()
-    return RangePrior(constant, power, mean, inverse_sd, log_mean, log_inverse_sd, low, high, None)
+    return RangePrior(constant, power, mean, inverse_sd, log_mean, log_inverse_sd, low, high, False)
 
 
 def row_of(rows: Rows, i: int) -> Rows:
@@ -229,7 +217,7 @@ def row_of(rows: Rows, i: int) -> Rows:
         None if rows.crosstalks is None else rows.crosstalks[one],
         None if rows.backgrounds is None else rows.backgrounds[one],
         rows.range_priors[one],
-        rows.reference,
+        rows.resolves,
         None if rows.flux_errors is None else rows.flux_errors[one],
         rows.flux_grid,
         None if rows.offsets is None else rows.offsets[one],
@@ -254,7 +242,7 @@ def scene_of(rows: Rows, instrument: Instrument, i: int) -> FrameScene:
             priors[i, 5],
             priors[i, 6],
             priors[i, 7],
-            rows.reference,
+            rows.resolves,
         ),
         _instrument_of(instrument, instrument.r0, instrument.wave, rows.lags, i),
         _flux_error_of(rows.flux_errors, rows.flux_grid, i),

@@ -5,7 +5,7 @@ Kernels take a block: the frames that have one range in common.
 
 import math
 
-from inference.frame.arguments import FrameScene, Pair, ReferencePrior
+from inference.frame.arguments import FrameScene, Pair
 from inference.frame.blocks import Block, frame_count, frame_of
 from inference.frame.gaussian import (
     covariance_slope,
@@ -29,6 +29,7 @@ from inference.frame.range_prior import (
     prior_slope,
 )
 from simulator.compiled import compiled
+from simulator.inlined import inlined
 
 __all__ = [
     "empty_log_likelihood",
@@ -50,30 +51,25 @@ def _information(u: float, gain: float, scene: FrameScene) -> float:
 
 
 @compiled
-def log_resolution(
-    u: float, block: Block, scene: FrameScene, reference: ReferencePrior | None
-) -> float:
+def log_resolution(u: float, block: Block, scene: FrameScene) -> float:
     """Return log sqrt(1 + I / I0), I the Fisher information of a block on its log r.
 
     What is known of the range beside the readings is part of it: a range that is known exactly has
     no other law than that.
 
     It is the density of the reference prior where the readings tell ranges apart, and that of a
-    log-uniform one where they do so to worse than I0 = `LEAST_INFORMATION`; 0 for any other prior.
+    log-uniform one where they do so to worse than I0 = `LEAST_INFORMATION`. Of any other prior
+    nobody asks for it: a call, which hands over all of a scene, takes longer than to look whether.
     """
-    if reference is not None:
-        if not reference.resolves:
-            return 0.0
-        total = 0.0
-        for j in range(frame_count(block)):
-            frame = frame_of(block, j)
-            total += _information(u, frame.gain, scene)
-            total += known_information(math.exp(u), frame.known)
-        return 0.5 * math.log1p(max(total, 0.0) / LEAST_INFORMATION)
-    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
-        return 0.0
+    total = 0.0
+    for j in range(frame_count(block)):
+        frame = frame_of(block, j)
+        total += _information(u, frame.gain, scene)
+        total += known_information(math.exp(u), frame.known)
+    return 0.5 * math.log1p(max(total, 0.0) / LEAST_INFORMATION)
 
 
+@inlined
 @compiled
 def log_density(u: float, block: Block, scene: FrameScene) -> float:
     """Return log p(readings, u | theta) of a block less `log_top` of each frame.
@@ -95,7 +91,9 @@ def log_density(u: float, block: Block, scene: FrameScene) -> float:
         total += gaussian(residual, mean, signal, scene.instrument)
         total += known_log_density(r, frame.known, scene.offset)
     total += log_range_density(r, u, prior)
-    return total + log_resolution(u, block, scene, prior.reference)
+    if prior.resolves:
+        total += log_resolution(u, block, scene)
+    return total
 
 
 @compiled
@@ -115,9 +113,10 @@ def slope_and_curvature(u: float, block: Block, scene: FrameScene) -> Pair:
         bend += precision_product(slope, slope, mean, signal, instrument)
         rise += known_slope(r, frame.known, scene.offset)
         bend += known_information(r, frame.known)
-    ahead = log_resolution(u + _DIFFERENCE, block, scene, prior.reference)
-    behind = log_resolution(u - _DIFFERENCE, block, scene, prior.reference)
-    rise += (ahead - behind) / (2 * _DIFFERENCE)
+    if prior.resolves:
+        ahead = log_resolution(u + _DIFFERENCE, block, scene)
+        behind = log_resolution(u - _DIFFERENCE, block, scene)
+        rise += (ahead - behind) / (2 * _DIFFERENCE)
     of_logarithm, of_range = prior_curvature(r, prior)
     return rise, bend + of_logarithm + of_range
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.frame.arguments import FrameScene, Pair, ReferencePrior
+from inference.frame.arguments import FrameScene, Pair
 from inference.frame.blocks import Block, Frame, Known, frame_count, frame_of
 from inference.frame.gaussian import gaussian
 from inference.frame.known_range import known_log_density
@@ -115,21 +115,16 @@ def _tops(modes: Array, values: Array, knots: Array) -> int:
 
 
 @compiled
-def _top_value(
-    u: float, value: float, block: Block, scene: FrameScene, reference: ReferencePrior | None
-) -> float:
+def _top_value(u: float, value: float, block: Block, scene: FrameScene) -> float:
     """Return the density at a knot: a table holds another frame's reference prior."""
-    if reference is not None:
-        return log_density(u, block, scene) if reference.resolves else value
-    else:  # noqa: RET505
-        return value
+    return log_density(u, block, scene) if scene.range_prior.resolves else value
 
 
 @compiled
 def _refine(mode: Array, lower: float, upper: float, block: Block, scene: FrameScene) -> None:
     """Move a mode from its knot to the top by Gauss-Newton steps within a bracket."""
     u = mode[POSITION]
-    density = _top_value(u, mode[TOP], block, scene, scene.range_prior.reference)
+    density = _top_value(u, mode[TOP], block, scene)
     slope, curvature = slope_and_curvature(u, block, scene)
     bend = curvature
     moved = upper - lower

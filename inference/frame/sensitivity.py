@@ -254,7 +254,8 @@ def sensitivity(
         if flux_error is not None:
             gains *= np.exp(flux_error[0])
         background = None if terms.background is None else True
-        _fill_all(slopes, log_r, values, gains, factors, background, instrument_of(sensor))
+        ranges = np.ascontiguousarray(log_r)
+        _fill_all(slopes, ranges, values, gains, factors, background, instrument_of(sensor))
         signal = slopes[:, Value.READINGS, 2:]
         by_range = slopes[:, Value.LOG_RANGE, :2]
         if flux_error is not None:

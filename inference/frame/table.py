@@ -38,13 +38,12 @@ _VISIBLE = 0.3  # standard deviations of a reading below which a turn of the cur
 
 
 @compiled
-def _fill(table: Array, k: int, u: float, strongest: Block, scene: FrameScene) -> None:
+def _fill(table: Array, k: int, u: float, scene: FrameScene) -> None:
     """Fill one column of a table."""
     r, prior = math.exp(u), scene.range_prior
     signal, mean = light_at(u, r, 1.0, scene)
     table[LOG_RANGE, k] = u
     table[LOG_PRIOR, k] = log_range_density(r, u, prior)
-    table[LOG_PRIOR, k] += log_resolution(u, strongest, scene, prior.reference)
     table[SIGNAL_1, k], table[SIGNAL_2, k] = signal
     table[MEAN_1, k], table[MEAN_2, k] = mean
 
@@ -108,6 +107,25 @@ def _offset(crosstalk: Pair | None, strongest: float) -> Pair:
 
 
 @compiled
+def _add_resolution(table: Array, strongest: float, scene: FrameScene) -> None:
+    """Add the density of a reference prior, that of the strongest frame, at every knot."""
+    r0, wave, read, shot, _ = scene.instrument
+    # a frame at its gain, and noise that does not depend on the object's part of the readings
+    frame = Block(Frame(0.0, 0.0, strongest, None), None, None)
+    plain = FrameScene(
+        scene.shape,
+        scene.crosstalk,
+        scene.background,
+        scene.range_prior,
+        Instrument(r0, wave, read, shot, None),
+        scene.flux_error,
+        None,
+    )
+    for k in range(table.shape[1]):
+        table[LOG_PRIOR, k] += log_resolution(table[LOG_RANGE, k], frame, plain)
+
+
+@compiled
 def tabulate(bounds: Pair, scene: FrameScene, strongest: float) -> Array:
     """Tabulate the curve of mean readings, knots closer where it turns.
 
@@ -131,30 +149,19 @@ def tabulate(bounds: Pair, scene: FrameScene, strongest: float) -> Array:
         crosstalk. A reference prior is that of the strongest frame under read and shot noise.
     """
     instrument = scene.instrument
-    r0, wave, read, shot, _ = instrument
-    # a frame at its gain, and noise that does not depend on the object's part of the readings
-    frame = Block(Frame(0.0, 0.0, strongest, None), None, None)
-    plain = FrameScene(
-        scene.shape,
-        scene.crosstalk,
-        scene.background,
-        scene.range_prior,
-        Instrument(r0, wave, read, shot, None),
-        scene.flux_error,
-        None,
-    )
+    wave, read, shot = instrument.wave, instrument.read, instrument.shot
     n = max(_FEWEST_KNOTS, math.ceil((bounds[1] - bounds[0]) / KNOT_SPACING) + 1)
     unit = (read[0] / strongest, read[1] / strongest)
     offset = _offset(scene.crosstalk, strongest)
     table = np.empty((_ROWS, n))
     for k in range(n):
         u = bounds[0] + (bounds[1] - bounds[0]) * k / (n - 1)
-        _fill(table, k, u, frame, plain)
+        _fill(table, k, u, scene)
     while True:
         split = np.empty(n - 1, dtype=np.bool_)
         more = _too_coarse(split, table, offset, unit, wave is None, shot)
         if more == 0 or n + more > _MOST_KNOTS:
-            return table
+            break
         finer = np.empty((_ROWS, n + more))
         k = 0
         for j in range(n):
@@ -163,6 +170,9 @@ def tabulate(bounds: Pair, scene: FrameScene, strongest: float) -> Array:
             k += 1
             if j < n - 1 and split[j]:
                 middle = 0.5 * (table[LOG_RANGE, j] + table[LOG_RANGE, j + 1])
-                _fill(finer, k, middle, frame, plain)
+                _fill(finer, k, middle, scene)
                 k += 1
         table, n = finer, n + more
+    if scene.range_prior.resolves:
+        _add_resolution(table, strongest, scene)
+    return table

@@ -66,7 +66,7 @@ def _columns(u: Array, strongest: float, scene: FrameScene) -> Array:
     columns = np.empty((loops._ROWS, u.size))
     columns[LOG_RANGE] = u
     columns[LOG_PRIOR] = twin(log_range_density)(r, u, prior)
-    if prior.reference is not None and prior.reference.resolves:
+    if prior.resolves:
         total = information(r, strongest, scene)
         total = np.where(total < 0.0, 0.0, total)
         columns[LOG_PRIOR] += 0.5 * of_each(math.log1p, total / LEAST_INFORMATION)

@@ -155,13 +155,17 @@ def test_an_absent_term_is_a_term_of_zeros(sensor: Sensor) -> None:
     assert absent == pytest.approx(zeros, rel=1e-12)
 
 
-def test_scenes_with_and_without_crosstalk_share_machine_code(sensor: Sensor) -> None:
+def test_crosstalk_and_priors_of_the_range_need_no_machine_code(sensor: Sensor) -> None:
     frames, found = data(sensor).frames, []
-    for scene in ({}, {"crosstalk": UNKNOWN_CROSSTALK}):
+    uniform = {"range_m": {"prior": "uniform", "low": 0.1, "high": 3.0}}
+    for scene in ({}, {"crosstalk": UNKNOWN_CROSSTALK}, uniform):
         density = of(sensor, scene, frames)
-        found.append(density.rows(density.parameters.terms(np.zeros((1, len(density.parameters))))))
-    absent, unknown = found
-    assert kind_of(absent) == kind_of(unknown)
+        terms = density.parameters.terms(np.zeros((1, len(density.parameters))))
+        found += [density.rows(terms), density.integral_rows(terms)]
+    assert {kind_of(rows) for rows in found} == {kind_of(found[0])}
+    # a reference prior counts for integrals alone, another one is in the numbers of all
+    assert [rows.resolves for rows in found] == [False, True, False, True, False, False]
+    absent = found[0]
     # and zeros change no bit of what a density without crosstalk says
     density, z = of(sensor, {}, frames), np.zeros((1, 3))
     none = absent._replace(crosstalks=None)

@@ -221,7 +221,7 @@ def density_errors(case: Slopes) -> dict[str, float]:
         wave = (case.sensor.wave_number, case.sensor.known_phase_rad)
     instrument = Instrument(r0, wave, noise.read, noise.shot or None, noise.relative or None)
     centre, spread = case.law
-    prior = RangePrior(0.0, -1.0, 0.0, 0.0, centre, 1 / spread, 0.0, math.inf, None)
+    prior = RangePrior(0.0, -1.0, 0.0, 0.0, centre, 1 / spread, 0.0, math.inf, False)
     scene = FrameScene(
         Shape(strength, case.values[0], case.values[1]),
         (case.values[3], case.values[4]),

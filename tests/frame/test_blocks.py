@@ -21,7 +21,7 @@ from inference.frame.range_prior import log_range_density, prior_curvature, prio
 
 FRAMES = np.array([[0.001, 0.02, 1.0], [0.0012, 0.03, 1.5], [0.0008, 0.015, 0.7]])
 PRESENT = np.array([True, False, True])
-PRIOR = RangePrior(0.3, -1.0, 0.0, 0.0, -0.5, 0.8, 0.02, 10.0, None)
+PRIOR = RangePrior(0.3, -1.0, 0.0, 0.0, -0.5, 0.8, 0.02, 10.0, False)
 SCENE = FrameScene(
     Shape(0.0074, 0.0769, -0.123),
     (0.0002, 0.001),

@@ -53,7 +53,7 @@ class Case:
             Shape(*self.shape),
             self.crosstalk,
             None if self.background is None else Background(*self.background),
-            RangePrior(*self.law, reference=None),
+            RangePrior(*self.law, resolves=False),
             self.instrument,
             None,
         )

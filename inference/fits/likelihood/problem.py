@@ -17,14 +17,14 @@ from inference.fits.likelihood.law_mode import LawMode
 from inference.fits.likelihood.places import Places
 from inference.fits.likelihood.supports import supports_of, with_support_alone
 from inference.fits.likelihood.told import KnownRanges
-from inference.frame.arguments import Instrument, ReferencePrior, Rows
+from inference.frame.arguments import Instrument, Rows
 from inference.frame.blocks import own_blocks
 from inference.frame.sensitivity import Value
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.model_error import ModelError
 from simulator.parameters import Parameters, parameters_of
-from simulator.scene import Reference, Scene
+from simulator.scene import Scene
 from simulator.sensor import Sensor, instrument
 
 __all__ = ["FitProblem", "fit_problem"]
@@ -116,12 +116,9 @@ class FitProblem:
         """Return what the kernels take, with fresh work space."""
         prior = np.array([[0.0, -1.0, 0.0, 0.0, 0.0, 0.0, *self.support]])
         background = None if self.background is None else np.empty((1, 4))
-        # flat, and of the type that a posterior of the scene has
-        reference = isinstance(self.parameters.range_prior, Reference)
-        law = ReferencePrior(False) if reference else None
         return Fit(
             self.layout,
-            Rows(np.empty((1, 3)), np.empty((1, 2)), background, prior, law),
+            Rows(np.empty((1, 3)), np.empty((1, 2)), background, prior),
             own_blocks(self.frames, self.present),
             self.instrument,
             self.gain,

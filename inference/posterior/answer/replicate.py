@@ -23,15 +23,6 @@ Array = NDArray[np.float64]
 
 
 @compiled
-def _strength(strength: float, errors: Array | None, i: int, j: int) -> float:
-    """Return the object's strength with its flux's error."""
-    if errors is not None:
-        return strength * math.exp(errors[i, j])
-    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
-        return strength
-
-
-@compiled
 def _replicate(
     out: Array,
     normals: Array,
@@ -39,7 +30,7 @@ def _replicate(
     positions: Array,
     gains: Array,
     instrument: Instrument,
-    errors: Array | None,
+    errors: Array,
 ) -> None:
     """Fill out[i, j] with readings drawn at the log ranges positions[i, j]."""
     for i in range(positions.shape[0]):
@@ -49,7 +40,7 @@ def _replicate(
             gain, r, signal = gains[j], math.inf, (0.0, 0.0)
             if math.isfinite(positions[i, j]):
                 r = math.exp(positions[i, j])
-                strength = _strength(gain * shape.strength, errors, i, j)
+                strength = gain * shape.strength * math.exp(errors[i, j])
                 signal = object_readings(r, of.r0, of.wave, strength, shape.c0, shape.c1)
             mean = with_surroundings(signal, r, gain, scene)
             noise = noise_of(mean, signal, instrument)
@@ -85,12 +76,13 @@ def replicate(
     """
     out = np.empty((*positions.shape, 2))
     terms = density.parameters.terms(z)
-    errors = density.flux_errors(positions, rng)
+    drawn = density.flux_errors(positions, rng)
+    # an error of zero costs less than machine code of its own for what has none
+    errors = np.zeros(positions.shape) if drawn is None else drawn
     normals = rng.standard_normal((*positions.shape, 4))
     for k, rows, data in pieces(density, terms, density.rows(terms)):
         gains = np.ascontiguousarray(data.frames[:, GAIN])
-        some = None if errors is None else errors[k]
-        _replicate(out[k], normals[k], rows, positions[k], gains, density.instrument, some)
+        _replicate(out[k], normals[k], rows, positions[k], gains, density.instrument, errors[k])
     return _at_temperature(density, terms, out)
 
 
