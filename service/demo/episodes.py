@@ -9,6 +9,7 @@ from service.adapters.histograms import calibrate, pulsed
 from service.adapters.recordings import read_recording
 from service.demo.answers import Answer, Episode, of_estimates, of_posterior
 from service.demo.running import Client
+from service.demo.table import rows_shown
 
 __all__ = ["EPISODES", "crosstalk", "derivatives", "nearest", "phases"]
 
@@ -45,11 +46,31 @@ def _posterior(
     scene: Body,
     frames: Body,
     truth: list[float],
-    method: str = "emcee",
 ) -> Answer:
-    sampler = {"seed": _SEED, "method": method}
+    sampler = {"seed": _SEED, "method": "emcee"}
     body = {"sensor": sensor, "scene": scene, "frames": frames, "sampler": sampler}
-    return of_posterior("posterior", truth, client.posterior(body))
+    (posterior,) = client.posteriors([body])
+    return of_posterior("posterior", truth, posterior)
+
+
+def _posteriors_of_each(
+    client: Client, sensor: Body, scene: Body, frames: Body, truth: list[float]
+) -> Answer:
+    """Ask for a posterior of each frame alone, of those that the table shows."""
+    shown = rows_shown(len(truth))
+    # one unknown: importance sampling is enough where it can be trusted
+    body = {"sensor": sensor, "scene": scene, "sampler": {"seed": _SEED, "method": "auto"}}
+    first, *others = [
+        body | {"frames": {name: [column[i]] for name, column in frames.items()}} for i in shown
+    ]
+    # the first has the machine code made that all of them need
+    posteriors = client.posteriors([first]) + client.posteriors(others)
+    answers = [
+        of_posterior("posterior", [truth[i]], posterior)
+        for i, posterior in zip(shown, posteriors, strict=True)
+    ]
+    points = tuple(answer.points[0] for answer in answers)
+    return Answer("posterior", points, "a posterior of each frame alone")
 
 
 def nearest(client: Client, recordings: Path) -> Episode:
@@ -156,17 +177,11 @@ def phases(client: Client, _: Path) -> Episode:
     frames, truth = _simulated(client, sensor, truth_scene, trajectory)
     strength = {"prior": "lognormal", "median": 0.0075, "sigma": 0.3}
     scene = known | {"background": behind | {"strength": strength}}
-    single = []
-    for i, range_m in enumerate(truth):
-        frame = {name: [column[i]] for name, column in frames.items()}
-        # one unknown: importance sampling is enough where it can be trusted
-        single.append(_posterior(client, sensor, scene, frame, [range_m], method="auto"))
-    points = tuple(answer.points[0] for answer in single)
     answers = (
         # as if there were none
         _estimates(client, sensor, {}, frames, truth, "conventional"),
         _estimates(client, sensor, scene, frames, truth, "background_cancelling"),
-        Answer("posterior", points, "a posterior of each frame alone"),
+        _posteriors_of_each(client, sensor, scene, frames, truth),
     )
     return Episode("A sine wave, background of unknown strength", "simulated", answers)
 

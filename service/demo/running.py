@@ -7,8 +7,7 @@ import re
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import httpx
@@ -19,7 +18,6 @@ from service.service_settings import PREFIX
 __all__ = ["Client", "DemoError", "running_service"]
 
 _ADDRESS = re.compile(r"running on (http://\S+)")
-_POLL_S = 0.1
 
 
 class DemoError(ServiceError):
@@ -92,18 +90,26 @@ class Client:
         answer: dict[str, Any] = response.json()
         return answer
 
-    def posterior(self, body: dict[str, Any]) -> dict[str, Any]:
-        """Ask for a posterior and wait for it.
+    def posteriors(self, bodies: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Ask for posteriors, all at once, and wait for them.
 
         Raises
         ------
         DemoError
-            Where it fails.
+            Where one fails.
         """
-        answer = self.post("/v1/posteriors", body)
+        asked = [self.post("/v1/posteriors", body) for body in bodies]
+        return [self._ended(answer) for answer in asked]
+
+    def _ended(self, answer: dict[str, Any]) -> dict[str, Any]:
+        address = f"/v1/posteriors/{answer['id']}"
         while answer["status"] in ("queued", "running"):
-            time.sleep(_POLL_S)
-            answer = self.http.get(f"/v1/posteriors/{answer['id']}").json()
+            # events of it end as it does
+            with self.http.stream("GET", f"{address}/events") as events:
+                events.raise_for_status()
+                for _ in events.iter_lines():
+                    pass
+            answer = self.http.get(address).raise_for_status().json()
         if answer["status"] != "done":
             raise DemoError(f"the posterior is {answer['status']}: {answer.get('problem')}")
         return answer

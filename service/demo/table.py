@@ -5,13 +5,18 @@ from collections.abc import Iterator, Sequence
 
 from service.demo.answers import Episode, Point
 
-__all__ = ["table"]
+__all__ = ["rows_shown", "table"]
 
 _ROWS = 5
 _HEADER = (
     f"  {'truth [m]':>9}  {'range [m]':>9}  {'90 % interval [m]':<19}  {'status':<10} "
     "ranges that explain the frame [m]"
 )
+
+
+def rows_shown(count: int) -> list[int]:
+    """Return which of so many frames a table shows."""
+    return sorted({round((count - 1) * i / (_ROWS - 1)) for i in range(_ROWS)})
 
 
 def _line(point: Point) -> str:
@@ -35,8 +40,7 @@ def _lines(episodes: Sequence[Episode]) -> Iterator[str]:
             remark = f" ({answer.remark})" if answer.remark else ""
             yield f"\n {answer.name}{remark}"
             yield _HEADER
-            last = len(answer.points) - 1
-            for row in sorted({round(last * i / (_ROWS - 1)) for i in range(_ROWS)}):
+            for row in rows_shown(len(answer.points)):
                 yield _line(answer.points[row])
         yield ""
 
