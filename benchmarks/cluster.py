@@ -12,7 +12,9 @@ import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-__all__ = ["Cluster", "certificate", "children", "command_of"]
+from benchmarks.ports import own_port
+
+__all__ = ["Cluster", "certificate", "children", "command_of", "listens"]
 
 _LOOK_S = 0.1
 
@@ -33,6 +35,14 @@ def command_of(pid: int) -> str:
     with contextlib.suppress(OSError):
         return Path(f"/proc/{pid}/cmdline").read_text()
     return ""
+
+
+def listens(scheduler: Path) -> bool:
+    """Tell whether a scheduler has written its file, to the end: then it can be reached."""
+    try:
+        return "address" in json.loads(scheduler.read_text())
+    except (FileNotFoundError, json.JSONDecodeError):
+        return False
 
 
 def certificate(folder: Path) -> dict[str, str] | None:
@@ -78,13 +88,14 @@ class Cluster:
         self._ending = threading.Event()
         self._lock = threading.Lock()
         self._parts: dict[str, subprocess.Popen[bytes]] = {}
-        self._address, self._file = f"{protocol}://127.0.0.1:0", folder / "scheduler.json"
+        # started anew it listens there again, where nobody else may be meanwhile
+        self._address = f"{protocol}://127.0.0.1:{own_port()}"
+        self._file = folder / "scheduler.json"
         self._start("scheduler")
-        while not self._file.exists():
+        while not listens(self._file):
             if self._parts["scheduler"].poll() is not None:
                 raise RuntimeError("the scheduler does not start")
             time.sleep(_LOOK_S)
-        self._address = json.loads(self._file.read_text())["address"]
         self.settings = dict(dask) | {"HYBRIDTOF_EXECUTOR": self._address}
         for number in range(workers):
             self._start(f"worker {number}")

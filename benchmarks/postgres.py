@@ -28,6 +28,11 @@ def _run_postgres(home: Path, program: str, *arguments: str) -> None:
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=home)  # noqa: S603
 
 
+def _control(home: Path, *arguments: str) -> None:
+    """Start or stop a server, and wait for it, on a busy machine for longer than a minute."""
+    _run_postgres(home, "pg_ctl", "-w", "-t", "600", *arguments)
+
+
 @contextlib.contextmanager
 def postgres() -> Iterator[str | None]:
     """Run a PostgreSQL of its own, reached through a socket; None where none is installed."""
@@ -38,11 +43,11 @@ def postgres() -> Iterator[str | None]:
     options = f"-k {home} -c listen_addresses= -c max_connections=60"
     try:
         _run_postgres(home, "initdb", "-U", "me", "-A", "trust")
-        _run_postgres(home, "pg_ctl", "-w", "-l", str(home / "log"), "-o", options, "start")
+        _control(home, "-l", str(home / "log"), "-o", options, "start")
         try:
             yield f"postgresql://me@/postgres?host={home}"
         finally:
-            _run_postgres(home, "pg_ctl", "-m", "immediate", "-w", "stop")
+            _control(home, "-m", "immediate", "stop")
     finally:
         shutil.rmtree(home, ignore_errors=True)
 
@@ -50,5 +55,5 @@ def postgres() -> Iterator[str | None]:
 def restart(address: str) -> str:
     """Crash a server that `postgres` runs, and start it anew."""
     home = Path(address.rpartition("host=")[2])
-    _run_postgres(home, "pg_ctl", "-m", "immediate", "-w", "-l", str(home / "log"), "restart")
+    _control(home, "-m", "immediate", "-l", str(home / "log"), "restart")
     return "database"

@@ -19,6 +19,7 @@ import pytest
 from paho.mqtt import client as mqtt
 from paho.mqtt.enums import CallbackAPIVersion
 
+from benchmarks.ports import own_port
 from service.cli import main
 from service.demo.running import running_service
 
@@ -106,9 +107,7 @@ def broker(folder: Path) -> Iterator[int]:
     command = shutil.which("mosquitto", path=f"{os.environ['PATH']}:/usr/sbin")
     if command is None:
         pytest.skip("no MQTT broker: apt-get install mosquitto")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = own_port()
     settings = folder / "mosquitto.conf"
     settings.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\n")
     process = subprocess.Popen([command, "-c", str(settings)], stderr=subprocess.DEVNULL)

@@ -123,13 +123,19 @@ def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float) -> tuple[Task, ...]:
     )
 
 
-def run(task: Task) -> float:
-    time.sleep(task.orders.get("sleep", 0.0))
-    until = time.process_time() + task.orders.get("burn", 0.0)
+def burn(seconds: float) -> None:
+    """Take processor time."""
+    until = time.process_time() + seconds
     while time.process_time() < until:
         pass
+
+
+def run(task: Task) -> float:
+    time.sleep(task.orders.get("sleep", 0.0))
+    burn(task.orders.get("burn", 0.0))
     if "hold" in task.orders and task.chunk > 0:
         while not Path(task.orders["hold"]).exists():
+            burn(0.001)  # who only waits is taken for stopped, and killed
             time.sleep(0.005)
     if "outlive" in task.orders:
         outlive(Path(task.orders["outlive"]))

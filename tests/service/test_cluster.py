@@ -3,6 +3,7 @@
 import contextlib
 import random
 import shutil
+import socket
 import time
 from functools import partial
 from pathlib import Path
@@ -11,9 +12,10 @@ import pytest
 
 pytest.importorskip("distributed", reason="Dask is not installed: hybridtof[cluster]")
 
-from benchmarks.cluster import Cluster
+from benchmarks.cluster import Cluster, listens
 from benchmarks.fleet import Fleet, fleet
 from benchmarks.kills import survived
+from benchmarks.ports import own_port
 from benchmarks.postgres import postgres
 from service import cluster
 from service.cli import main
@@ -49,6 +51,29 @@ def test_refused_at_the_start(
     captured = capsys.readouterr()
     assert captured.err.startswith(f"hybridtof: error: /HYBRIDTOF_EXECUTOR: {said}")
     assert captured.err.count("\n") == 1
+
+
+def test_a_scheduler_listens_once_its_file_is_whole(tmp_path: Path) -> None:
+    """Dask writes it in place: a busy machine lets others read the first half of it."""
+    file, whole = tmp_path / "scheduler.json", '{"type": "Scheduler", "address": "tcp://[::1]:1"}'
+    found = [listens(file)]
+    for written in ("", whole[:20], whole):
+        file.write_text(written)
+        found.append(listens(file))
+    assert found == [False, False, False, True]
+
+
+def test_a_port_of_its_own_is_given_to_nobody_who_asks_for_any() -> None:
+    given = set()
+    with contextlib.ExitStack() as open_ones:
+        for _ in range(50):
+            one = open_ones.enter_context(socket.socket())
+            one.bind(("127.0.0.1", 0))
+            given.add(one.getsockname()[1])
+        own = own_port()
+        with socket.socket() as taken:
+            taken.bind(("127.0.0.1", own))
+    assert own < min(given)
 
 
 @pytest.mark.slow

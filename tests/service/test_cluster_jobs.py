@@ -3,7 +3,7 @@
 import os
 import signal
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 
 import pytest
@@ -27,13 +27,20 @@ from tests.service.test_jobs import (
 )
 
 pytestmark = [pytest.mark.anyio, pytest.mark.slow]
-# after which a scheduler takes a silent worker for dead; five minutes where nothing is said
+# after which a scheduler takes a silent worker for dead; five minutes where nothing is said, as one
+# that imports is silent for as long as a busy machine takes
 SILENT = {"DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "3s"}
 
 
 @pytest.fixture(scope="module")
 def machines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
-    running = Machines(SILENT, tmp_path_factory.mktemp("cluster"), 2, "tcp")
+    with machines_of({}, tmp_path_factory.mktemp("cluster")) as running:
+        yield running
+
+
+@contextmanager
+def machines_of(dask: dict[str, str], folder: Path) -> Iterator[Machines]:
+    running = Machines(dask, folder, 2, "tcp")
     try:
         yield running
     finally:
@@ -86,15 +93,16 @@ async def test_chunk_that_always_crashes_fails_alone(machines: Machines, tmp_pat
     assert workers.items() <= machines.pids().items()
 
 
-async def test_a_worker_that_is_stopped_is_done_without(machines: Machines, tmp_path: Path) -> None:
+async def test_a_worker_that_is_stopped_is_done_without(tmp_path: Path) -> None:
     fake_fold.order(hold=str(tmp_path / "mark"))
-    async with on(machines, tmp_path) as jobs:
-        job_id = (await jobs.submit(*system(), SETTINGS)).id
-        await until(jobs, job_id, fake_fold.STEPS)
-        stopped = machines.pids()["worker 0"]
-        os.kill(stopped, signal.SIGSTOP)
-        try:
-            (tmp_path / "mark").touch()
-            assert mean_of(await ended(jobs, job_id)) == undisturbed()
-        finally:
-            os.kill(stopped, signal.SIGCONT)
+    with machines_of(SILENT, tmp_path) as machines:
+        async with on(machines, tmp_path) as jobs:
+            job_id = (await jobs.submit(*system(), SETTINGS)).id
+            await until(jobs, job_id, fake_fold.STEPS)
+            stopped = machines.pids()["worker 0"]
+            os.kill(stopped, signal.SIGSTOP)
+            try:
+                (tmp_path / "mark").touch()
+                assert mean_of(await ended(jobs, job_id)) == undisturbed()
+            finally:
+                os.kill(stopped, signal.SIGCONT)
