@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
+from inference.fits.answer.blamed import blamed
 from inference.fits.answer.determined import (
     noise_may_be_followed,
     off_the_top,
@@ -232,7 +233,9 @@ def _erring_answer(
         refuse_if_undetermined(top.clean, top, facts)
     contradicted = contradicting(top, problem)
     wider, doubt = 1.0, doubt_of(problem, top.chi_square)
-    if not contradicted:
+    # of readings that the model cannot make, whatever a last step would gain, that is to be said
+    unlike = p_value_of(problem, max(top.chi_square - top.remaining, 0.0)) < FALSE_ALARM
+    if not contradicted and not unlike:
         wider = math.hypot(1.0, off_the_top(top))
         refuse_if_open(top.clean, top, top.facts, wider * math.sqrt(doubt), whole=top.whole)
     decided = top.deviance + doubt * DECIDED
@@ -243,6 +246,8 @@ def _erring_answer(
     checks = model_checks(problem, top)
     widening = wider * math.sqrt(doubt)
     report = fit_report(problem, found, top.chi_square, facts.rank, widening, checks)
+    if report["misfit"]:
+        report["reasons"] += blamed(problem, top, np.flatnonzero(state != SATURATED))
     if contradicted:
         report["misfit"] = True
         report["reasons"].append(CONTRADICTION)

@@ -26,7 +26,7 @@ from inference.fits.likelihood.erring_point import (
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import eliminated
 
-__all__ = ["REASONS", "Check", "model_checks"]
+__all__ = ["REASONS", "Check", "Rows", "basis", "model_checks", "rows_of", "without_size"]
 
 Array = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ class Check(NamedTuple):
         return float(scipy.special.chdtrc(self.freedom, self.statistic)) if self.freedom else 1.0
 
 
-class _Rows(NamedTuple):
+class Rows(NamedTuple):
     """What is standard normal before a fit: readings across their ranges, errors, unknowns.
 
     Attributes
@@ -72,15 +72,19 @@ class _Rows(NamedTuple):
         Along the crosstalk that is no unknown.
     dense : ndarray, shape (d,)
         How much nearer than in the target unknowns are to where their priors are densest.
+    frames : ndarray of int, shape (m - k - d,)
+        Of which frame of the problem the first rows are.
     """
 
     target: Array
     followed: Array
     crosstalk: Array
     dense: Array
+    frames: NDArray[np.intp]
 
 
-def _rows(problem: FitProblem, top: Erring) -> _Rows:
+def rows_of(problem: FitProblem, top: Erring) -> Rows:
+    """Linearise a fit at its maximum, the laws of errors and unknowns as rows of their own."""
     at = point_at(problem, top.x, top.positions, top.a)
     whitener = linearised(problem, top.x, top.positions)[-1]
     # crosstalk moves the readings themselves
@@ -95,20 +99,31 @@ def _rows(problem: FitProblem, top: Erring) -> _Rows:
     seen = eliminated(problem.names, at.jacobian, at.along, np.concatenate(columns, axis=2), told)
     errors, residual, crosstalk = np.split(seen.errors, [k, k + 1], axis=1)
     slopes = slopes_of_priors(problem, at.x)
-    return _Rows(
+    return Rows(
         np.concatenate([residual[:, 0], -at.a, -at.z]),
         np.block([[errors, seen.jacobian], [np.eye(k, k + d)], [np.zeros((d, k)), slopes]]),
         np.vstack([crosstalk, np.zeros((k + d, c))]),
         at.z - deviations_of(problem, at.x),
+        _frames_of_rows(at.along, told is not None),
     )
 
 
-def _unit(columns: Array) -> Array:
+def _frames_of_rows(along: Array, told: bool) -> NDArray[np.intp]:
+    """Return of which frame each row is, in the order of `eliminate`."""
+    with np.errstate(invalid="ignore"):
+        moves = np.linalg.norm(along, axis=1) > 0.0
+    still = np.repeat(np.flatnonzero(~moves), 2)
+    beside = np.repeat(np.arange(len(along) if told else 0), 2)
+    return np.concatenate([np.flatnonzero(moves), still, beside])
+
+
+def without_size(columns: Array) -> Array:
+    """Return columns of length 1, and those of none as they are."""
     size = np.linalg.norm(columns, axis=0)
     return np.asarray(columns / np.where(size > 0.0, size, 1.0))
 
 
-def _basis(columns: Array) -> Array:
+def basis(columns: Array) -> Array:
     """Return an orthonormal basis of what columns span, those that are next to nothing left out."""
     left, values, _ = np.linalg.svd(columns, full_matrices=False)
     return np.asarray(left[:, values > _APART])
@@ -131,8 +146,8 @@ def model_checks(problem: FitProblem, top: Erring) -> dict[str, Check]:
         or none at all; ``priors``: the unknowns against their laws. Each is chi-square distributed
         where the scene is as stated, up to what is not linear.
     """
-    rows = _rows(dataclasses.replace(problem, mode=top.clean.mode), top)
-    followed = _basis(_unit(rows.followed))
+    rows = rows_of(dataclasses.replace(problem, mode=top.clean.mode), top)
+    followed = basis(without_size(rows.followed))
 
     def left(part: Array) -> Array:
         for _ in range(2):  # the second time takes off what rounding left
@@ -140,7 +155,7 @@ def model_checks(problem: FitProblem, top: Erring) -> dict[str, Check]:
         return part
 
     target = left(rows.target)
-    light = _basis(left(_unit(rows.crosstalk)))
+    light = basis(left(without_size(rows.crosstalk)))
     d = top.x.size
     of_priors = followed[rows.target.size - d :]
     share, turn = np.linalg.eigh(np.eye(d) - of_priors @ of_priors.T)
