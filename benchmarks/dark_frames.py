@@ -8,7 +8,8 @@ sqrt(k^2 + I) of log r, I its Fisher information, the score of the likelihood wi
 integrated out is averaged over data sets at the truth. A law that takes nothing from how ranges are
 spread leaves a mean of zero; the table has what it leaves, in standard deviations of all unknowns
 together (Mahalanobis), and "k = inf" is a log-uniform law. The bias is of first order, so that
-beyond one or two standard deviations only its size counts.
+beyond one or two standard deviations only its size counts. The last column is the law that stands:
+k = 5, and less in the dark, which has the mass of one state (`inference.frame.dark_mass`).
 """
 
 import argparse
@@ -19,6 +20,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.frame.dark_mass import DARK_MASS
+from inference.frame.range_prior import LEAST_INFORMATION
+
 Array = NDArray[np.float64]
 
 C0, C1, C2, STRENGTH = 0.0769, -0.123, 0.0957, 0.0177
@@ -27,6 +31,7 @@ R0 = 14.99
 FRAMES = 40
 FLOORS = np.array([1.0, 5.0, 10.0, 40.0, math.inf])
 _LOWEST = 0.02
+_STANDS = math.sqrt(LEAST_INFORMATION)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,11 +73,23 @@ def _readings(r: float, theta: Array, wall: float) -> tuple[float, float, float,
 
 
 @numba.njit(cache=True)
+def _dark(theta: Array, wall: float, sd: float) -> float:
+    """Return the factor on the law that stands, in the dark."""
+    low, step = math.log(_LOWEST), math.log(wall / _LOWEST) / 400
+    mass = 0.0
+    for j in range(400):
+        _, _, d1, d2 = _readings(math.exp(low + (j + 0.5) * step), theta, wall)
+        mass += step * _STANDS / math.sqrt(1.0 + (d1 * d1 + d2 * d2) / (sd * _STANDS) ** 2)
+    return min(DARK_MASS / mass, 1.0)
+
+
+@numba.njit(cache=True)
 def _log_likelihoods(seen: Array, truth: Array, theta: Array, wall: float, sd: float) -> Array:
-    """Sum log int N(y; m(r)) sqrt(k^2 + I) dlog r over frames, for every k."""
+    """Sum log int N(y; m(r)) sqrt(k^2 + I) dlog r over frames, for every k, and what stands."""
     floors = FLOORS
-    out = np.zeros(floors.size)
+    out = np.zeros(floors.size + 1)
     low, high = math.log(_LOWEST), math.log(wall)
+    dark = _dark(theta, wall, sd) * _STANDS**2
     for i in range(truth.size):
         u = math.log(truth[i])
         found = _readings(truth[i], theta, wall)
@@ -81,7 +98,7 @@ def _log_likelihoods(seen: Array, truth: Array, theta: Array, wall: float, sd: f
         start, end = max(low, u - reach), min(high, u + reach)
         count = 2400 if told < 30.0 else 400
         step = (end - start) / count
-        total, top = np.zeros(floors.size), -math.inf
+        total, top = np.zeros(floors.size + 1), -math.inf
         for j in range(count):
             m1, m2, d1, d2 = _readings(math.exp(start + (j + 0.5) * step), theta, wall)
             value = -0.5 * ((seen[i, 0] - m1) ** 2 + (seen[i, 1] - m2) ** 2) / sd**2
@@ -93,12 +110,13 @@ def _log_likelihoods(seen: Array, truth: Array, theta: Array, wall: float, sd: f
             for k in range(floors.size):
                 flat = math.isinf(floors[k])
                 total[k] += share * (1.0 if flat else math.sqrt(floors[k] ** 2 + information))
+            total[-1] += share * (dark + information) / math.sqrt(_STANDS**2 + information)
         out += top + np.log(total)
     return out
 
 
 def bias(case: Case, sets: int) -> tuple[float, Array]:
-    """Return the least sqrt(I) of a frame, and the bias under every k in standard deviations."""
+    """Return the least sqrt(I) of a frame, and the bias under every law in standard deviations."""
     wall = case.high + 1.0 if case.light == "wall" else R0
     spaced = np.geomspace if case.even_in_log else np.linspace
     truth, sd = spaced(case.low, case.high, FRAMES), SIGNAL_AT_1M / case.snr
@@ -121,7 +139,7 @@ def bias(case: Case, sets: int) -> tuple[float, Array]:
         return np.asarray(_log_likelihoods(seen, truth, theta, wall, sd))
 
     rng, x = np.random.default_rng(5), np.concatenate([start, extra])
-    scores = np.empty((FLOORS.size, sets, x.size))
+    scores = np.empty((FLOORS.size + 1, sets, x.size))
     for number in range(sets):
         seen = mean[:, :2] + sd * rng.standard_normal((FRAMES, 2))
         for j, step in enumerate(np.diag(steps)):
@@ -139,7 +157,8 @@ def main() -> None:
     parser.add_argument("--sets", type=int, default=100)
     given = parser.parse_args()
     print("| before | SNR | ranges [m] | least sqrt(I) |", end="")
-    print("".join(f" k = {k:g} |" for k in FLOORS), "|---" * (4 + FLOORS.size) + "|", sep="\n")
+    print("".join(f" k = {k:g} |" for k in FLOORS), "stands |")
+    print("|---" * (5 + FLOORS.size) + "|")
     for case in CASES:
         least, found = bias(case, given.sets)
         spread = "log-spaced" if case.even_in_log else "constant speed"

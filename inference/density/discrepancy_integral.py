@@ -23,6 +23,7 @@ from inference.frame.arguments import (
     scene_of,
 )
 from inference.frame.blocks import Data, block_of, is_empty
+from inference.frame.dark_mass import with_dark_mass
 from inference.frame.flux_error import fill_knots
 from inference.frame.gaussian import LOG_2PI, log_top
 from inference.frame.log_density import empty_log_likelihood
@@ -65,6 +66,7 @@ def _round(
     """
     fill_knots(functions.error.knots, functions.basis, coefficients)
     table = tabulate(integration_bounds(scene.range_prior), scene, data.strongest)
+    scene = with_dark_mass(table, scene)
     work = np.empty(table.shape[1])
     modes = room_for_modes(table)
     n, size = values.size, coefficients.size
@@ -208,12 +210,14 @@ def _without_reference(scene: FrameScene) -> FrameScene:
 
     A maximum over ranges knows none, which is a density for integrals.
     """
-    constant, power, mean, inverse_sd, log_mean, log_inverse_sd, low, high, _ = scene.range_prior
+    constant, power, mean, inverse_sd, log_mean, log_inverse_sd, low, high, _, _ = scene.range_prior
     return FrameScene(
         scene.shape,
         scene.crosstalk,
         scene.background,
-        RangePrior(constant, power, mean, inverse_sd, log_mean, log_inverse_sd, low, high, False),
+        RangePrior(
+            constant, power, mean, inverse_sd, log_mean, log_inverse_sd, low, high, False, 1.0
+        ),
         scene.instrument,
         scene.flux_error,
         scene.offset,

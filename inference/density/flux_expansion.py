@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.range_integral import falls_off
-from inference.frame.arguments import FluxError, FrameScene, Instrument
+from inference.frame.arguments import FluxError, FrameScene
 from inference.frame.blocks import Block, frame_of
 from inference.frame.flux_error import cubic_weights, slope_weights
 from inference.frame.gaussian import (
@@ -22,6 +22,7 @@ from inference.frame.modes import LEFT, POSITION, RIGHT, SD, TOP
 from inference.frame.range_prior import (
     LEAST_INFORMATION,
     log_range_density,
+    log_resolved,
     prior_curvature,
     prior_slope,
 )
@@ -116,28 +117,24 @@ def expand(u: float, block: Block, scene: FrameScene) -> Expansion:
     if bend > 0.0:
         cross = squared_cross(slope, signal, mean, signal, instrument)
         free = (cross + held * stiff) / bend
-    information = LEAST_INFORMATION + told_by_light + told
     resolved, pushed, turn = _resolution(
-        information, Along(signal, signal_slope, mean, slope), instrument, prior.resolves
+        told_by_light + told, Along(signal, signal_slope, mean, slope), scene
     )
     return Expansion(density + resolved, along, bend, flux + pushed, mixed, stiff, free, turn)
 
 
 @compiled
-def _resolution(
-    information: float, along: Along, instrument: Instrument, resolves: bool
-) -> tuple[float, float, float]:
+def _resolution(information: float, along: Along, scene: FrameScene) -> tuple[float, float, float]:
     """Return what a reference prior adds to density, slope along log flux, and turn."""
-    if not resolves:
+    if not scene.range_prior.resolves:
         return 0.0, 0.0, 0.0
     signal, signal_slope, mean, slope = along
-    pushed = precision_product(signal_slope, slope, mean, signal, instrument)
-    turned = precision_product(signal, slope, mean, signal, instrument)
-    return (
-        0.5 * math.log(information / LEAST_INFORMATION),
-        pushed / information,
-        turned / information,
-    )
+    pushed = precision_product(signal_slope, slope, mean, signal, scene.instrument)
+    turned = precision_product(signal, slope, mean, signal, scene.instrument)
+    dark = scene.range_prior.dark
+    whole, lit = LEAST_INFORMATION + information, dark * LEAST_INFORMATION + information
+    rate = 2.0 / lit - 1.0 / whole
+    return log_resolved(information / LEAST_INFORMATION, dark), rate * pushed, rate * turned
 
 
 @compiled

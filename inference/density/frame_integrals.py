@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from inference.density.range_integral import integrate_range
 from inference.frame.arguments import Instrument, Rows, scene_of
 from inference.frame.blocks import Data, block_of, is_empty
+from inference.frame.dark_mass import with_dark_mass
 from inference.frame.log_density import empty_log_likelihood
 from inference.frame.modes import find_modes, room_for_modes
 from inference.frame.range_prior import integration_bounds
@@ -30,6 +31,7 @@ def fill_log_likelihoods(out: Array, rows: Rows, data: Data, instrument: Instrum
             out[i, :] = -math.inf
             continue
         table = tabulate(bounds, scene, data.strongest)
+        scene = with_dark_mass(table, scene)
         values = np.empty(table.shape[1])
         modes = room_for_modes(table)
         for b in range(out.shape[1]):

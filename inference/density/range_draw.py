@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from inference.density.range_integral import falls_off, integrate_range
 from inference.frame.arguments import FrameScene, Instrument, Rows, scene_of
 from inference.frame.blocks import Block, Data, block_of, is_empty
+from inference.frame.dark_mass import with_dark_mass
 from inference.frame.log_density import log_density
 from inference.frame.modes import (
     LEFT,
@@ -124,6 +125,7 @@ def fill_range_draws(
     for i in range(out.shape[0]):
         scene = scene_of(rows, instrument, i)
         table = tabulate(integration_bounds(scene.range_prior), scene, data.strongest)
+        scene = with_dark_mass(table, scene)
         values = np.empty(table.shape[1])
         modes = room_for_modes(table)
         for b in range(out.shape[1]):

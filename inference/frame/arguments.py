@@ -98,6 +98,8 @@ class RangePrior(NamedTuple):
         Whether the density is to be multiplied by what a frame resolves of its range: under a
         reference prior, but for maxima over ranges, where that is flat in log r. It is a number and
         no type, so that one machine code does for all priors, integrates and maximises.
+    dark : float
+        Factor on that where a frame resolves nothing (`inference.frame.dark_mass`).
     """
 
     constant: float
@@ -109,6 +111,7 @@ class RangePrior(NamedTuple):
     low: float
     high: float
     resolves: bool
+    dark: float = 1.0
 
 
 class FluxError(NamedTuple):
@@ -243,6 +246,7 @@ def scene_of(rows: Rows, instrument: Instrument, i: int) -> FrameScene:
             priors[i, 6],
             priors[i, 7],
             rows.resolves,
+            1.0,
         ),
         _instrument_of(instrument, instrument.r0, instrument.wave, rows.lags, i),
         _flux_error_of(rows.flux_errors, rows.flux_grid, i),

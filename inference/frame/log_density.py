@@ -25,6 +25,7 @@ from inference.frame.mean_readings import readings_along, readings_at, with_surr
 from inference.frame.range_prior import (
     LEAST_INFORMATION,
     log_range_density,
+    log_resolved,
     prior_curvature,
     prior_slope,
 )
@@ -52,21 +53,21 @@ def _information(u: float, gain: float, scene: FrameScene) -> float:
 
 @compiled
 def log_resolution(u: float, block: Block, scene: FrameScene) -> float:
-    """Return log sqrt(1 + I / I0), I the Fisher information of a block on its log r.
+    """Return the log of the reference prior of a block's log r, I its Fisher information.
 
     What is known of the range beside the readings is part of it: a range that is known exactly has
     no other law than that.
 
-    It is the density of the reference prior where the readings tell ranges apart, and that of a
-    log-uniform one where they do so to worse than I0 = `LEAST_INFORMATION`. Of any other prior
-    nobody asks for it: a call, which hands over all of a scene, takes longer than to look whether.
+    It is that of sqrt(I / I0) where the readings tell ranges apart, and log-uniform where they do
+    so to worse than I0 = `LEAST_INFORMATION`. Of any other prior nobody asks for it: a call, which
+    hands over all of a scene, takes longer than to look whether.
     """
     total = 0.0
     for j in range(frame_count(block)):
         frame = frame_of(block, j)
         total += _information(u, frame.gain, scene)
         total += known_information(math.exp(u), frame.known)
-    return 0.5 * math.log1p(max(total, 0.0) / LEAST_INFORMATION)
+    return log_resolved(max(total, 0.0) / LEAST_INFORMATION, scene.range_prior.dark)
 
 
 @inlined

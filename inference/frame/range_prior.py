@@ -9,6 +9,7 @@ __all__ = [
     "LEAST_INFORMATION",
     "integration_bounds",
     "log_range_density",
+    "log_resolved",
     "prior_curvature",
     "prior_slope",
 ]
@@ -34,6 +35,20 @@ def log_range_density(r: float, u: float, prior: RangePrior) -> float:
     logarithmic = (u - prior.log_mean) * prior.log_inverse_sd
     square = linear * linear + logarithmic * logarithmic
     return prior.constant + (prior.power + 1.0) * u - 0.5 * square
+
+
+@compiled
+def log_resolved(told: float, dark: float) -> float:
+    """Return the log of a reference prior along log r, but for a constant.
+
+    Parameters
+    ----------
+    told : float
+        Fisher information of a frame on its log r, in units of `LEAST_INFORMATION`.
+    dark : float
+        The law where nothing is told (`inference.frame.dark_mass`).
+    """
+    return math.log((told + dark) / math.sqrt(1.0 + told))
 
 
 @compiled

@@ -69,7 +69,8 @@ def _columns(u: Array, strongest: float, scene: FrameScene) -> Array:
     if prior.resolves:
         total = information(r, strongest, scene)
         total = np.where(total < 0.0, 0.0, total)
-        columns[LOG_PRIOR] += 0.5 * of_each(math.log1p, total / LEAST_INFORMATION)
+        told = total / LEAST_INFORMATION
+        columns[LOG_PRIOR] += of_each(math.log, (told + prior.dark) / np.sqrt(1.0 + told))
     signal, mean = light(r, scene)
     columns[SIGNAL_1], columns[SIGNAL_2] = signal
     columns[MEAN_1], columns[MEAN_2] = mean

@@ -6,7 +6,7 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.frame.arguments import Background, RangePrior
+from inference.frame.arguments import Background, RangePrior, prior_of
 from inference.frame.coordinates import coordinate_slopes
 from inference.frame.sensitivity import Sensitivity, sensitivity, whiteners
 from inference.frame.shadow_error import ShadowError, shadow_at, with_shadow_error
@@ -85,7 +85,7 @@ class Experiment:
     @property
     def range_prior(self) -> RangePrior:
         """The prior of a range at z."""
-        return RangePrior._make((*self.terms.ranges[0].tolist(), None))
+        return prior_of(self.terms.ranges[0])
 
     @functools.cached_property
     def readings(self) -> Sensitivity:

@@ -80,6 +80,13 @@ def information(sensor: Any, r: Array) -> Array:
     return np.asarray(np.square(slope / np.array(sensor.noise.read)[:, None]).sum(axis=0))
 
 
+def dark_of(sensor: Any, low: float, high: float) -> float:
+    """What readings alone do not resolve has the mass of one state, or less."""
+    u = np.linspace(math.log(low), math.log(high), 20_001)
+    unresolved = 5.0 / np.sqrt(1.0 + information(sensor, np.exp(u)) / 25.0)
+    return float(min(math.sqrt(2 * math.pi * math.e) / integrate.trapezoid(unresolved, u), 1.0))
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("sd", [1e-5, 0.003, 0.1])
@@ -94,6 +101,7 @@ def test_likelihood_against_quadrature(kind: str, law: str, sd: float) -> None:
     assert found[1] == plain[1]
     prior: Any = density.parameters.range_prior
     low, high = max(prior.low, 1e-4), min(prior.high, 10.0)
+    dark = dark_of(sensor, low, prior.high) if law == "reference" else 1.0
     for j in (0, 2):
 
         def log_density(u: Array, j: int = j) -> Array:
@@ -101,7 +109,8 @@ def test_likelihood_against_quadrature(kind: str, law: str, sd: float) -> None:
             value = pointwise(sensor, frames.readings[j], r)
             value = value - 0.5 * ((r - told[j]) / sd) ** 2
             if law == "reference":
-                value = value + 0.5 * np.log1p((information(sensor, r) + (r / sd) ** 2) / 25.0)
+                resolved = (information(sensor, r) + (r / sd) ** 2) / 25.0
+                value = value + np.log((resolved + dark) / np.sqrt(1.0 + resolved))
             else:
                 value = value + u + prior.log_density(r)
             return np.asarray(value)

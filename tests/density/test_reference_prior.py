@@ -10,6 +10,7 @@ from scipy import integrate, stats
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.density.discrepant import with_discrepancy
+from inference.frame.dark_mass import DARK_MASS
 from inference.frame.range_prior import LEAST_INFORMATION
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
@@ -18,7 +19,7 @@ from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import PulsedSensor, Sensor, parse_sensor
 from simulator.simulate import simulate
-from simulator.trajectories import RadialTrajectory
+from simulator.trajectories import RadialTrajectory, SampledTrajectory
 from tests.density.discrepancy_reference import matern_path_covariance
 from tests.posterior.scenes import KINDS, OBJECT, UNKNOWN_CROSSTALK, data, sensor_of
 
@@ -72,31 +73,52 @@ def covariances(sensor: Sensor, mean: Array, own: Array) -> Array:
     return np.asarray(matrix + light[:, :, None] * light[:, None, :])
 
 
-def log_densities(sensor: Sensor, scene: dict[str, Any], reading: Array, u: Array) -> Array:
-    """One frame's log density, plus that of the root of one plus a 25th of its information."""
+def told_at(sensor: Sensor, scene: dict[str, Any], u: Array) -> Array:
+    """A frame's Fisher information on its log r, in units of the least."""
     mean, own = readings_at(sensor, u, scene)
     ahead, behind = (readings_at(sensor, u + h, scene)[0] for h in (1e-5, -1e-5))
-    slope, e = ((ahead - behind) / 2e-5).T, reading - mean.T
-    matrix = covariances(sensor, mean, own)
-    square, information = (
-        np.einsum("nj,nj->n", side, np.linalg.solve(matrix, side[:, :, None])[:, :, 0])
-        for side in (e, slope)
-    )
+    slope = ((ahead - behind) / 2e-5).T
+    solved = np.linalg.solve(covariances(sensor, mean, own), slope[:, :, None])[:, :, 0]
+    return np.asarray(np.einsum("nj,nj->n", slope, solved) / LEAST_INFORMATION)
+
+
+def dark_of(sensor: Sensor, scene: dict[str, Any]) -> float:
+    """By what the law is less in the dark: there it has the mass of one state, or less.
+
+    Told apart by read and shot noise alone.
+    """
+    read = sensor.noise.model_copy(update={"relative": 0.0})
+    plain = sensor.model_copy(update={"noise": read})
+    u = np.linspace(math.log(SPAN["low"]), math.log(SPAN["high"]), 4001)
+    share = 1.0 / np.sqrt(1.0 + told_at(plain, scene, u))
+    mass = math.sqrt(LEAST_INFORMATION) * float(integrate.simpson(share, x=u))
+    return min(DARK_MASS / mass, 1.0)
+
+
+def log_densities(
+    sensor: Sensor, scene: dict[str, Any], reading: Array, u: Array, dark: float
+) -> Array:
+    """One frame's log density and that of the law."""
+    mean, own = readings_at(sensor, u, scene)
+    e, matrix = reading - mean.T, covariances(sensor, mean, own)
+    solved = np.linalg.solve(matrix, e[:, :, None])[:, :, 0]
+    square = np.einsum("nj,nj->n", e, solved)
     log_density = -0.5 * (square + np.log(np.linalg.det(matrix))) - math.log(2 * math.pi)
-    return np.asarray(log_density + 0.5 * np.log1p(information / LEAST_INFORMATION))
+    told = told_at(sensor, scene, u)
+    return np.asarray(log_density + np.log((told + dark) / np.sqrt(1.0 + told)))
 
 
 def by_quadrature(sensor: Sensor, scene: dict[str, Any], reading: Array) -> float:
     """Integrate a frame over a grid that is graded around its best range."""
     low, high = math.log(SPAN["low"]), math.log(SPAN["high"])
-    grid = np.linspace(low, high, 800)
+    grid, dark = np.linspace(low, high, 800), dark_of(sensor, scene)
     for _ in range(3):
-        values = log_densities(sensor, scene, reading, grid)
+        values = log_densities(sensor, scene, reading, grid, dark)
         best = grid[int(np.argmax(values))]
         near = grid[values > values.max() - 20.0]
         width = float(np.ptp(near)) + 2 * (grid[1] - grid[0])  # seen, and what a step may hide
         grid = np.linspace(max(best - width, low), min(best + width, high), 1601)
-    values = log_densities(sensor, scene, reading, grid)
+    values = log_densities(sensor, scene, reading, grid, dark)
     return float(values.max() + math.log(integrate.simpson(np.exp(values - values.max()), x=grid)))
 
 
@@ -133,6 +155,26 @@ def test_only_the_distance_from_the_curve_counts(kind: str) -> None:
     assert (found < top + 1e-4).all()
     # six chi-squares of one degree: beyond 40 once in 1e6 runs
     assert -2 * (found - top).sum() < 40.0
+
+
+@pytest.mark.parametrize("far", [8.0, 14.0])
+def test_a_frame_in_the_dark_is_no_more_probable_than_another(kind: str, far: float) -> None:
+    """Else crosstalk that alone explains some frames gains a factor with each of them.
+
+    However far the law reaches: under sqrt(I0 + I) each gained 0.8 and 1.1 nat here.
+    """
+    count, sensor = 4000, sensor_of(kind, 10.0)
+    scene = {"object": OBJECT, "range_m": {"prior": "reference", "low": 0.02, "high": far}}
+    found = []
+    for at in (0.15, far):
+        path = SampledTrajectory(range_m=[at] * count)
+        seen = simulate(sensor, parse_scene({"object": OBJECT, "discrepancy": 0}), path, 4).frames
+        found.append(density_of(sensor, scene, seen).frame_log_likelihoods(NOTHING)[0])
+    lit, dark = found
+    # half of a chi-square of one degree and of one of two scatter by 0.7 and 1 nat a frame; the
+    # curve itself, up to its end, adds a quarter to what is in the dark at most
+    error = math.sqrt((0.5 + 1.0) / count)
+    assert -4 * error < dark.mean() - lit.mean() < math.log(1.25) + 4 * error
 
 
 @pytest.mark.parametrize("scale", [1e-12, 1e12])
@@ -196,7 +238,7 @@ def test_a_range_is_drawn_from_what_is_integrated(kind: str) -> None:
     density = density_of(sensor, scene, frames)
     drawn = density.draw_log_ranges(np.empty((4000, 0)), np.random.default_rng(5))[:, 0]
     u = np.linspace(math.log(SPAN["low"]), math.log(SPAN["high"]), 3001)
-    mass = np.exp(log_densities(sensor, scene, frames.readings[0], u))
+    mass = np.exp(log_densities(sensor, scene, frames.readings[0], u, dark_of(sensor, scene)))
     law = np.concatenate([[0.0], np.cumsum(mass[1:] + mass[:-1])])
     # one test in a thousand fails by chance, and the seed is fixed
     assert stats.kstest(drawn, lambda x: np.interp(x, u, law / law[-1])).pvalue > 1e-3

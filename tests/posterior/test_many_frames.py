@@ -91,12 +91,12 @@ def test_a_few_hundred_frames_have_the_likelihood_of_all(kind: str) -> None:
 
 
 def test_the_bias_of_many_frames_is_measured() -> None:
-    """At an SNR of 77 and 4000 frames it is some standard deviations, and is known to one in 1.2.
+    """At an SNR of 20 and 4000 frames it is two standard deviations, and is known to one in 1.2.
 
     Compared with where the optimum lies off the truth, whose noise is one standard deviation:
     tested at 4 of both together (false alarm 2e-4 for three parameters).
     """
-    sensor = sensor_of("pulsed", 77.0)
+    sensor = sensor_of("pulsed", 20.0)
     density, z = density_and_truth(sensor, frames_of(sensor, 4000, (0.3, 3.0))[0])
     rng = np.random.default_rng(1)
     _, optima, _ = represent(density, [optimum_of_some(density, z)], rng)

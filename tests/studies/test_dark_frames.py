@@ -13,12 +13,14 @@ def test_the_floor_of_the_information_is_the_one_of_least_bias() -> None:
     ranges are spread is what misleads.
     """
     at = dict(zip(FLOORS.tolist(), range(FLOORS.size), strict=True))
-    ours = at[float(np.sqrt(LEAST_INFORMATION))]
+    ours, stands = at[float(np.sqrt(LEAST_INFORMATION))], -1
     least, found = bias(Case("wall", 100.0, 0.2, 4.0, False), 12)
     assert least < 1.0
     assert found[ours] < found[at[1.0]] - 0.8
+    assert found[stands] < found[at[1.0]] - 0.8
     least, found = bias(Case("crosstalk", 100.0, 0.2, 2.0, True), 12)
     assert least > 5.0
     assert found[ours] < 2.0
+    assert found[stands] < 2.0
     assert found[at[np.inf]] > 5.0
     assert found[at[40.0]] > 2 * found[ours]
