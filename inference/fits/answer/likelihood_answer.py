@@ -31,6 +31,7 @@ from inference.fits.answer.report import (
     spoiled,
 )
 from inference.fits.likelihood.erring import Erring, contradicting, erring_maxima, softened
+from inference.fits.likelihood.erring_profile import profiles
 from inference.fits.likelihood.erring_valley import valleys
 from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.law_mode import law_modes
@@ -215,7 +216,11 @@ def _searched(problem: FitProblem, starts: Sequence[Maximum]) -> tuple[list[Erri
     for _ in range(_WALKS):
         mode = found[0].clean.mode
         alike = [one for one in found if one.clean.mode is mode]
-        along, better = valleys(dataclasses.replace(problem, mode=mode), alike)
+        alone = dataclasses.replace(problem, mode=mode)
+        along, better = valleys(alone, alike)
+        if better is None:
+            more, better = profiles(alone, found[0])
+            along += more
         if better is None or not better.deviance < found[0].deviance:
             break
         found.insert(0, better)

@@ -182,10 +182,10 @@ def _merged(u: Array, sd: Array, excess: Array) -> tuple[list[int], bool]:
 
 
 def _reaches(problem: FitProblem, best: Array, points: Sequence[tuple[float, Array]]) -> Array:
-    """Return how far each frame's log range moves to other values, per standard deviation, (n,)."""
+    """Return how far each range moves to other values, relative, per standard deviation, (n,)."""
     reach = np.zeros(problem.frames.shape[0])
     for excess, positions in points:
-        away = np.abs(positions - best) / math.sqrt(max(excess, WITHIN))
+        away = np.abs(np.expm1(positions - best)) / math.sqrt(max(excess, WITHIN))
         reach = np.fmax(reach, away)
     return reach
 
