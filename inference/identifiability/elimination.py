@@ -8,9 +8,19 @@ from numpy.typing import NDArray
 from inference.frame.known_range import free_of_range
 from inference.identifiability.information import Information
 
-__all__ = ["eliminate"]
+__all__ = ["eliminate", "moving"]
 
 Array = NDArray[np.float64]
+
+# standard deviations of noise by which a factor of e in range moves a reading, below which it moves
+# none: the variance of that range would be no number
+_LEAST = 1e-150
+
+
+def moving(along_range: Array) -> NDArray[np.bool_]:
+    """Return which frames' readings depend on their range, shape (n,), of derivatives (n, 2)."""
+    with np.errstate(invalid="ignore"):  # nan of a frame without object compares as still
+        return np.asarray(np.linalg.norm(along_range, axis=1) > _LEAST)
 
 
 def eliminate(
@@ -47,8 +57,7 @@ def eliminate(
     both = np.concatenate([jacobian, errors], axis=2)
     empty = np.asarray(np.isnan(along_range).any(axis=1))
     along = np.where(empty[:, None], 0.0, along_range)
-    length = np.linalg.norm(along, axis=1)
-    moves = length > 0
+    length, moves = np.linalg.norm(along, axis=1), moving(along)
     sizes = np.linalg.norm(jacobian, axis=1)
     whole = both[~moves]
     response, variance = np.zeros((n, d + k)), np.full(n, np.inf)

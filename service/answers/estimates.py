@@ -96,6 +96,7 @@ class TechniqueFit(pydantic.BaseModel):
     misfit: bool
     reasons: list[str] = []
     checks: dict[str, float] = {}
+    by_priors: bool = False
     rank: int
     widening: float | None = None
     optima: list[FittedOptimum]

@@ -164,5 +164,6 @@ async def create(
         try:
             content = await shared.processes.run(request, answer, asked, shape)
         except OverdueError as error:
-            raise OverdueError(f"{error}: ask for a posterior, or send fewer frames") from None
+            remedy = "ask for a posterior, state numbers as known, or send fewer frames"
+            raise OverdueError(f"{error}: {remedy}") from None
     return Response(content, media_type="application/json")

@@ -63,6 +63,13 @@ class NormalDistribution(Distribution):
                 return np.asarray(np.exp(position) if self.log else position)
         return Distribution.from_normal(self, z, low, high)
 
+    def to_normal(self, x: Any, low: Any = -np.inf, high: Any = np.inf) -> Array:
+        """As `Distribution.to_normal`, for an uncut law without its bounds."""
+        if not self._cut_by(low, high):
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                return self._standard(self._coordinate(x))
+        return Distribution.to_normal(self, x, low, high)
+
     def _cut_by(self, low: Any, high: Any) -> bool:
         """Tell whether anything is cut away; bounds of many laws at once count as a cut."""
         end = 0.0 if self.log else -math.inf

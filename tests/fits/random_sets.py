@@ -2,21 +2,27 @@
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inference.estimate import estimate
 from inference.fits.answer.determined import LIMIT
 from inference.fits.answer.inflation import inflation
+from inference.fits.likelihood.erring import erring_maxima
 from inference.fits.likelihood.information import residuals_and_information
-from inference.fits.likelihood.maximum import maximum_from
-from inference.fits.likelihood.problem import fit_problem
+from inference.fits.likelihood.maximum import Maximum, maximum_from
+from inference.fits.likelihood.prior_maxima import prior_maxima
+from inference.fits.likelihood.problem import FitProblem, fit_problem
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor, parse_sensor
 from simulator.simulate import Simulation, simulate
 from simulator.trajectories import SampledTrajectory
 from tests.fits.scenes import values_of
+
+Array = NDArray[np.float64]
 
 CLASSES = ("object", "crosstalk", "known background", "free shadow", "everything")
 _NOISE = {"free shadow": (3.0, 5.0), "everything": (4.0, 6.0)}  # decades of SNR, else 2 to 4
@@ -124,7 +130,8 @@ class Outcome:
     Attributes
     ----------
     excess : float
-        Deviance above that of a start at the truth; nan where the fit was refused.
+        Deviance of the best optimum above that of a start at the truth; nan where the fit was
+        refused.
     refused : bool
         Whether the fit was refused.
     shared : float
@@ -134,6 +141,8 @@ class Outcome:
         (log r - truth) / standard deviation of every range that is unique.
     seconds : float
         Run time as the result states it.
+    by_priors : bool
+        Whether the priors of the unknowns count.
     """
 
     excess: float
@@ -141,6 +150,7 @@ class Outcome:
     shared: float
     misses: tuple[float, ...]
     seconds: float
+    by_priors: bool = False
 
     @property
     def right(self) -> bool:
@@ -176,8 +186,23 @@ def outcome_of(one: RandomSet) -> Outcome:
         return Outcome(math.nan, True, shared, (), math.nan)
     (result,) = found.results
     assert result.fit is not None
-    best = result.fit["deviance"]
-    excess = best - reference.deviance
+    excess = best_of(result.fit) - reference.deviance
+    if result.fit["by_priors"]:
+        excess = best_of(result.fit) - best_with_priors(one, problem, truth)
     miss = np.log(result.range_m / one.simulation.range_m) / (result.sd_m / result.range_m)
     misses = tuple(miss[np.isfinite(miss)].tolist())
-    return Outcome(float(excess), False, shared, misses, result.runtime_s)
+    by_priors = bool(result.fit["by_priors"])
+    return Outcome(float(excess), False, shared, misses, result.runtime_s, by_priors)
+
+
+def best_of(fit: Mapping[str, Any]) -> float:
+    """Return the least deviance that a fit has found."""
+    return float(fit["deviance"] + min(one["excess_deviance"] for one in fit["optima"]))
+
+
+def best_with_priors(one: RandomSet, problem: FitProblem, truth: Array) -> float:
+    """Return the deviance of a climb from the truth where the priors count, or the model errs."""
+    start = Maximum(truth, 0.0, math.inf, np.log(one.simulation.range_m))
+    if problem.erring:
+        return erring_maxima(problem, [start])[0].deviance
+    return prior_maxima(dataclasses.replace(problem, priors=True), [start])[0].deviance

@@ -65,6 +65,17 @@ def test_against_fifty_digits(system: System) -> None:
     assert found.sd == pytest.approx(sd, rel=tolerance)
 
 
+@pytest.mark.parametrize("common", [False, True])
+def test_a_range_that_moves_readings_by_no_number_is_one_that_moves_none(common: bool) -> None:
+    """The variance of its log, one over the square of 1e-157, overflowed."""
+    jacobian = np.random.default_rng(1).normal(size=(2, 2, 1))
+    still = eliminate(("a",), jacobian, np.zeros((2, 2)), common_range=common)
+    found = eliminate(("a",), jacobian, np.full((2, 2), 1e-157), common_range=common)
+    assert np.isposinf(found.own_variance).all()
+    np.testing.assert_array_equal(found.jacobian, still.jacobian)
+    np.testing.assert_array_equal(found.response, still.response)
+
+
 @pytest.mark.parametrize(("unknown", "shared"), [(A, True), (B, False)])
 @pytest.mark.parametrize("noise", ["P", "A"])
 def test_each_distinct_range_tells_one_number(

@@ -4,7 +4,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from inference.estimates import TechniqueResult
 from inference.fits.answer.counts import ranges_needed
 from inference.fits.answer.motion_seen import numbers_shown
 from inference.fits.answer.ranges import DECIDED, WITHIN
@@ -19,12 +21,19 @@ from simulator.errors import RefusedError, listed
 
 __all__ = [
     "LIMIT",
+    "LeftOpenError",
     "noise_may_be_followed",
     "off_the_top",
     "refuse_if_noise_was_followed",
     "refuse_if_open",
     "refuse_if_undetermined",
+    "tells_nothing",
 ]
+
+
+class LeftOpenError(RefusedError):
+    """Frames alone leave open how large the ranges are; what is known of the scene may tell it."""
+
 
 _SEEN_WITHOUT_OBJECT = (*CROSSTALK, Value.STRENGTH, Value.DISTANCE)
 
@@ -61,21 +70,25 @@ def _less_noise(problem: FitProblem) -> str:
     )
 
 
-def off_the_top(top: Maximum) -> float:
+def off_the_top(top: Maximum, unlike: bool = False) -> float:
     """Return how many standard deviations an end point of the search is off its optimum.
 
     Parameters
     ----------
     top : Maximum
         The best end point.
+    unlike : bool
+        Whether the readings are unlike the model whatever a last step gains.
 
     Raises
     ------
     RefusedError
-        Where the search ended so far below the top that what is left says nothing of it.
+        Where the search ended so far below the top that what is left says nothing of it: a
+        LeftOpenError unless ``unlike``, which no prior of the scene mends.
     """
     if not top.remaining <= _REMAINING:
-        raise RefusedError(
+        kind = RefusedError if unlike else LeftOpenError
+        raise kind(
             "the search stopped before the best values were reached (a step would still take "
             f"{top.remaining:.2g} off chi-square); state a number as known, or use a posterior"
         )
@@ -173,7 +186,7 @@ def refuse_if_open(
 
     Raises
     ------
-    RefusedError
+    LeftOpenError
         Where the ranges share a relative standard deviation above `LIMIT`, there or at another
         optimum as far as the intervals of 95 % reach.
     """
@@ -191,14 +204,14 @@ def refuse_if_open(
             if item["status"] != "identified"
         ]
         if of_noise <= LIMIT:
-            raise RefusedError(
+            raise LeftOpenError(
                 f"errors of the model (discrepancy) leave the ranges a common relative standard "
                 f"deviation of {typical:.2g}, more than {LIMIT:g}: "
                 f"{listed(open_ones or list(problem.names))} are too uncertain; state a number as "
                 "known, a smaller discrepancy if the object is nearer to the model, or use a "
                 "posterior with priors"
             )
-        raise RefusedError(
+        raise LeftOpenError(
             f"the ranges would have a common relative standard deviation of {typical:.2g}, more "
             f"than {LIMIT:g}: {listed(open_ones or list(problem.names))} are too uncertain; "
             f"{_less_noise(problem)}"
@@ -210,8 +223,24 @@ def refuse_if_open(
         shared = there.sd_of(there.response[problem.present & np.isfinite(other.positions)])
         typical = float(np.median(shared)) * math.sqrt(1.0 - excess / WITHIN)
         if not typical <= LIMIT:
-            raise RefusedError(
+            raise LeftOpenError(
                 f"other values of the unknowns explain the frames nearly as well (chi-square "
                 f"{excess:.2g} higher), and with them the ranges would have a common relative "
                 f"standard deviation of {typical:.2g}, more than {LIMIT:g}; {_less_noise(problem)}"
             )
+
+
+def tells_nothing(answer: TechniqueResult, state: NDArray[np.uint8]) -> bool:
+    """Tell whether an answer leaves most ranges more open than by a factor of e.
+
+    Parameters
+    ----------
+    answer : TechniqueResult
+        Of a fit; one that says misfit tells that.
+    state : ndarray of uint8, shape (n,)
+        What rules frames out, 0 where nothing does.
+    """
+    if answer.fit is None or answer.fit["misfit"]:
+        return False
+    spread = (answer.sd_m / answer.range_m)[state == 0]
+    return not np.median(np.where(np.isfinite(spread), spread, np.inf)) <= LIMIT

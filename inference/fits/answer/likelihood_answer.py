@@ -10,21 +10,32 @@ from numpy.typing import NDArray
 from inference.estimates import TechniqueResult
 from inference.fits.answer.blamed import blamed
 from inference.fits.answer.determined import (
+    LeftOpenError,
     noise_may_be_followed,
     off_the_top,
     refuse_if_noise_was_followed,
     refuse_if_open,
     refuse_if_undetermined,
+    tells_nothing,
 )
 from inference.fits.answer.inflation import inflation, shift_of
 from inference.fits.answer.larger_error import DOUBLINGS, evidence_of, is_default, twice_as_large
 from inference.fits.answer.model_checks import model_checks
 from inference.fits.answer.profile_scan import profile_scan
-from inference.fits.answer.ranges import CONTRADICTION, DECIDED, WITHIN, Answer, frame_ranges
+from inference.fits.answer.ranges import (
+    CONTRADICTION,
+    DECIDED,
+    WITHIN,
+    Answer,
+    Beside,
+    beside,
+    frame_ranges,
+)
 from inference.fits.answer.report import (
     DOUBTFUL,
     FALSE_ALARM,
     describe,
+    disputed,
     doubt_of,
     fit_report,
     p_value_of,
@@ -33,12 +44,16 @@ from inference.fits.answer.report import (
 from inference.fits.likelihood.erring import Erring, contradicting, erring_maxima, softened
 from inference.fits.likelihood.erring_profile import profiles
 from inference.fits.likelihood.erring_valley import valleys
+from inference.fits.likelihood.held_walks import held_walks
 from inference.fits.likelihood.information import residuals_and_information
+from inference.fits.likelihood.integrated import with_integrated_first
 from inference.fits.likelihood.law_mode import law_modes
 from inference.fits.likelihood.maximum import TOP, Maximum, maximum_from
-from inference.fits.likelihood.multistart import find_maxima, find_starts
+from inference.fits.likelihood.multistart import find_maxima, find_near, find_starts
 from inference.fits.likelihood.places import places_of
+from inference.fits.likelihood.prior_maxima import prior_maxima
 from inference.fits.likelihood.problem import FitProblem, fit_problem
+from inference.fits.likelihood.range_walks import range_walks
 from inference.fits.likelihood.told import known_ranges
 from inference.realtime.net import SATURATED, rule_out
 from inference.technique import Task
@@ -84,14 +99,26 @@ def likelihood_answer(
     if not task.exact:
         law = problem.parameters.law is not None
         known = known_ranges(frames, problem.support)
-        places = places_of(problem.frames, problem.present, problem.instrument)
+        places = None
+        if problem.object_errs:  # an exact model leaves nothing for them to share
+            places = places_of(problem.frames, problem.present, problem.instrument)
         problem = dataclasses.replace(problem, law=law, known=known, places=places)
     found = _found(problem) if values is None else _found_from(problem, values)
     optima = [optimum for optimum in found if np.isfinite(optimum.deviance)]
     if not optima:
         raise RefusedError(_NO_LIKELIHOOD)
-    answer = _erring_answer if problem.erring else _exact_answer
-    return answer(name, problem, optima, state)
+    if problem.erring:
+        return _erring_answer(name, problem, optima, state)
+    try:
+        return _exact_answer(name, problem, optima, state)
+    except LeftOpenError:
+        if task.exact or values is not None:  # asked for what the frames alone say
+            raise
+        problem = dataclasses.replace(problem, priors=True)
+        answer = _erring_answer(name, problem, [*optima, *find_near(problem)], state)
+        if tells_nothing(answer, state):
+            raise
+        return answer
 
 
 def _found(problem: FitProblem) -> Sequence[Maximum]:
@@ -110,7 +137,12 @@ def _found(problem: FitProblem) -> Sequence[Maximum]:
 
 def _explains(problem: FitProblem, top: Maximum) -> bool:
     residual, _ = residuals_and_information(problem, top.x, top.positions)
-    return p_value_of(problem, float(np.square(residual).sum())) >= FALSE_ALARM
+    return not _unlike(problem, float(np.square(residual).sum()))
+
+
+def _unlike(problem: FitProblem, chi_square: float) -> bool:
+    """Return whether noise alone makes no such chi-square, of frames that the model explains."""
+    return p_value_of(problem, max(chi_square, 0.0)) < FALSE_ALARM
 
 
 def _found_from(problem: FitProblem, values: dict[str, float]) -> list[Maximum]:
@@ -145,9 +177,9 @@ def _exact_answer(
         if not scanned:  # a better optimum was met on every walk
             scanned, _ = profile_scan(problem, top, facts, always=True)
         refuse_if_noise_was_followed(problem, top, scanned)
-    wider = math.hypot(wider, off_the_top(top))
     residual, facts = residuals_and_information(problem, top.x, top.positions)
     chi_square = float(np.square(residual).sum())
+    wider = math.hypot(wider, off_the_top(top, _unlike(problem, chi_square - top.remaining)))
     doubt = doubt_of(problem, chi_square)
 
     def with_excess(found: Sequence[Maximum]) -> list[tuple[float, Maximum]]:
@@ -173,7 +205,7 @@ def _exact_answer(
         state,
         spoiled(parameters, report) if report["misfit"] else parameters,
         report,
-        [(excess, one.positions) for excess, one in points],
+        [Beside(excess, one.positions) for excess, one in points],
         doubt=doubt,
     )
 
@@ -204,10 +236,9 @@ def _probability(problem: FitProblem, top: Erring) -> float:
 def _searched(problem: FitProblem, starts: Sequence[Maximum]) -> tuple[list[Erring], list[Erring]]:
     """Return the maxima, the best first, and points along their valleys."""
     modes = law_modes(problem.parameters.law) if problem.law else (None,)
+    climb, follow = (prior_maxima, range_walks) if problem.priors else (erring_maxima, valleys)
     found = [
-        end
-        for mode in modes
-        for end in erring_maxima(dataclasses.replace(problem, mode=mode), starts)
+        end for mode in modes for end in climb(dataclasses.replace(problem, mode=mode), starts)
     ]
     if not found:
         raise RefusedError(_NO_LIKELIHOOD)
@@ -217,14 +248,21 @@ def _searched(problem: FitProblem, starts: Sequence[Maximum]) -> tuple[list[Erri
         mode = found[0].clean.mode
         alike = [one for one in found if one.clean.mode is mode]
         alone = dataclasses.replace(problem, mode=mode)
-        along, better = valleys(alone, alike)
-        if better is None:
+        along, better = follow(alone, alike)
+        if better is None and not problem.priors:
             more, better = profiles(alone, found[0])
             along += more
         if better is None or not better.deviance < found[0].deviance:
             break
         found.insert(0, better)
+    if problem.priors:
+        return with_integrated_first(found, along)
     return found, along
+
+
+def _alone(one: Erring, excess: float) -> Beside:
+    """Return other values without noise: what errs has no frame as sure as that."""
+    return Beside(excess, one.positions)
 
 
 def _erring_answer(
@@ -239,8 +277,7 @@ def _erring_answer(
     contradicted = contradicting(top, problem)
     wider, doubt = 1.0, doubt_of(problem, top.chi_square)
     # of readings that the model cannot make, whatever a last step would gain, that is to be said
-    unlike = p_value_of(problem, max(top.chi_square - top.remaining, 0.0)) < FALSE_ALARM
-    if not contradicted and not unlike:
+    if not contradicted and not _unlike(problem, top.chi_square - top.remaining):
         wider = math.hypot(1.0, off_the_top(top))
         refuse_if_open(top.clean, top, top.facts, wider * math.sqrt(doubt), whole=top.whole)
     decided = top.deviance + doubt * DECIDED
@@ -257,6 +294,14 @@ def _erring_answer(
         report["misfit"] = True
         report["reasons"].append(CONTRADICTION)
     parameters = describe(top.clean, top, top.facts, widening, near, top.whole)
+    if problem.priors:
+        told = [parameters[name]["status"] == "identified" for name in problem.names]
+        near += held_walks(problem, top, np.flatnonzero(told).tolist())
+        parameters = describe(top.clean, top, top.facts, widening, near, top.whole)
+        alone = describe(top.clean, top, top.facts, widening, (), top.whole)
+        places = [problem.natural(one.x) for one in found[1:] if one.deviance <= decided]
+        elsewhere = {name: [x[j] for x in places] for j, name in enumerate(problem.names)}
+        parameters = disputed(parameters, alone, elsewhere)
     return frame_ranges(
         name,
         problem,
@@ -268,7 +313,7 @@ def _erring_answer(
         spoiled(parameters, report) if report["misfit"] else parameters,
         report,
         [
-            ((one.deviance - top.deviance) / doubt, one.positions)
+            (beside if problem.priors else _alone)(one, (one.deviance - top.deviance) / doubt)
             for one in near
             if one.clean.mode is top.clean.mode
         ],

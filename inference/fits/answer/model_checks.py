@@ -25,6 +25,7 @@ from inference.fits.likelihood.erring_point import (
 )
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import eliminated
+from inference.identifiability.elimination import moving
 
 __all__ = ["REASONS", "Check", "Rows", "basis", "model_checks", "rows_of", "without_size"]
 
@@ -110,8 +111,7 @@ def rows_of(problem: FitProblem, top: Erring) -> Rows:
 
 def _frames_of_rows(along: Array, told: bool) -> NDArray[np.intp]:
     """Return of which frame each row is, in the order of `eliminate`."""
-    with np.errstate(invalid="ignore"):
-        moves = np.linalg.norm(along, axis=1) > 0.0
+    moves = moving(along)
     still = np.repeat(np.flatnonzero(~moves), 2)
     beside = np.repeat(np.arange(len(along) if told else 0), 2)
     return np.concatenate([np.flatnonzero(moves), still, beside])
@@ -159,6 +159,7 @@ def model_checks(problem: FitProblem, top: Erring) -> dict[str, Check]:
     d = top.x.size
     of_priors = followed[rows.target.size - d :]
     share, turn = np.linalg.eigh(np.eye(d) - of_priors @ of_priors.T)
+    share = np.minimum(share, 1.0)  # rounding makes more of it where frames tell all
     free = share > _FREE
     share, turn = share[free], turn[:, free]
     off = turn.T @ target[rows.target.size - d :]

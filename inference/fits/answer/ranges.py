@@ -8,7 +8,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,16 @@ from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.problem import FitProblem
 from inference.realtime.net import ABSENT, COMMON_REASONS, SATURATED
 
-__all__ = ["CONTRADICTION", "DECIDED", "MISFIT", "WITHIN", "Answer", "frame_ranges"]
+__all__ = [
+    "CONTRADICTION",
+    "DECIDED",
+    "MISFIT",
+    "WITHIN",
+    "Answer",
+    "Beside",
+    "beside",
+    "frame_ranges",
+]
 
 Array = NDArray[np.float64]
 
@@ -75,6 +84,24 @@ class Answer:
     of_x: Array | None = None
     erring: Erring | None = None
     wider: float = 1.0
+
+
+class Beside(NamedTuple):
+    """Other values of the unknowns that are not decided against.
+
+    Attributes
+    ----------
+    excess : float
+        Deviance above the best answer's.
+    log_r : ndarray, shape (n,)
+        The ranges there.
+    noise : ndarray, shape (n,), or float
+        How far each frame's own noise reaches from there, a standard deviation of log r.
+    """
+
+    excess: float
+    log_r: Array
+    noise: Array | float = 0.0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -133,6 +160,8 @@ def _modes(problem: FitProblem, answers: Sequence[Answer]) -> tuple[_Modes, Arra
                 with np.errstate(invalid="ignore"):
                     known = np.square(noise[:, k]) + np.square(shared)
                     model[:, k] = np.sqrt(np.maximum(np.square(whole) - known, 0.0))
+                if not erring.a.size:  # but for rounding
+                    model[:, k] = 0.0
                 shared = answer.wider * shared
                 model[:, k] *= answer.wider
                 deviance[:, k] = np.where(np.isfinite(u[:, k]), square, np.inf)
@@ -181,12 +210,25 @@ def _merged(u: Array, sd: Array, excess: Array) -> tuple[list[int], bool]:
     return kept, merged
 
 
-def _reaches(problem: FitProblem, best: Array, points: Sequence[tuple[float, Array]]) -> Array:
+def beside(one: Erring, excess: float) -> Beside:
+    """Return other values, and how far each frame's own noise reaches from its range there.
+
+    A frame that is all but in the dark there may be bright at the best values, and sure of itself.
+    """
+    modes, _, reaches = frame_reaches(one.clean, one.x)
+    away = np.abs(modes - one.positions[:, None])
+    nearest = np.where(np.isfinite(away), away, np.inf).argmin(axis=1)
+    noise = np.take_along_axis(reaches, nearest[:, None], axis=1)[:, 0]
+    return Beside(excess, one.positions, np.where(np.isfinite(noise), noise, 0.0))
+
+
+def _reaches(problem: FitProblem, best: Array, points: Sequence[Beside]) -> Array:
     """Return how far each range moves to other values, relative, per standard deviation, (n,)."""
     reach = np.zeros(problem.frames.shape[0])
-    for excess, positions in points:
-        away = np.abs(np.expm1(positions - best)) / math.sqrt(max(excess, WITHIN))
-        reach = np.fmax(reach, away)
+    for excess, positions, noise in points:
+        away = np.abs(np.expm1(positions - best))
+        away += np.exp(positions - best) * noise * math.sqrt(max(WITHIN - excess, 0.0))
+        reach = np.fmax(reach, away / math.sqrt(max(excess, WITHIN)))
     return reach
 
 
@@ -197,7 +239,7 @@ def frame_ranges(
     state: NDArray[np.uint8],
     parameters: Mapping[str, Any],
     fit: Mapping[str, Any],
-    points: Sequence[tuple[float, Array]] = (),
+    points: Sequence[Beside] = (),
     contradicted: Collection[int] = (),
     doubt: float = 1.0,
 ) -> TechniqueResult:
@@ -216,11 +258,10 @@ def frame_ranges(
         or saturated are, in order, those of the problem.
     parameters, fit : mapping
         As in `TechniqueResult`. A fit that says of itself that it misfits gives no ranges.
-    points : sequence of (float, ndarray of shape (n,))
-        Other values that are not decided against, none of them an optimum: their deviance above
-        the best and the log ranges there. Standard deviations of the best answer are widened until
-        such ranges lie as far out as their deviance says, or in the interval of 95 % if that
-        reaches them.
+    points : sequence of Beside
+        Other values that are not decided against, none of them an answer. Standard deviations of
+        the best answer are widened until such ranges lie as far out as their deviance says, or in
+        the interval of 95 % if that reaches them, with as much of their noise as is left of it.
     contradicted : collection of int
         Frames of the problem whose readings and known ranges contradict one another.
     doubt : float

@@ -19,6 +19,7 @@ from simulator.parameters import Parameters
 __all__ = [
     "FALSE_ALARM",
     "describe",
+    "disputed",
     "doubt_of",
     "entries",
     "fit_report",
@@ -83,6 +84,34 @@ def describe(
     return with_parts(found, dict(zip(problem.names, parts, strict=True)))
 
 
+def disputed(
+    parameters: Mapping[str, Any], alone: Mapping[str, Any], others: Mapping[str, Sequence[float]]
+) -> dict[str, Any]:
+    """Return parameters of which none is `identified` where several optima disagree.
+
+    Parameters
+    ----------
+    parameters, alone : mapping
+        From `describe`, with and without other optima.
+    others : mapping of str to sequence of float
+        By scene path, values at other optima that are not decided against.
+
+    Returns
+    -------
+    dict
+        As ``parameters``; `weak` at best what lies at another optimum by more than a standard
+        deviation elsewhere.
+    """
+    answer: dict[str, Any] = {}
+    for path, entry in parameters.items():
+        value, sd = alone[path]["value"], alone[path]["sd"]
+        agreed = value is not None and sd is not None
+        agreed = agreed and all(abs(other - value) <= sd for other in others.get(path, ()))
+        weak = entry["status"] == "identified" and not agreed
+        answer[path] = {**entry, "status": "weak"} if weak else dict(entry)
+    return answer
+
+
 def with_parts(
     parameters: Mapping[str, Any], parts: Mapping[str, tuple[float, float]]
 ) -> dict[str, Any]:
@@ -144,10 +173,10 @@ def entries(
 ) -> dict[str, Any]:
     """Return value, standard deviation and status of unknowns that were fitted.
 
-    Of an exact model the fit uses no prior, but `inference.identifiability.status` tells by how
-    much it would narrow the prior that the scene states, or that is its default: identified
-    where what is left is less than 0.2 of the prior's standard deviation, weak up to 0.7,
-    not_identified beyond.
+    Of an exact model the fit uses no prior, as a rule, but `inference.identifiability.status`
+    tells by how much it would narrow the prior that the scene states, or that is its default:
+    identified where what is left is less than 0.2 of the prior's standard deviation, weak up to
+    0.7, not_identified beyond.
 
     Parameters
     ----------
@@ -238,8 +267,9 @@ def fit_report(
     dict
         ``chi_square`` less what errors of the model take up, ``deviance``, ``degrees_of_freedom``,
         ``p_value`` of the worst of all checks, made up for their number as if they were independent
-        (Sidak), ``misfit`` and its ``reasons``, ``checks`` with the p-value of each, ``rank``,
-        ``widening`` and ``optima``, each with its deviance above the best and its values.
+        (Sidak), ``misfit`` and its ``reasons``, ``checks`` with the p-value of each, ``by_priors``:
+        whether those of the unknowns count, ``rank``, ``widening`` and ``optima``, each with its
+        deviance above the first and its values.
     """
     each = {"chi_square": p_value_of(problem, chi_square)}
     each |= {name: check.p_value for name, check in checks.items()}
@@ -255,6 +285,7 @@ def fit_report(
         "misfit": p_value < FALSE_ALARM,
         "reasons": [REASONS[name] for name, p in together.items() if p < FALSE_ALARM],
         "checks": each,
+        "by_priors": problem.erring,
         "rank": rank,
         "widening": wider,
         "optima": [

@@ -1,6 +1,7 @@
 """Climbs over unknowns, ranges and errors of the model (docs/model.md, fit-response)."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -8,11 +9,10 @@ from numpy.typing import NDArray
 
 from inference.fits.likelihood.erring_point import (
     Point,
-    columns_of,
     left_of_frames,
     point_at,
-    slopes_of_priors,
     standard,
+    standard_and_slopes,
 )
 from inference.fits.likelihood.frame_modes import frame_modes
 from inference.fits.likelihood.model_error import number_of_errors
@@ -20,7 +20,7 @@ from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import eliminated
 from inference.identifiability.information import Information
 
-__all__ = ["FEW", "begun", "climbed", "held_within_priors", "with_other_ranges"]
+__all__ = ["FEW", "Pull", "begun", "climbed", "held_within_priors", "with_other_ranges"]
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ _REST = 0.75  # of the frames, whose ranges stay
 
 def held_within_priors(problem: FitProblem, x: Array) -> Array:
     """Return coordinates that are nowhere far out in the priors."""
-    columns = columns_of(problem)
+    columns = problem.columns
     z = np.zeros((1, len(columns)))
     z[0, columns] = np.clip(standard(problem, x[None]), -_INWARD, _INWARD)
     if problem.mode is not None:
@@ -80,9 +80,10 @@ def _settled(problem: FitProblem, at: Point) -> Point:
     for _ in range(_TURNS):
         if not math.isfinite(at.deviance):
             break
-        seen = _eliminated(problem, at)
-        rows = np.vstack([seen.errors[:, :-1], np.eye(k)])
-        da = np.linalg.lstsq(rows, np.concatenate([seen.errors[:, -1], -at.a]), rcond=None)[0]
+        seen, da = _eliminated(problem, at), np.zeros(k)
+        if k > 0:
+            rows = np.vstack([seen.errors[:, :-1], np.eye(k)])
+            da = np.linalg.lstsq(rows, np.concatenate([seen.errors[:, -1], -at.a]), rcond=None)[0]
         u = _ranges(problem, at, seen, np.zeros(at.x.size), da)
         at = point_at(problem, at.x, u, at.a + da, at.z)
     return at
@@ -98,14 +99,49 @@ def begun(problem: FitProblem, x: Array, positions: Array) -> Point:
     return _settled(problem, _settled(problem, point_at(problem, x, u, none)))
 
 
+class Pull(NamedTuple):
+    """Where a weighted sum of log ranges is pulled to in a climb, and how strongly.
+
+    Attributes
+    ----------
+    weights : ndarray, shape (n,)
+        Of the frames; 0 of one without a range.
+    target : float
+        Of the sum.
+    strength : float
+        One over how far it may stay off, a standard deviation.
+    """
+
+    weights: Array
+    target: float
+    strength: float
+
+    def off(self, u: Array) -> float:
+        """Return how far ranges are off it, in standard deviations."""
+        return self.strength * (self.target - self.sum_of(u))
+
+    def sum_of(self, part: Array) -> float:
+        """Return the weighted sum over the frames."""
+        return float(self.weights @ np.where(self.weights != 0.0, part, 0.0))
+
+    def row(self, seen: Information, u: Array) -> Array:
+        """Return it as a row beside those of readings: errors, unknowns and what is left."""
+        moved = np.concatenate([seen.error_response[:, :-1], seen.response], axis=1)
+        moved = self.weights @ np.where(self.weights[:, None] != 0.0, moved, 0.0)
+        ahead = self.sum_of(seen.error_response[:, -1])
+        return np.append(self.strength * moved, self.off(u) + self.strength * ahead)
+
+
 def climbed(
-    problem: FitProblem, at: Point, steps: int, held: int | None = None
+    problem: FitProblem, at: Point, steps: int, held: int | None = None, pull: Pull | None = None
 ) -> tuple[Point, float]:
     """Climb by Levenberg-Marquardt steps of the unknowns, ranges and errors following.
 
-    One of the unknowns may be held. Returns also the deviance that a whole step would still gain.
+    One of the unknowns may be held, or the ranges be pulled elsewhere. Returns also the deviance
+    that a whole step would still gain.
     """
     k, damping, remaining = at.a.size, 1e-3, math.inf
+    slopes = standard_and_slopes(problem, at.x)[1]
     for _ in range(steps if math.isfinite(at.deviance) else 0):
         seen, bounds = _eliminated(problem, at), problem.bounds(at.x)
         errors, seen_residual = seen.errors[:, :-1], seen.errors[:, -1]
@@ -114,9 +150,11 @@ def climbed(
             [
                 [errors, seen.jacobian, seen_residual[:, None]],
                 [np.eye(k), np.zeros((k, d)), -at.a[:, None]],
-                [np.zeros((d, k)), slopes_of_priors(problem, at.x), -at.z[:, None]],
+                [np.zeros((d, k)), slopes, -at.z[:, None]],
             ]
         )
+        if pull is not None:
+            rows = np.vstack([rows, pull.row(seen, at.u)])
         triangle = scipy.linalg.qr(rows, mode="r")[0]
         of_x, wanted = triangle[k : k + d, k:-1], triangle[k : k + d, -1]
         if held is not None:
@@ -133,17 +171,20 @@ def climbed(
             dx = new - at.x
             left = triangle[:k, -1] - triangle[:k, k:-1] @ dx
             da = np.linalg.lstsq(triangle[:k, :k], left, rcond=None)[0]
-            there = point_at(problem, new, _ranges(problem, at, seen, dx, da), at.a + da)
-            there = _settled(problem, there)
+            z, slopes_there = standard_and_slopes(problem, new)
+            u = _ranges(problem, at, seen, dx, da)
+            there = _settled(problem, point_at(problem, new, u, at.a + da, z))
             if math.isfinite(there.deviance):
                 gained = at.deviance - there.deviance_weighted_as(at)
+                if pull is not None:
+                    gained += pull.off(at.u) ** 2 - pull.off(there.u) ** 2
                 if gained > 0.0:
                     better = there
                     break
             damping *= 6.0
         if better is None:
             break
-        at, damping = better, max(damping / 4.0, 1e-9)
+        at, slopes, damping = better, slopes_there, max(damping / 4.0, 1e-9)
         if gained < _ENOUGH:
             break
     return at, remaining

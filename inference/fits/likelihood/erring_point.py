@@ -24,13 +24,13 @@ from simulator.object_arrays import quadratics
 
 __all__ = [
     "Point",
-    "columns_of",
     "left_of_frames",
     "linearised",
     "moved_by_errors",
     "point_at",
     "slopes_of_priors",
     "standard",
+    "standard_and_slopes",
     "whitened_of",
 ]
 
@@ -65,6 +65,8 @@ class Point(NamedTuple):
         Steps are computed with covariances that stay. Of many frames these differ between points
         by enough to hide what a step gains, so that it is judged as it was computed.
         """
+        if self.errors.shape[2] == 0:  # noise alone, which is the same everywhere
+            return self.deviance
         bare = self.root @ self.residual[:, :, None]
         square = np.square(np.linalg.solve(other.root, bare)).sum()
         change = float(square - np.square(self.residual).sum())
@@ -95,16 +97,11 @@ def moved_by_errors(problem: FitProblem, x: Array, u: Array, of_x: Array) -> tup
     return model, left_of_frames(problem, u, residual, along, errors, more)
 
 
-def columns_of(problem: FitProblem) -> list[int]:
-    """Return where the priors have the unknowns."""
-    return [problem.parameters.names.index(name) for name in problem.names]
-
-
 def standard(problem: FitProblem, points: Array) -> Array:
     """Return coordinates as standard normal ones of the priors, or of the law, shape (m, d)."""
-    columns = columns_of(problem)
+    columns = problem.columns
     natural = np.empty_like(points)
-    natural[:, columns] = [problem.natural(x) for x in points]
+    natural[:, columns] = problem.naturals(points)
     with np.errstate(all="ignore"):
         z = problem.parameters.standard(natural)
         if problem.mode is not None:
@@ -127,7 +124,7 @@ def deviations_of(problem: FitProblem, x: Array) -> Array:
     z = standard(problem, x[None])[0]
     if problem.mode is not None:
         return np.asarray(z)
-    columns = columns_of(problem)
+    columns = problem.columns
     whole = np.empty((1, len(columns)))
     whole[0, columns] = z
     return np.asarray(np.copysign(problem.parameters.deviations(whole)[0, columns], z))
@@ -135,9 +132,14 @@ def deviations_of(problem: FitProblem, x: Array) -> Array:
 
 def slopes_of_priors(problem: FitProblem, x: Array) -> Array:
     """Return the derivatives of `standard` along the coordinates, shape (d, d)."""
+    return standard_and_slopes(problem, x)[1]
+
+
+def standard_and_slopes(problem: FitProblem, x: Array) -> tuple[Array, Array]:
+    """Return `standard` of one point, shape (d,), and its derivatives, at the cost of one call."""
     around = np.vstack([x, x + _DIFFERENCE * np.eye(x.size)])
     z = standard(problem, around)
-    return np.asarray((z[1:] - z[0]).T / _DIFFERENCE)
+    return np.asarray(z[0]), np.asarray((z[1:] - z[0]).T / _DIFFERENCE)
 
 
 def linearised(
@@ -155,6 +157,9 @@ def linearised(
     whitened_slopes(by_value, along, residual, values, np.eye(SLOTS), np.ascontiguousarray(u), fit)
     # crosstalk moves the readings themselves
     whitener = by_value[:, :, list(CROSSTALK)]
+    if not (problem.object_errs or problem.shadow_errs or problem.places is not None):
+        errors = with_column(problem.known, np.zeros((n, 2, 0)))
+        return residual, by_value @ problem.chain(x), along, errors, whitener
     signal = by_value[:, :, Value.C2] * values[Value.C2]
     light = np.linalg.solve(whitener, signal[:, :, None])[:, :, 0]
     parts = [errors_of_readings(problem, light, u)]
@@ -164,16 +169,16 @@ def linearised(
         parts.append(shadow.columns)
     errors = whitener @ np.concatenate([*parts, left_at_places(problem, light, u)], axis=2)
     errors = np.where(np.isnan(errors), 0.0, errors)
-    if a is not None:
+    if a is not None and smooth > 0:
         erring = _Erring(problem, u, a[:smooth], whitener)
         for column in (Value.C0, Value.C1, Value.C2):
             bare = np.linalg.solve(whitener, by_value[:, :, column, None])
             by_value[:, :, column] += erring.change(np.asarray(bare[:, :, 0], np.float64))
         along = along + erring.change(light, _slope_of_light(problem, values, light, u))
-        if shadow is not None:
-            more, further = shadow.changes(a[smooth : smooth + parts[1].shape[2]])
-            by_value += whitener @ np.nan_to_num(more)
-            along = along + (whitener @ np.nan_to_num(further)[:, :, None])[:, :, 0]
+    if a is not None and shadow is not None:
+        more, further = shadow.changes(a[smooth : smooth + parts[1].shape[2]])
+        by_value += whitener @ np.nan_to_num(more)
+        along = along + (whitener @ np.nan_to_num(further)[:, :, None])[:, :, 0]
     return (
         residual,
         by_value @ problem.chain(x),
@@ -213,6 +218,8 @@ def whitened_of(problem: FitProblem, u: Array, errors: Array, parts: Array) -> A
 
 def _root_of_covariance(problem: FitProblem, u: Array, errors: Array) -> Array:
     """Return the Cholesky factor of noise and what is left of errors, in units of the noise."""
+    if errors.shape[2] == 0:
+        return np.broadcast_to(np.eye(2), (u.size, 2, 2))
     with np.errstate(over="ignore", invalid="ignore"):
         left = np.einsum("n,nik,njk->nij", own_share_left(problem, u), errors, errors)
     left = np.where(np.isfinite(left).all(axis=(1, 2), keepdims=True), left, 0.0)
@@ -272,13 +279,16 @@ def _shared_volume(problem: FitProblem, along: Array, errors: Array) -> float:
 def point_at(problem: FitProblem, x: Array, u: Array, a: Array, z: Array | None = None) -> Point:
     """Linearise in units of the noise and of what is left of errors; ``z`` is `standard` of x."""
     residual, jacobian, along, errors, _ = linearised(problem, x, u, a)
-    parts = [(residual - errors @ a)[:, :, None], jacobian, along[:, :, None], errors]
     root = _root_of_covariance(problem, u, errors)
-    white = np.asarray(np.linalg.solve(root, np.concatenate(parts, axis=2)), np.float64)
-    d = x.size
-    volume = _volume(root, along, white[:, :, d + 1]) + _shared_volume(problem, along, errors)
-    residual, z = white[:, :, 0], standard(problem, x[None])[0] if z is None else z
-    at = white[:, :, 1 : d + 1], white[:, :, d + 1], white[:, :, d + 2 :]
+    at, volume = (jacobian, along, errors), 0.0
+    if errors.shape[2] > 0:  # else the root is 1
+        parts = [(residual - errors @ a)[:, :, None], jacobian, along[:, :, None], errors]
+        white = np.asarray(np.linalg.solve(root, np.concatenate(parts, axis=2)), np.float64)
+        d = x.size
+        volume = _volume(root, along, white[:, :, d + 1]) + _shared_volume(problem, along, errors)
+        residual = white[:, :, 0]
+        at = white[:, :, 1 : d + 1], white[:, :, d + 1], white[:, :, d + 2 :]
+    z = standard(problem, x[None])[0] if z is None else z
     told = told_at(problem.known, u, a)
     with np.errstate(over="ignore", invalid="ignore"):
         deviance = float(np.square(residual).sum() + a @ a + z @ z) + volume

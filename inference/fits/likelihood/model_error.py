@@ -66,6 +66,8 @@ def errors_of_readings(
     ndarray, shape (n, 2, k)
         Along independent standard normal errors, in the unit of ``light``.
     """
+    if not problem.object_errs:
+        return np.zeros((*light.shape, 0))
     present = np.isfinite(positions)
     basis = discrepancy_basis(*problem.parameters.reach_m)
     at = np.where(present, positions, 0.0)
@@ -105,7 +107,7 @@ def shadow_of(problem: FitProblem, values: Array, positions: Array) -> ShadowErr
 def number_of_errors(problem: FitProblem) -> int:
     """Return how many errors a fit has."""
     reach = problem.parameters.reach_m
-    own = 2 * discrepancy_basis(*reach).size
+    own = 2 * discrepancy_basis(*reach).size if problem.object_errs else 0
     of_shadow = 2 * shadow_basis(*reach).size if problem.shadow_errs else 0
     at_places = 0 if problem.places is None else 2 * problem.places.number
     offset = problem.known is not None and problem.known.offset_sd > 0.0

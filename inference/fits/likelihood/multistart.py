@@ -14,7 +14,7 @@ from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.screen import screen
 from inference.identifiability.information import Information
 
-__all__ = ["BREADTH", "EASY", "find_maxima", "find_starts"]
+__all__ = ["BREADTH", "EASY", "find_maxima", "find_near", "find_starts"]
 
 Array = NDArray[np.float64]
 
@@ -202,6 +202,24 @@ def find_starts(problem: FitProblem, softer: Iterable[FitProblem]) -> tuple[Maxi
     screened = _screened(problem)
     found = (_distinct(one, _climbed(one, *screened), _NEAR) for one in (*softer, problem))
     return tuple(start for near in found for start in near)
+
+
+def find_near(problem: FitProblem) -> list[Maximum]:
+    """Return ends of the first short climbs: near optima that the best ones hide, too.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        At least as many frames as the unknowns need.
+    """
+    chosen, starts, effort = _screened(problem)
+    few = problem.select(chosen)
+    first = [approach(few, x, effort.few) for x in starts[: effort.climbs]]
+    return (
+        first
+        if chosen.size == problem.present.size
+        else [approach(problem, end.x, 1) for end in first]
+    )
 
 
 def find_maxima(problem: FitProblem) -> tuple[Maximum, ...]:

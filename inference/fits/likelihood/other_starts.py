@@ -7,7 +7,7 @@ import numpy as np
 from inference.fits.likelihood.arguments import CROSSTALK
 from inference.fits.likelihood.conditional_fit import conditional, unconditional
 from inference.fits.likelihood.erring_climb import begun
-from inference.fits.likelihood.erring_point import Point, columns_of
+from inference.fits.likelihood.erring_point import Point
 from inference.fits.likelihood.frame_modes import frame_modes
 from inference.fits.likelihood.maximum import Maximum, approach
 from inference.fits.likelihood.problem import FitProblem
@@ -38,7 +38,7 @@ def of_law(problem: FitProblem) -> list[Maximum]:
     z = np.zeros((1, len(problem.parameters)))
     if problem.mode is not None:
         z = problem.mode.centre[None]
-    natural = problem.parameters.natural(z)[:, columns_of(problem)]
+    natural = problem.parameters.natural(z)[:, problem.columns]
     x = problem.coordinates(natural)[0]
     return [Maximum(x, 0.0, math.inf, frame_modes(problem, x)[0][:, 0])]
 
@@ -67,7 +67,7 @@ def half_dark(problem: FitProblem, softer: FitProblem) -> list[Maximum]:
     light = problem.frames[problem.present, :2]
     dark = 0.5 * light[np.argmin(np.hypot(light[:, 0], light[:, 1]))]
     middle = problem.parameters.natural(np.zeros((1, len(problem.parameters))))
-    x = problem.coordinates(middle[:, columns_of(problem)])[0]
+    x = problem.coordinates(middle[:, problem.columns])[0]
     x[sides] = dark
     # the last first: the places of the others stay
     first, rest = conditional(softer, sides[1], np.clip(x, *problem.bounds(x)))

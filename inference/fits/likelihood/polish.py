@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.fits.likelihood.deviance import POSITION
+from inference.fits.likelihood.erring_point import standard_and_slopes
 from inference.fits.likelihood.linearisation import rows_of
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.profile_slopes import profile_slopes
@@ -36,10 +37,30 @@ class _Profile:
         self.place = problem.place(np.empty(d))
         self.matrix = np.empty((rows_of(n, problem.instrument), d + 1))
 
+    @property
+    def jacobian(self) -> Array:
+        """Rows of the last point that was asked for, shape (m, d)."""
+        return np.asarray(self.matrix[:, :-1])
+
     def __call__(self, x: Array) -> tuple[float, Array]:
         self.place.x[:] = x
         value = profile_slopes(self.matrix, self.place, self.fit)
         return 0.5 * value, -(self.matrix[:, :-1].T @ self.matrix[:, -1])
+
+
+class _WithPriors(_Profile):
+    """The same with what the priors say of the unknowns."""
+
+    slopes: Array
+
+    @property
+    def jacobian(self) -> Array:
+        return np.vstack([super().jacobian, self.slopes])
+
+    def __call__(self, x: Array) -> tuple[float, Array]:
+        value, gradient = super().__call__(x)
+        z, self.slopes = standard_and_slopes(self.problem, x)
+        return value + 0.5 * float(z @ z), gradient + self.slopes.T @ z
 
 
 def _directions(jacobian: Array, problem: FitProblem, free: NDArray[np.bool_]) -> Array:
@@ -95,7 +116,7 @@ def polish(problem: FitProblem, x: Array) -> tuple[Array, float, float, Array]:
     (ndarray, float, float, ndarray)
         Coordinates, deviance, deviance that a whole step would still gain, and best log ranges.
     """
-    profile = _Profile(problem)
+    profile = _WithPriors(problem) if problem.priors else _Profile(problem)
     x = x.copy()
     value, gradient = profile(x)
     radius, predicted = _RADIUS, np.inf
@@ -107,7 +128,7 @@ def polish(problem: FitProblem, x: Array) -> tuple[Array, float, float, Array]:
         if not free.any():
             predicted = 0.0
             break
-        basis = _directions(profile.matrix[:, :-1], problem, free)
+        basis = _directions(profile.jacobian, problem, free)
         columns = []
         for k in range(basis.shape[1]):
             trial = np.clip(x + _DIFFERENCE * basis[:, k], low, high)

@@ -1,6 +1,7 @@
 """What a fit over frames works on: unknowns of a scene as coordinates, usable frames, sensor."""
 
 import dataclasses
+import functools
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +75,9 @@ class FitProblem:
         That of its modes which is taken; None where it has but one.
     places : Places or None
         Where frames share what following errors of the model leaves; None: nowhere.
+    priors : bool
+        Whether the priors of the unknowns count though the model is exact: frames alone leave too
+        much open.
     """
 
     names: tuple[str, ...]
@@ -92,6 +96,7 @@ class FitProblem:
     law: bool = False
     mode: LawMode | None = None
     places: Places | None = None
+    priors: bool = False
 
     def __len__(self) -> int:
         return len(self.names)
@@ -99,15 +104,20 @@ class FitProblem:
     @property
     def erring(self) -> bool:
         """Whether an object's model errs, or something is known of it or of ranges."""
-        errs = self.error.flux > 0 or self.error.range_m > 0 or self.shadow_errs
-        return bool(self.present.any()) and (errs or self.law or self.known is not None)
+        known = self.law or self.priors or self.known is not None
+        return bool(self.present.any()) and (self.object_errs or self.shadow_errs or known)
+
+    @property
+    def object_errs(self) -> bool:
+        """Whether the object's light or its delay errs."""
+        return self.error.flux > 0 or self.error.range_m > 0
 
     @property
     def shadow_errs(self) -> bool:
         """Whether there is a background whose shadow errs."""
         return self.background is not None and self.error.shadow > 0
 
-    @property
+    @functools.cached_property
     def logarithms(self) -> NDArray[np.bool_]:
         """Which coordinates are logarithms: all but crosstalk, shape (d,)."""
         return ~np.isin(self.slots, CROSSTALK)
@@ -149,7 +159,12 @@ class FitProblem:
         chain(out, self.values(x), x, self.layout, self.bounds(x))
         return out
 
-    @property
+    @functools.cached_property
+    def columns(self) -> list[int]:
+        """Where the priors have the unknowns."""
+        return [self.parameters.names.index(name) for name in self.names]
+
+    @functools.cached_property
     def units(self) -> Array:
         """Size of one unit of each unknown's value in SI or reading units, shape (d,)."""
         return np.where(np.isin(self.slots, IN_READINGS), self.unit, 1.0)
@@ -157,6 +172,26 @@ class FitProblem:
     def natural(self, x: Array) -> Array:
         """Return the unknowns in SI or reading units, shape (d,)."""
         return np.asarray(self.values(x)[self.slots] * self.units)
+
+    def naturals(self, points: Array) -> Array:
+        """Return `natural` of many coordinates at once, shape (m, d) for (m, d)."""
+        natural = np.empty_like(points)
+        columns: dict[int, Array] = {}
+        with np.errstate(all="ignore"):
+            for j, slot in enumerate(self.slots.tolist()):
+                x = points[:, j]
+                if slot in SHAPES:
+                    c0 = columns.get(slot - 1, self.layout.known[slot - 1])
+                    natural[:, j] = 2 * np.sqrt(c0) * np.expm1(x)
+                elif slot in CROSSTALK:
+                    natural[:, j] = x * self.unit
+                else:
+                    natural[:, j] = np.exp(x) * (self.unit if slot in IN_READINGS else 1.0)
+                columns[slot] = natural[:, j]
+            for j in np.flatnonzero(~self.logarithms).tolist():
+                side = CROSSTALK.index(self.slots[j])
+                natural[:, j] = (points[:, j] - self._bare(columns, side)) * self.unit
+        return natural
 
     def coordinates(self, natural: Array) -> Array:
         """Return coordinates of given unknowns, shape (m, d) for (m, d); nan where impossible."""
