@@ -30,12 +30,11 @@ from benchmarks.resumable import Row, code_version, resume, rows_of
 from inference.estimate import estimate
 from inference.estimates import TechniqueResult
 from inference.fits.answer.determined import LIMIT
-from inference.fits.likelihood.erring import erring_maxima
 from inference.fits.likelihood.erring_point import slopes_of_priors
 from inference.fits.likelihood.information import residuals_and_information
-from inference.fits.likelihood.maximum import Maximum, maximum_from
+from inference.fits.likelihood.maximum import maximum_from
 from inference.fits.likelihood.problem import FitProblem, fit_problem
-from tests.fits.random_sets import CLASSES, RandomSet, random_set
+from tests.fits.random_sets import CLASSES, RandomSet, best_of, best_with_priors, random_set
 from tests.fits.scenes import values_of
 
 KINDS = ("pulsed", "sine_wave")
@@ -84,15 +83,11 @@ def row_of(told: str, kind: str, name: str, snr: float, number: int) -> Row:
         return {**row, "refused": reason}
     (result,) = found.results
     assert result.fit is not None
-    if problem.erring:
-        start = Maximum(truth, 0.0, math.inf, np.log(truth_m))
-        reference = erring_maxima(problem, [start])[0].deviance
+    if result.fit["by_priors"]:
+        reference = best_with_priors(one, problem, truth)
     else:
         reference = maximum_from(problem, truth).deviance
-    row |= {
-        "misfit": int(result.fit["misfit"]),
-        "excess": result.fit["deviance"] - reference,
-    }
+    row |= {"misfit": int(result.fit["misfit"]), "excess": best_of(result.fit) - reference}
     return {**row, **_ranges_of(result, truth_m)}
 
 

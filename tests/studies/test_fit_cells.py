@@ -30,7 +30,7 @@ def test_a_set_with_little_noise_is_answered_and_right(told: str) -> None:
 
 
 def test_a_refusal_is_none_of_the_answers_and_needless_where_the_truth_tells() -> None:
-    row = text_of(dict(row_of("exact", "pulsed", "everything", 1e3, 0)))
+    row = text_of(dict(row_of("exact", "pulsed", "everything", 30.0, 0)))
     assert row["refused"]
     assert float(row["alone"]) > 1.0
     told = row | {"alone": "0.5"}
