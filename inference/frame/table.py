@@ -21,6 +21,7 @@ __all__ = [
     "SIGNAL_1",
     "SIGNAL_2",
     "TURN",
+    "even_spacing",
     "tabulate",
 ]
 
@@ -126,6 +127,20 @@ def _add_resolution(table: Array, strongest: float, scene: FrameScene) -> None:
 
 
 @compiled
+def _knots(first: float, last: float) -> int:
+    """Return how many knots a table begins with, evenly spaced."""
+    return max(_FEWEST_KNOTS, math.ceil((last - first) / KNOT_SPACING) + 1)
+
+
+@compiled
+def even_spacing(table: Array) -> float:
+    """Return the spacing of a table's knots along log r; 0 where the curve turns between some."""
+    n = table.shape[1]
+    first, last = table[LOG_RANGE, 0], table[LOG_RANGE, n - 1]
+    return (last - first) / (n - 1) if n == _knots(first, last) else 0.0
+
+
+@compiled
 def tabulate(bounds: Pair, scene: FrameScene, strongest: float) -> Array:
     """Tabulate the curve of mean readings, knots closer where it turns.
 
@@ -150,7 +165,7 @@ def tabulate(bounds: Pair, scene: FrameScene, strongest: float) -> Array:
     """
     instrument = scene.instrument
     wave, read, shot = instrument.wave, instrument.read, instrument.shot
-    n = max(_FEWEST_KNOTS, math.ceil((bounds[1] - bounds[0]) / KNOT_SPACING) + 1)
+    n = _knots(bounds[0], bounds[1])
     unit = (read[0] / strongest, read[1] / strongest)
     offset = _offset(scene.crosstalk, strongest)
     table = np.empty((_ROWS, n))
