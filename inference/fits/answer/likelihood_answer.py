@@ -198,6 +198,12 @@ def _exact_answer(
     report = fit_report(problem, optima, chi_square, facts.rank, wider)
     parameters = describe(problem, top, facts, wider, [one for _, one in (*near, *points)])
     points += [(excess, one) for excess, one in with_excess(walked) if excess <= DECIDED]
+    # walks go where no prior would let an unknown be: they count against what claims to be told
+    walked_too = describe(problem, top, facts, wider, [one for _, one in (*near, *points)])
+    parameters = {
+        path: walked_too[path] if entry["status"] == "identified" else entry
+        for path, entry in parameters.items()
+    }
     return frame_ranges(
         name,
         problem,
