@@ -53,8 +53,7 @@ def test_points_of_a_profile_are_the_best_for_the_range_that_they_hold() -> None
     """Against a long climb from the truth, with that range held by other means."""
     one = of_seed(2)
     problem, top = fitted(one)
-    points, better = profiles(problem, top)
-    assert better is None
+    points = profiles(problem, top)
     assert len(points) >= 4
     known = values_of(one.sensor, one.truth)
     truth = problem.coordinates(np.array([[known[name] for name in problem.names]]))[0]
@@ -84,4 +83,4 @@ def test_points_of_a_profile_are_the_best_for_the_range_that_they_hold() -> None
 
 def test_ranges_that_are_told_well_are_not_held() -> None:
     problem, top = fitted(of_seed(0, (4.0, 4.0)))
-    assert profiles(problem, top) == ([], None)
+    assert profiles(problem, top) == []

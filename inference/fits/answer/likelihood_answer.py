@@ -256,8 +256,7 @@ def _searched(problem: FitProblem, starts: Sequence[Maximum]) -> tuple[list[Erri
         alone = dataclasses.replace(problem, mode=mode)
         along, better = follow(alone, alike)
         if better is None and not problem.priors:
-            more, better = profiles(alone, found[0])
-            along += more
+            along += profiles(alone, found[0])
         if better is None or not better.deviance < found[0].deviance:
             break
         found.insert(0, better)

@@ -31,10 +31,9 @@ _STRIDE = 0.7  # most that log r is moved at once
 _ENOUGH = 4.0  # deviance that two standard deviations cost
 _TOO_FAR = 8.0  # deviance of points that say nothing any more
 _TRIES = 7
-_BETTER = 0.05  # deviance by which another optimum is better
 
 
-def profiles(problem: FitProblem, top: Erring) -> tuple[list[Erring], Erring | None]:
+def profiles(problem: FitProblem, top: Erring) -> list[Erring]:
     """Hold ranges that are told loosely.
 
     Parameters
@@ -46,29 +45,25 @@ def profiles(problem: FitProblem, top: Erring) -> tuple[list[Erring], Erring | N
 
     Returns
     -------
-    (list of Erring, Erring or None)
+    list of Erring
         Points that are optimal but for one range; none where ranges are told well, or are known.
-        And a better maximum, if one was met.
+        A better one than the best maximum is a point as the others: an error as large as the
+        ranges makes such of frames at the end of what is possible.
     """
     points: list[Erring] = []
     if problem.known is not None or not len(problem):
-        return points, None
+        return points
     own, _, whole, _ = top.at_ranges(top.positions)
     # what is a frame's own is followed frame by frame (`frame_reaches`)
     loose = np.flatnonzero(np.isfinite(whole) & (whole > np.hypot(_LOOSE, own)))
     order = loose[np.argsort(-whole[loose], kind="stable")]
     for frame in order[:: max(1, order.size // _FRAMES)][:_FRAMES].tolist():
         for sign in (1.0, -1.0):
-            more, better = _side(problem, top, frame, sign * float(whole[frame]))
-            points += more
-            if better is not None:
-                return points, better
-    return points, None
+            points += _side(problem, top, frame, sign * float(whole[frame]))
+    return points
 
 
-def _side(
-    problem: FitProblem, top: Erring, frame: int, sd: float
-) -> tuple[list[Erring], Erring | None]:
+def _side(problem: FitProblem, top: Erring, frame: int, sd: float) -> list[Erring]:
     """Hold the range of a frame on one side, which the sign of `sd` tells."""
     points: list[Erring] = []
     low, high = np.log(problem.support)
@@ -82,10 +77,6 @@ def _side(
         cost = at.deviance - top.deviance
         if not math.isfinite(cost):
             break
-        if cost < -_BETTER:
-            end, remaining = climbed(problem, begun(problem, at.x, at.u), 5 * _STEPS)
-            if end.deviance < top.deviance - _BETTER:
-                return points, end_of(problem, end, remaining)
         if cost < _TOO_FAR:
             points.append(end_of(held, at, 0.0))
         if _ENOUGH <= cost < _TOO_FAR or (cost < _ENOUGH and value in (low, high)):
@@ -95,7 +86,7 @@ def _side(
         else:
             far = reach
         reach = 2.0 * near if math.isinf(far) else 0.5 * (near + far)
-    return points, None
+    return points
 
 
 def _holding(problem: FitProblem, frame: int, u: float) -> FitProblem:
