@@ -51,7 +51,9 @@ _FRAMES = 20_000  # that this may cost
 _FEWEST = 20
 _STRAIGHT = 0.1  # share of the response that the next order adds, below which the first is all
 _THINNED = 4  # of them one is followed further
-_TRIED = 12  # of them, at which the response is followed beyond its first order
+# errors that are followed beyond the first order at draws: to tell whether that is of any size, and
+# of what size, which few far draws decide
+_TRIED, _MEASURED = 24, 200
 _AT_ONCE = 20_000  # draws that are moved
 # what linear response is taken for at most: e-folds of a range, and standard deviations of a prior
 _FARTHEST_RANGE, _FARTHEST = 1.0, 3.0
@@ -193,7 +195,7 @@ def error_budget(
     readings = density.frames[:, [0, 1] if rates is None else [0, 1, RANGE, DISPLACEMENT]]
     responses = [model_response(each, readings) for each in experiments]
     erring = responses[0].parameters.shape[1] > 0
-    curvature = _curvature(experiments, responses, rng) if erring else 0.0
+    curvature = _curvature(experiments, responses, _TRIED, rng) if erring else 0.0
     pull = common_pull(responses)
     further = erring and job.scene.motion != "static"
     bent = further and (curvature > _STRAIGHT or bool(pull.any()))
@@ -201,7 +203,8 @@ def error_budget(
         fewer = slice(None, None, _THINNED)
         chosen, experiments = chosen[fewer], experiments[fewer]
         responses = [model_response(each, readings, pull) for each in experiments]
-        curvature = _curvature(experiments, responses, rng)
+        measured = int(np.clip(_FRAMES // max(log_r.shape[1], 1), len(experiments), _MEASURED))
+        curvature = _curvature(experiments, responses, measured, rng)
     stretch = np.hypot(1.0, min(curvature, 1.0))  # what the next order may add is no less wide
     by_z = [
         np.array([each.shift[0] for each in responses])[:, :, None],
@@ -261,11 +264,12 @@ def error_budget(
 def _curvature(
     experiments: Sequence[Experiment],
     responses: Sequence[ModelResponse],
+    tried: int,
     rng: np.random.Generator,
 ) -> float:
-    """Return the share of the response that the next order would add."""
+    """Return the share of the response that the next order would add, by so many random errors."""
     missed, size = 0.0, 0.0
-    for i in np.linspace(0, len(experiments) - 1, min(_TRIED, len(experiments))).astype(int):
+    for i in np.linspace(0, len(experiments) - 1, tried).astype(int):
         of = responses[i]
         normal = rng.standard_normal(of.log_r.shape[1])
         present = np.isfinite(experiments[i].log_r)
