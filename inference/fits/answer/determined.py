@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from inference.estimates import TechniqueResult
 from inference.fits.answer.counts import ranges_needed
 from inference.fits.answer.motion_seen import numbers_shown
-from inference.fits.answer.ranges import DECIDED, WITHIN
+from inference.fits.answer.ranges import WITHIN
 from inference.fits.answer.report import describe
 from inference.fits.likelihood.arguments import CROSSTALK
 from inference.fits.likelihood.information import residuals_and_information
-from inference.fits.likelihood.maximum import Maximum
+from inference.fits.likelihood.maximum import DECIDED, Maximum
 from inference.fits.likelihood.problem import FitProblem
 from inference.frame.sensitivity import Value
 from inference.identifiability.information import Information

@@ -24,7 +24,6 @@ from inference.fits.answer.model_checks import model_checks
 from inference.fits.answer.profile_scan import profile_scan
 from inference.fits.answer.ranges import (
     CONTRADICTION,
-    DECIDED,
     WITHIN,
     Answer,
     Beside,
@@ -48,7 +47,7 @@ from inference.fits.likelihood.held_walks import held_walks
 from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.integrated import with_integrated_first
 from inference.fits.likelihood.law_mode import law_modes
-from inference.fits.likelihood.maximum import TOP, Maximum, maximum_from
+from inference.fits.likelihood.maximum import DECIDED, TOP, Maximum, maximum_from
 from inference.fits.likelihood.multistart import find_maxima, find_near, find_starts
 from inference.fits.likelihood.places import places_of
 from inference.fits.likelihood.prior_maxima import prior_maxima

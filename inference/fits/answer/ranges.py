@@ -18,12 +18,12 @@ from inference.fits.likelihood.erring import Erring
 from inference.fits.likelihood.erring_point import moved_by_errors
 from inference.fits.likelihood.frame_modes import MOST, frame_reaches
 from inference.fits.likelihood.information import residuals_and_information
+from inference.fits.likelihood.maximum import DECIDED
 from inference.fits.likelihood.problem import FitProblem
 from inference.realtime.net import ABSENT, COMMON_REASONS, SATURATED
 
 __all__ = [
     "CONTRADICTION",
-    "DECIDED",
     "MISFIT",
     "WITHIN",
     "Answer",
@@ -34,7 +34,6 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-DECIDED = 9.0  # deviance by which something must be worse to be decided against: 3 sd
 # deviance that intervals of 95 % reach, 1.96 sd squared: of chi-square, one degree, 5 %
 WITHIN = 3.8414588206941285
 _IMPOSSIBLE = 36.0  # chi-square of a single frame that nothing explains

@@ -12,11 +12,11 @@ import numpy as np
 
 from inference.fits.likelihood.erring import Erring, end_of
 from inference.fits.likelihood.erring_climb import begun, climbed
+from inference.fits.likelihood.maximum import DECIDED
 from inference.fits.likelihood.problem import FitProblem
 
 __all__ = ["held_walks"]
 
-_DECIDED = 9.0  # deviance of three standard deviations
 _FIRST = 3.0  # standard deviations to where an unknown is held first
 _FARTHER = 1.5  # of that, where it is held next
 _MOST = 4  # times
@@ -54,7 +54,7 @@ def held_walks(problem: FitProblem, top: Erring, unknowns: Sequence[int]) -> lis
                 x = np.clip(top.x + away * along, *problem.bounds(top.x))
                 at, _ = climbed(problem, begun(problem, x, top.positions), _STEPS, held=j)
                 excess = at.deviance - top.deviance
-                if not excess < _DECIDED:
+                if not excess < DECIDED:
                     break
                 points.append(end_of(problem, at, 0.0))
                 if excess > _BENT * away * away:

@@ -9,10 +9,9 @@ from inference.density.frame_integrals import fill_log_likelihoods
 from inference.fits.likelihood.deviance import open_values
 from inference.fits.likelihood.erring import Erring
 from inference.fits.likelihood.erring_point import standard
+from inference.fits.likelihood.maximum import DECIDED
 
 __all__ = ["integrated_deviance", "with_integrated_first"]
-
-_DECIDED = 9.0  # deviance by which something must be worse to be decided against: 3 sd
 
 
 def integrated_deviance(end: Erring) -> float:
@@ -66,6 +65,6 @@ def with_integrated_first(
     points = [*found, *along]
     each = [integrated_deviance(point) for point in points]
     best = int(np.argmin(each))
-    if not each[best] < each[0] - _DECIDED:
+    if not each[best] < each[0] - DECIDED:
         return list(found), list(along)
     return [points[best], *(one for one in found if one is not points[best])], list(along)

@@ -10,10 +10,11 @@ from inference.fits.likelihood.levenberg_marquardt import levenberg_marquardt
 from inference.fits.likelihood.polish import polish
 from inference.fits.likelihood.problem import FitProblem
 
-__all__ = ["MANY", "TOP", "Maximum", "approach", "followed", "maximum_from"]
+__all__ = ["DECIDED", "MANY", "TOP", "Maximum", "approach", "followed", "maximum_from"]
 
 Array = NDArray[np.float64]
 
+DECIDED = 9.0  # deviance by which something must be worse to be decided against: 3 sd
 MANY = 100  # steps of Levenberg-Marquardt that reach the top as a rule
 TOP = 1e-3  # deviance that may remain to be gained
 _TURNS = 4  # of Newton steps and climbs

@@ -9,7 +9,7 @@ from inference.fits.likelihood.erring import Erring, end_of
 from inference.fits.likelihood.erring_climb import begun, climbed, held_within_priors
 from inference.fits.likelihood.erring_point import Point, point_at
 from inference.fits.likelihood.frame_modes import frame_modes
-from inference.fits.likelihood.maximum import TOP, Maximum
+from inference.fits.likelihood.maximum import DECIDED, TOP, Maximum
 from inference.fits.likelihood.other_places import beyond_walls
 from inference.fits.likelihood.polish import polish
 from inference.fits.likelihood.problem import FitProblem
@@ -29,7 +29,6 @@ _BASES = 2  # ends from which others are looked for beyond walls
 _FAR = 100.0  # deviance by which such an end may be worse
 _BEYOND, _RELEASED = 6, 30  # of what is found there, and steps of their climbs
 _KEPT = 12  # ends
-_NEAR = 9.0  # deviance within which they have to be tops: 3 sd
 
 
 def prior_maxima(problem: FitProblem, starts: Sequence[Maximum]) -> list[Erring]:
@@ -68,7 +67,9 @@ def prior_maxima(problem: FitProblem, starts: Sequence[Maximum]) -> list[Erring]
         found = _apart(beyond_walls(problem, end_of(problem, *base)), _BEYOND)
         ends += [polished(problem, *climbed(problem, at, _RELEASED)) for at, _ in found]
         ends = _apart(ends, _KEPT)
-    near = [_at_top(problem, *end) for end in ends if end[0].deviance < ends[0][0].deviance + _NEAR]
+    near = [
+        _at_top(problem, *end) for end in ends if end[0].deviance < ends[0][0].deviance + DECIDED
+    ]
     ends = sorted([*near, *ends[len(near) :]], key=lambda end: end[0].deviance)
     return [end_of(problem, at, remaining) for at, remaining in ends]
 

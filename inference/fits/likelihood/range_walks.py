@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from inference.fits.likelihood.erring import Erring, end_of
 from inference.fits.likelihood.erring_climb import Pull, begun, climbed
+from inference.fits.likelihood.maximum import DECIDED
 from inference.fits.likelihood.problem import FitProblem
 
 __all__ = ["range_walks", "shared_of", "sums_of"]
 
 Array = NDArray[np.float64]
 
-_DECIDED = 9.0  # deviance of three standard deviations
 _NEARLY = 6.0  # of it, where a walk may end
 _STEPS = 12  # of a climb with ranges pulled
 _BEHIND = 60  # of one to a better optimum
@@ -57,7 +57,7 @@ def range_walks(problem: FitProblem, found: Sequence[Erring]) -> tuple[list[Erri
     points: list[Erring] = []
     best, bases = found[0].deviance, 0
     behind: list[tuple[Array, Array]] = []
-    for base in (one for one in found if one.deviance - best < _DECIDED):
+    for base in (one for one in found if one.deviance - best < DECIDED):
         shared = shared_of(base)
         u, sd = np.nan_to_num(base.positions), np.linalg.norm(shared, axis=1)
         if bases == _BASES or any((np.abs(u - v) <= _ONE * one).all() for v, one in behind):
@@ -110,7 +110,7 @@ def _walk(
         begin = np.clip(begin, *problem.bounds(x))
         pull = Pull(weights, start + reach, _TIGHT / (reach - near))
         at, _ = climbed(problem, begun(problem, begin, positions), _STEPS, pull=pull)
-        if not at.deviance - best < _DECIDED:  # a step ahead may lead into the dark
+        if not at.deviance - best < DECIDED:  # a step ahead may lead into the dark
             again, _ = climbed(problem, begun(problem, x, positions), _STEPS, pull=pull)
             at = min(at, again, key=lambda end: end.deviance)
         if not math.isfinite(at.deviance):
@@ -120,7 +120,7 @@ def _walk(
             if end.deviance < best - _BETTER:
                 return points, end_of(problem, end, remaining)
         cost = at.deviance - best
-        if cost < _DECIDED:
+        if cost < DECIDED:
             points.append(end_of(problem, at, 0.0))
             stuck = pull.sum_of(at.u) - start < 0.5 * (near + reach)  # at an end of the ranges
             near, x, positions = reach, at.x, at.u
@@ -132,7 +132,7 @@ def _walk(
         if far - near < _NARROW * far:
             break
         if math.isinf(far):  # deviance grows by about the square of the way
-            more = math.sqrt(0.5 * (_NEARLY + _DECIDED) / max(cost, 1e-3))
+            more = math.sqrt(0.5 * (_NEARLY + DECIDED) / max(cost, 1e-3))
             reach = near * min(max(more, _LEAST), _LONGEST)
         else:
             reach = 0.5 * (near + far)
