@@ -1,20 +1,14 @@
 """Estimates at once: readings in, all physical ranges out, at once."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
-from inference.assumptions import assumptions_of
-from inference.empty_frames import Contradiction, contradiction
-from inference.estimates import Estimates, LeftOut, TechniqueResult
-from inference.first_step import beyond_bounds, first_step
+from inference.estimates import Estimates, TechniqueResult
+from inference.in_turn import estimates_in_turn, last_of
 from inference.known import known_of
-from inference.plan import Plan, cheapest, obstacle, plan
+from inference.plan import Plan, obstacle, plan
 from inference.realtime.registry import TECHNIQUES
-from inference.run import Said, by_prior, obstacle_by_prior, run
-from inference.stated_light import StatedLight, answers, stated_light, tells_more
-from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from inference.temperature import solved_where_told, task_of
-from simulator.errors import InvalidInputError, Problem
+from simulator.errors import InvalidInputError
 from simulator.frames import Frames
 from simulator.joint_scene import centre
 from simulator.scene import Scene
@@ -88,142 +82,7 @@ def estimate_planned(
     InvalidInputError
         As of `estimate`.
     """
-    light = stated_light(sensor, scene)
-    numbers, open_ = (scene, None) if light is None else (light.scene, light.sd)
-    against = contradiction(numbers, sensor, frames, open_)
-    asked = _Asked(sensor, scene, frames, light, against, {})
-    supposed = assumptions_of(scene, sensor, frames)
-    found = _chosen(asked, choice) if techniques is None else _named(asked, choice, techniques)
-    resting = any(asked.rests_on_prior(each.technique) for each in found.results)
-    if against is not None and (light is None or resting):
-        supposed = (against.said, *supposed)
-    return Estimates(found.chosen, found.results, found.left_out, supposed, found.do_first)
-
-
-class _Asked(NamedTuple):
-    """A request, and what is found out of it once."""
-
-    sensor: Sensor
-    scene: Scene
-    frames: Frames
-    light: StatedLight | None  # where the crosstalk has priors
-    against: Contradiction | None
-    said: Said
-
-    def rests_on_prior(self, name: str) -> bool:
-        """Tell whether a technique needs the crosstalk, of which there is a prior."""
-        own = TECHNIQUES.get(name)
-        return self.light is not None and own is not None and "crosstalk" not in own.immune_to
-
-    def run(self, name: str) -> TechniqueResult | LeftOut:
-        """Ask a technique that serves the scene."""
-        if self.light is not None and self.rests_on_prior(name):
-            return by_prior(self.sensor, self.light, self.frames, name, self.against)
-        against = None if self.light is not None else self.against
-        return run(self.sensor, self.scene, self.frames, name, against, self.said)
-
-    def first_step(self, choice: Plan, refused: LeftOut | None) -> str:
-        """Return what to do first where nothing answers."""
-        return first_step(self.sensor, self.scene, self.frames, choice, refused)
-
-
-class _Found(NamedTuple):
-    """Results, and why there are no others; see `Estimates`."""
-
-    chosen: str | None
-    results: tuple[TechniqueResult, ...]
-    left_out: tuple[LeftOut, ...]
-    do_first: str | None = None
-
-
-def _chosen(asked: _Asked, choice: Plan) -> _Found:
-    """Answer by the technique that tells most, of all that the scene allows."""
-    planned = None if choice.chosen is None else asked.run(choice.chosen)
-    left_out = choice.left_out
-    if isinstance(planned, LeftOut):
-        left_out = (planned, *left_out)
-    if asked.light is not None:
-        found, left_out = _beside(asked, asked.light, planned, left_out)
-        if found is not None:
-            return _Found(found.technique, (found,), left_out)
-    if not isinstance(planned, TechniqueResult):
-        return _Found(None, (), left_out, asked.first_step(choice, planned))
-    todo = None
-    if planned.range_bounds_m is not None:
-        todo = beyond_bounds(asked.sensor, asked.scene, asked.frames, planned.technique)
-    return _Found(planned.technique, (planned,), left_out, todo)
-
-
-def _beside(
-    asked: _Asked,
-    light: StatedLight,
-    planned: TechniqueResult | LeftOut | None,
-    left_out: tuple[LeftOut, ...],
-) -> tuple[TechniqueResult | None, tuple[LeftOut, ...]]:
-    """Return what goes before the plan's choice by a prior of the crosstalk, and what is left."""
-    names = filter(asked.rests_on_prior, TECHNIQUES)
-    reasons = {name: obstacle_by_prior(light, asked.frames, name) for name in names}
-    able = [name for name, reason in reasons.items() if reason is None]
-    name = cheapest(able, asked.sensor, asked.scene)
-    found = None if name is None else asked.run(name)
-    served = f"{name} serves the scene at less cost"
-    if isinstance(found, LeftOut):
-        served = found.reason
-    told = {item.name: item for item in left_out}
-    told |= {other: LeftOut(other, reason or served) for other, reason in reasons.items()}
-    if isinstance(found, TechniqueResult):
-        if not isinstance(planned, TechniqueResult):
-            del told[found.technique]
-            return found, tuple(told.values())
-        first = tells_more(found, planned)
-        more, less = (found, planned) if first else (planned, found)
-        told.pop(more.technique, None)
-        told[less.technique] = LeftOut(less.technique, _tells_less(more))
-        return (found if first else None), tuple(told.values())
-    return None, tuple(told.values())
-
-
-def _tells_less(than: TechniqueResult) -> str:
-    return (
-        f"{than.technique} tells more of these frames, or the same sharper: "
-        f"{int(answers(than).sum())} of {len(than)}"
-    )
-
-
-def _named(asked: _Asked, choice: Plan, techniques: Sequence[str]) -> _Found:
-    """Answer by the techniques that are asked for."""
-    sensor, scene, frames = asked.sensor, asked.scene, asked.frames
-    problems = [
-        Problem(f"/techniques/{i}", f"{name!r} is not a technique")
-        for i, name in enumerate(techniques)
-        if name not in ALL_TECHNIQUES and name not in ELSEWHERE
-    ]
-    if problems:
-        raise InvalidInputError(*problems)
-    served: dict[str, TechniqueResult] = {}
-    refused: LeftOut | None = None
-    left_out = {item.name: item for item in choice.left_out if item.name not in techniques}
-    if choice.chosen is not None and choice.chosen not in techniques:
-        left_out[choice.chosen] = LeftOut(choice.chosen, "was not asked for")
-    for name in dict.fromkeys(techniques):
-        reason = ELSEWHERE.get(name)
-        if reason is None and not asked.rests_on_prior(name):
-            # a fit over many frames asks the frames alone
-            of, stated = centre(sensor, scene) if name in TECHNIQUES else (sensor, scene)
-            reason = obstacle(ALL_TECHNIQUES[name], of, stated, known_of(stated, of), frames)
-        found = LeftOut(name, reason) if reason else asked.run(name)
-        if isinstance(found, LeftOut):
-            left_out[name] = found
-            own = reason is None and not asked.rests_on_prior(name)
-            refused = found if own else refused
-        else:
-            served[name] = found
-    chosen = cheapest((name for name in served if not asked.rests_on_prior(name)), sensor, scene)
-    other = cheapest(filter(asked.rests_on_prior, served), sensor, scene)
-    if other is not None and (chosen is None or tells_more(served[other], served[chosen])):
-        chosen = other
-    todo = None if served else asked.first_step(choice, refused)
-    return _Found(chosen, tuple(served.values()), tuple(left_out.values()), todo)
+    return last_of(estimates_in_turn(sensor, scene, frames, choice, techniques))
 
 
 def all_roots(

@@ -26,6 +26,8 @@
         └── WorkerDiedError            a task killed every worker that ran it
 """
 
+from typing import Any
+
 from simulator.errors import HybridTofError
 
 __all__ = [
@@ -128,7 +130,17 @@ class IdempotencyError(ServiceError):
 
 
 class OverdueError(ServiceError):
-    """The computation takes longer than the service has for an answer at once."""
+    """The computation takes longer than the service has for an answer at once.
+
+    Attributes
+    ----------
+    parts : tuple
+        What it had told of its answer by then.
+    """
+
+    def __init__(self, message: str, parts: tuple[Any, ...] = ()) -> None:
+        super().__init__(message)
+        self.parts = parts
 
 
 class ClientGoneError(ServiceError):

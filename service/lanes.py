@@ -5,7 +5,7 @@ what nobody waits for any more is given up.
 """
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Generator
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
@@ -122,9 +122,34 @@ class Processes:
         ClientGoneError
             Where the client hung up; the process is ended then.
         """
+        self._check_room()
+        return await self._result(
+            request, self._pool.submit_once(self._limit_s, function, *arguments)
+        )
+
+    async def run_in_parts(
+        self, request: Request, function: Callable[..., Generator[R, None, R]], *arguments: Any
+    ) -> list[R]:
+        """Run a generator that can be imported by its name; what it returns is the last part.
+
+        Raises
+        ------
+        BusyError, ClientGoneError
+            As of `run`.
+        OverdueError
+            As of `run`, with the parts that were told in time.
+        """
+        self._check_room()
+        return await self._result(
+            request, self._pool.submit_in_parts(self._limit_s, function, *arguments)
+        )
+
+    def _check_room(self) -> None:
         if self._count >= self._most:
             raise BusyError("too many requests wait for their turn")
-        future: Future[R] = self._pool.submit_once(self._limit_s, function, *arguments)
+
+    async def _result(self, request: Request, future: Future[R]) -> R:
+        """Await a task that was handed over, for as long as its client waits for it."""
         self._count += 1
         try:
             return await while_wanted(request, asyncio.wrap_future(future))

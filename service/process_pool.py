@@ -9,9 +9,9 @@ import contextlib
 import logging
 import queue
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from concurrent.futures import Executor, Future
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, cast
 
 from service.errors import OverdueError, WorkerDiedError
 from service.worker_process import DiedError, Watch, WorkerProcess
@@ -124,6 +124,29 @@ class ProcessPool(Executor):
         """Hand over a task as `submit_within` does; beyond it the future raises `OverdueError`."""
         return self._submit(Watch(limit_s, self._stall_s, again=False), fn, *args)
 
+    def submit_in_parts(
+        self, limit_s: float, fn: Callable[..., Generator[R, None, R]], /, *args: Any
+    ) -> Future[list[R]]:
+        """Hand over a task that tells its answer in parts, once.
+
+        Parameters
+        ----------
+        limit_s : float
+            As of `submit_within`; beyond it the future raises `OverdueError`, with the parts that
+            were told.
+        fn : callable
+            A generator; what it returns is the last part.
+        *args
+            Its arguments.
+
+        Returns
+        -------
+        concurrent.futures.Future
+            Of all parts.
+        """
+        watch = Watch(limit_s, self._stall_s, again=False, in_parts=True)
+        return cast("Future[list[R]]", self._submit(watch, fn, *args))
+
     def compiling(self, future: Future[Any]) -> bool:
         """Tell whether machine code is being made for a task."""
         with self._lock:
@@ -210,7 +233,7 @@ class ProcessPool(Executor):
                 if future in self._unwanted or self._closed.is_set():
                     break
                 if error.overdue and not watch.again:
-                    return False, OverdueError(f"it takes {error}")
+                    return False, OverdueError(f"it takes {error}", tuple(watch.parts))
                 own, deaths = own + error.own, deaths + 1
                 _log.warning("a worker died (%s); its task is run again", error)
                 if own >= _OWN_DEATHS or deaths >= _DEATHS:

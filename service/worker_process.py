@@ -11,7 +11,7 @@ from multiprocessing.context import SpawnProcess
 from typing import Any
 
 from service.process_watch import ended_by_itself, processor_time
-from service.worker import COMPILING, THREAD_VARIABLES, work
+from service.worker import COMPILING, PART, THREAD_VARIABLES, work
 
 __all__ = ["DiedError", "Watch", "WorkerProcess"]
 
@@ -51,18 +51,26 @@ class Watch:
 
     again : bool
         Whether a task that took too long is run again.
+    in_parts : bool
+        Whether the task is a generator: its result is a list of what it told and what it returned.
 
     Attributes
     ----------
     compiling : bool
         Whether machine code is being made.
+    parts : list
+        What the task has told of its answer until now.
     """
 
-    def __init__(self, limit_s: float, stall_s: float, again: bool = True) -> None:
+    def __init__(
+        self, limit_s: float, stall_s: float, again: bool = True, in_parts: bool = False
+    ) -> None:
         self.limit_s = limit_s
         self.stall_s = stall_s
         self.again = again
+        self.in_parts = in_parts
         self.compiling = False
+        self.parts: list[Any] = []
 
 
 @contextlib.contextmanager
@@ -112,15 +120,21 @@ class WorkerProcess:
         DiedError
             Where there is no answer to be had; the process has ended then.
         """
+        watch.parts = []
         try:
             self.pipe.send(task)
             self._await(watch, watch.limit_s + _IMPORTS_S)
             spent_s = 0.0
             while True:
                 answer: Any = self.pipe.recv()
-                if answer[0] != COMPILING:
+                if answer[0] == COMPILING:
+                    watch.compiling = answer[1]
+                elif answer[0] == PART:
+                    watch.parts.append(answer[1])
+                elif answer[0] and watch.in_parts:
+                    return True, [*watch.parts, answer[1]]
+                else:
                     return bool(answer[0]), answer[1]
-                watch.compiling = answer[1]
                 spent_s += self._await(watch, watch.limit_s - spent_s)
         except (EOFError, OSError):
             self.process.join(_LOOK_S)

@@ -17,7 +17,7 @@ from inference.estimates import Estimates, LeftOut, SdParts, Status, TechniqueRe
 from service.json_text import encode
 from simulator.remembered import remembered
 
-__all__ = ["AnswerShape", "encode_estimates"]
+__all__ = ["AnswerShape", "encode_around", "encode_estimates", "encode_result"]
 
 AnswerShape = Literal["rows", "columns"]
 
@@ -48,16 +48,29 @@ def encode_estimates(estimates: Estimates, shape: AnswerShape = "rows") -> bytes
     bytes
         JSON as in docs/http.md, estimates; null where a number is not available.
     """
-    parts = [b'{"chosen":', encode(estimates.chosen), b',"results":[']
+    before, after = encode_around(estimates)
+    parts = [before]
     for number, result in enumerate(estimates.results):
         parts.append(b"," if number else b"")
-        parts += _technique(result, shape)
-    parts += [b'],"left_out":', _left_out(estimates.left_out)]
+        parts += encode_result(result, shape)
+    parts.append(after)
+    return b"".join(parts)
+
+
+def encode_around(estimates: Estimates) -> tuple[bytes, bytes]:
+    """Return what stands before and behind the results.
+
+    Parameters
+    ----------
+    estimates : Estimates
+        Of which the results are not looked at.
+    """
+    parts = [b'],"left_out":', _left_out(estimates.left_out)]
     parts += [b',"assumptions":', encode(estimates.assumptions)]
     if estimates.do_first is not None:
         parts += [b',"do_first":', encode(estimates.do_first)]
     parts.append(b"}")
-    return b"".join(parts)
+    return b'{"chosen":' + encode(estimates.chosen) + b',"results":[', b"".join(parts)
 
 
 @remembered
@@ -66,8 +79,14 @@ def _left_out(items: tuple[LeftOut, ...]) -> bytes:
     return encode([{"technique": item.name, "reason": item.reason} for item in items])
 
 
-def _technique(result: TechniqueResult, shape: AnswerShape) -> Iterator[bytes]:
-    """Yield JSON text of one technique's results, block by block."""
+def encode_result(result: TechniqueResult, shape: AnswerShape) -> Iterator[bytes]:
+    """Yield JSON text of one technique's results, block by block.
+
+    Parameters
+    ----------
+    result, shape
+        As of `encode_estimates`.
+    """
     yield b'{"technique":' + encode(result.technique) + b',"frames":'
     if shape == "columns":
         yield from _columns(result)

@@ -1,11 +1,12 @@
 """Estimates as messages: the answer to a request that accepts one of their forms."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 
-from inference.estimate import estimate
 from inference.estimates import Estimates
+from inference.in_turn import estimates_in_turn
 from inference.known import known_of
+from inference.plan import plan
 from inference.techniques import ALL_TECHNIQUES
 from service.checked_system import checked_frames
 from service.messages import MESSAGES
@@ -17,7 +18,7 @@ from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
-__all__ = ["encode_messages", "message_answer"]
+__all__ = ["encode_messages", "message_parts"]
 
 
 def encode_messages(
@@ -64,8 +65,10 @@ def encode_messages(
     return json.dumps(body, allow_nan=False).encode("ascii")
 
 
-def message_answer(request: EstimateRequest, media_type: str) -> bytes:
-    """Estimate, and encode as messages.
+def message_parts(
+    request: EstimateRequest, media_type: str, overdue: str
+) -> Generator[bytes, None, bytes]:
+    """Estimate, and encode as messages whenever another technique is the chosen one.
 
     Parameters
     ----------
@@ -73,11 +76,18 @@ def message_answer(request: EstimateRequest, media_type: str) -> bytes:
         Sensor, scene, frames and techniques.
     media_type : str
         Of one of `MESSAGES`.
+    overdue : str
+        Why a technique is left out that has not answered when there is no more time.
+
+    Yields
+    ------
+    bytes
+        As of `encode_messages`: all that is to be said if no other technique answers in time.
 
     Returns
     -------
     bytes
-        As of `encode_messages`.
+        The last of it.
 
     Raises
     ------
@@ -87,6 +97,19 @@ def message_answer(request: EstimateRequest, media_type: str) -> bytes:
         As of `encode_messages`.
     """
     sensor, scene, frames = checked_frames(request.sensor, request.scene, request.frames)
-    estimates = estimate(sensor, scene, frames, request.techniques)
     form = {message.media_type: message for message in MESSAGES}[media_type]
-    return encode_messages(form, sensor, scene, frames, estimates, request.techniques)
+    choice = plan(sensor, scene, frames)
+    turns = estimates_in_turn(sensor, scene, frames, choice, request.techniques, overdue)
+    chosen, messages = None, b""
+    while True:
+        try:
+            so_far = next(turns)
+        except StopIteration as end:
+            found: Estimates = end.value
+            if messages and found.chosen == chosen:
+                return messages
+            return encode_messages(form, sensor, scene, frames, found, request.techniques)
+        if so_far.chosen != chosen:
+            chosen = so_far.chosen
+            messages = encode_messages(form, sensor, scene, frames, so_far, request.techniques)
+            yield messages

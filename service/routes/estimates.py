@@ -1,30 +1,35 @@
 """Deterministic estimates, at once."""
 
-from typing import Annotated, cast, get_args
+from collections.abc import Callable, Generator
+from typing import Annotated, Any, TypeVar, cast, get_args
 
 from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import Response
 
-from inference.estimate import estimate, estimate_planned
+from inference.estimate import estimate_planned
 from inference.fits.techniques.registry import FITS
 from inference.plan import plan
+from service.answers.answering import answer_parts
 from service.answers.encoding import AnswerShape, encode_estimates
 from service.answers.estimates import ColumnarEstimatesResponse, EstimatesResponse
+from service.answers.in_parts import joined
 from service.bodies import BodyOf
 from service.checked_system import aliases_of, checked_frames
 from service.errors import NotAcceptableError, OverdueError
 from service.exports.negotiation import accepted_type
 from service.messages import MESSAGES
-from service.messages.answering import message_answer
+from service.messages.answering import message_parts
 from service.problems import problem_responses
 from service.requests import EstimateRequest
 from service.routes.direct import DirectRoute
 from service.service_settings import ServiceSettings
-from service.shared import SMALL, TINY, TINY_BYTES, shared_of
+from service.shared import SMALL, TINY, TINY_BYTES, Shared, shared_of
 from simulator.compiled import NotReadyError, ready_only
 from simulator.errors import InvalidInputError, listed
 
-__all__ = ["answer", "quick_answer", "router"]
+__all__ = ["quick_answer", "router"]
+
+R = TypeVar("R")
 
 _READ = BodyOf(EstimateRequest)
 
@@ -48,30 +53,6 @@ _ANY = frozenset({"", "*/*", _FORMS[0]})
 Body = Annotated[tuple[EstimateRequest, bytes], Depends(_READ)]
 
 
-def answer(request: EstimateRequest, shape: AnswerShape = "rows") -> bytes:
-    """Estimate and encode.
-
-    Parameters
-    ----------
-    request : EstimateRequest
-        Sensor, scene, frames and techniques.
-    shape : str
-        Of `service.answers.encoding.encode_estimates`.
-
-    Returns
-    -------
-    bytes
-        JSON as in docs/http.md, estimates.
-
-    Raises
-    ------
-    InvalidInputError
-        With pointers into the request.
-    """
-    sensor, scene, frames = checked_frames(request.sensor, request.scene, request.frames)
-    return encode_estimates(estimate(sensor, scene, frames, request.techniques), shape)
-
-
 def quick_answer(
     request: EstimateRequest,
     settings: ServiceSettings,
@@ -83,23 +64,24 @@ def quick_answer(
     Parameters
     ----------
     request : EstimateRequest
-        As of `answer`.
+        As of `answer_parts`.
     settings : ServiceSettings
         How many frames a fit may have.
     shape : str
-        As of `answer`.
+        As of `answer_parts`.
     most : int
         Estimates of frames that may be asked for, by all techniques together.
 
     Returns
     -------
     bytes or None
-        As of `answer`; None where a fit over many frames is asked for, or more than ``most``.
+        JSON as in docs/http.md, estimates; None where a fit over many frames is asked for, or more
+        than ``most``.
 
     Raises
     ------
     InvalidInputError
-        As of `answer`, and for a fit of too many frames.
+        As of `answer_parts`, and for a fit of too many frames.
     """
     sensor, scene, frames = checked_frames(request.sensor, request.scene, request.frames)
     choice = plan(sensor, scene, frames)
@@ -125,6 +107,22 @@ def tiny_answer(
             return quick_answer(request, settings, shape, TINY)
     except NotReadyError:
         return None
+
+
+async def _in_time(
+    request: Request, shared: Shared, function: Callable[..., Generator[R, None, R]], *asked: Any
+) -> list[R]:
+    """Return the parts of an answer, or those that were there in time; none is an error."""
+    reason = (
+        f"the request takes more than {shared.settings.request_s:g} s of processor time: "
+        "ask for a posterior, state numbers as known, or send fewer frames"
+    )
+    try:
+        return await shared.processes.run_in_parts(request, function, *asked, reason)
+    except OverdueError as error:
+        if not error.parts:
+            raise OverdueError(reason) from None
+        return list(error.parts)
 
 
 @router.post(
@@ -154,16 +152,12 @@ async def create(
         if form is None:
             raise NotAcceptableError(f"estimates come as {listed(_FORMS)}")
         if form != _FORMS[0]:
-            messages = await shared.processes.run(request, message_answer, asked, form)
+            messages = (await _in_time(request, shared, message_parts, asked, form))[-1]
             return Response(messages, headers={"Vary": "Accept"}, media_type=form)
     tiny = len(body[1]) <= TINY_BYTES
     content = tiny_answer(asked, shared.settings, shape) if tiny else None
     if content is None:
         content = await shared.threads.run(request, quick_answer, asked, shared.settings, shape)
     if content is None:
-        try:
-            content = await shared.processes.run(request, answer, asked, shape)
-        except OverdueError as error:
-            remedy = "ask for a posterior, state numbers as known, or send fewer frames"
-            raise OverdueError(f"{error}: {remedy}") from None
+        content = joined(await _in_time(request, shared, answer_parts, asked, shape))
     return Response(content, media_type="application/json")

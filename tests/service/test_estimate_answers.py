@@ -1,7 +1,9 @@
 """The columnwise encoder against one dictionary a frame."""
 
+import dataclasses
 import json
 import math
+from collections.abc import Generator
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from inference.estimates import Estimates, LeftOut, SdParts, Status, TechniqueResult
-from service.answers.encoding import encode_estimates
+from inference.techniques import ALL_TECHNIQUES
+from service.answers.encoding import AnswerShape, encode_estimates
+from service.answers.in_parts import AnswerPart, encode_in_parts, joined
 
 REASONS = ("", 'a "quoted" {brace} reason', "beyond the background: é")
 
@@ -104,6 +108,36 @@ def test_same_as_one_dictionary_a_frame(result: TechniqueResult) -> None:
     for item in body["results"]:
         assert item.keys() == {"technique", "frames", "parameters", "runtime_s"}
         assert item["frames"] == slow(result)
+
+
+@pytest.mark.parametrize("shape", ["rows", "columns"])
+@given(found=st.lists(results(), min_size=1, max_size=4))
+def test_parts_are_the_whole_at_any_time(found: list[TechniqueResult], shape: AnswerShape) -> None:
+    """Techniques answer in another order than they stand in, and each is encoded once."""
+    names = list(ALL_TECHNIQUES)[: len(found)]
+    pairs = zip(found, names, strict=True)
+    named = [dataclasses.replace(result, technique=name) for result, name in pairs]
+
+    def upto(number: int) -> Estimates:
+        waiting = tuple(LeftOut(name, "is slow") for name in names[: len(names) - number])
+        return Estimates(names[-1], tuple(named[len(names) - number :]), waiting)
+
+    whole = [upto(number) for number in range(1, len(names) + 1)]
+
+    def turns() -> Generator[Estimates, None, Estimates]:
+        yield from whole[:-1]
+        return whole[-1]
+
+    parts: list[AnswerPart] = []
+    encoding = encode_in_parts(turns(), shape)
+    while len(parts) < len(whole) - 1:
+        parts.append(next(encoding))
+    with pytest.raises(StopIteration) as end:
+        next(encoding)
+    parts.append(end.value.value)
+    for number, estimates in enumerate(whole, 1):
+        assert joined(parts[:number]) == encode_estimates(estimates, shape)
+    assert [len(part.results) for part in parts] == [1] * len(names)
 
 
 def test_no_result() -> None:

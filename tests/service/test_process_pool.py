@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import signal
 import time
+from collections.abc import Generator
 from concurrent.futures import CancelledError
 from pathlib import Path
 
@@ -101,6 +102,53 @@ def _compile_and_spin() -> None:
         until = time.process_time() + 0.02
         while time.process_time() < until:
             pass
+
+
+def _count(to: int, dies: str) -> Generator[int, None, int]:
+    """Count, and die once on the way where there is no mark yet."""
+    for number in range(to):
+        yield number
+        if dies and number == 1 and not Path(dies).exists():
+            Path(dies).touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+    return to
+
+
+def _count_and_spin(to: int, pid: str) -> Generator[int, None, int]:
+    yield from range(to)
+    Path(pid).write_text(str(os.getpid()))
+    while True:
+        pass
+
+
+def _count_and_refuse() -> Generator[int, None, int]:
+    yield 0
+    raise InvalidInputError.at("/b", "is wrong")
+
+
+def test_parts_are_told_once_each(tmp_path: Path) -> None:
+    with ProcessPool(1) as pool:
+        assert pool.submit_in_parts(9.0, _count, 3, "").result() == [0, 1, 2, 3]
+        again = pool.submit_in_parts(9.0, _count, 3, str(tmp_path / "died")).result()
+        assert (tmp_path / "died").exists()
+        assert again == [0, 1, 2, 3]
+        with pytest.raises(InvalidInputError, match="/b: is wrong"):
+            pool.submit_in_parts(9.0, _count_and_refuse).result()
+        assert pool.submit_in_parts(9.0, _count, 0, "").result() == [0]
+
+
+def test_parts_that_were_told_outlive_what_takes_too_long(tmp_path: Path) -> None:
+    pid = tmp_path / "pid"
+    with ProcessPool(1) as pool:
+        for told in (3, 0):
+            with pytest.raises(OverdueError, match="processor time") as overdue:
+                pool.submit_in_parts(0.1, _count_and_spin, told, str(pid)).result()
+            assert overdue.value.parts == tuple(range(told))
+            with pytest.raises(ProcessLookupError):
+                os.kill(int(pid.read_text()), 0)
+        with pytest.raises(OverdueError) as plain:
+            pool.submit_once(0.1, _spin).result()
+        assert plain.value.parts == ()
 
 
 def test_each_compiling_is_no_new_beginning() -> None:
