@@ -94,11 +94,14 @@ def add_shape(
         def scale(values: Values) -> Array | float:
             return 1.0 if is_object else values["object.c0"]
 
+        def cut(values: Values) -> Array | float:
+            return 0.0 if least == 0.0 else least / scale(values)
+
         unknowns.append(
             Unknown(
                 name0,
                 lambda z, v: scale(v) * law.from_normal(z, least / scale(v)),
-                lambda x, v: law.to_normal(x / scale(v), least / scale(v)),
+                lambda x, v: law.to_normal(x / scale(v), cut(v)),
                 None if least == 0.0 else (lambda v: law.log_mass(least / scale(v))),
                 deviation=lambda x, v: law.deviation(x / scale(v), least / scale(v)),
             )

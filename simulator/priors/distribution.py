@@ -6,6 +6,7 @@ unit scale whatever the units, and the posterior's spread in z is its contractio
 
 import abc
 import dataclasses
+import functools
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -153,9 +154,11 @@ class Distribution(abc.ABC):
         ndarray
             z.
         """
-        low = np.maximum(low, 0.0) if self.log else low
-        a, b = self._bounds(low, high)
         position = self._coordinate(x)
+        if isinstance(low, float) and isinstance(high, float):
+            a, b = _ends(self, low, high)
+        else:
+            a, b = self._bounds(np.maximum(low, 0.0) if self.log else low, high)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             return np.asarray(self._variate(position, a, b))
 
@@ -195,3 +198,9 @@ class Distribution(abc.ABC):
     def truncated(self, low: float = -np.inf, high: float = np.inf) -> Self:
         """Return the same law on a smaller support, renormalised."""
         return dataclasses.replace(self, low=max(low, self.low), high=min(high, self.high))
+
+
+@functools.lru_cache(maxsize=256)
+def _ends(law: Distribution, low: float, high: float) -> tuple[Array, Array]:
+    """Return bounds in the coordinate of a law, found once: fits ask for them at every step."""
+    return law._bounds(np.maximum(low, 0.0) if law.log else low, high)

@@ -1,6 +1,7 @@
 """Laws that are normal in x or in log x, whole or cut."""
 
 import dataclasses
+import functools
 import math
 from typing import Annotated, Any, Literal
 
@@ -30,7 +31,7 @@ def _log_difference(larger: Array, smaller: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         gap = np.minimum(smaller - larger, 0.0)
         result = np.where(gap > -math.log(2), np.log(-np.expm1(gap)), np.log1p(-np.exp(gap)))
-    return np.asarray(np.where(np.isneginf(larger), -np.inf, larger + result))
+    return np.asarray(np.where(larger == -np.inf, -np.inf, larger + result))
 
 
 def _log_normal_mass(low: Array, high: Array) -> Array:
@@ -67,7 +68,8 @@ class NormalDistribution(Distribution):
         """As `Distribution.to_normal`, for an uncut law without its bounds."""
         if not self._cut_by(low, high):
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                return self._standard(self._coordinate(x))
+                position = np.asarray(np.log(x) if self.log else x, dtype=float)
+                return np.asarray((position - self.loc) / self.scale)
         return Distribution.to_normal(self, x, low, high)
 
     def _cut_by(self, low: Any, high: Any) -> bool:
@@ -98,14 +100,20 @@ class NormalDistribution(Distribution):
         return np.asarray(self.loc + self.scale * z)
 
     def _variate(self, position: Array, a: Array, b: Array) -> Array:
-        a, b, standard = self._standard(a), self._standard(b), self._standard(position)
-        if _is_whole(a, b):
+        standard = self._standard(position)
+        if a.ndim == b.ndim == 0:
+            whole, a, b, mass = _between(self, float(a), float(b))
+        else:
+            a, b = self._standard(a), self._standard(b)
+            whole, mass = _is_whole(a, b), None
+        if whole:
             return standard
-        mass = _log_normal_mass(a, b)
-        lower = np.minimum(_log_normal_mass(a, standard) - mass, 0.0)
-        upper = np.minimum(_log_normal_mass(standard, b) - mass, 0.0)
-        return np.where(
-            lower < upper, scipy.special.ndtri_exp(lower), -scipy.special.ndtri_exp(upper)
+        mass = _log_normal_mass(a, b) if mass is None else mass
+        sides = np.empty((2, 2, *np.broadcast_shapes(a.shape, b.shape, standard.shape)))
+        sides[0, 0], sides[0, 1], sides[1, 0], sides[1, 1] = a, standard, standard, b
+        lower, upper = np.minimum(_log_normal_mass(*sides) - mass, 0.0)
+        return np.asarray(
+            np.where(lower < upper, scipy.special.ndtri_exp(lower), -scipy.special.ndtri_exp(upper))
         )
 
     def _log_density(self, position: Array, a: Array, b: Array) -> Array:
@@ -125,6 +133,19 @@ class NormalDistribution(Distribution):
         if self.log:
             return RangeForm(-1.0, log_mean=self.loc, inverse_log_sd=1.0 / self.scale)
         return RangeForm(0.0, mean=self.loc, inverse_sd=1.0 / self.scale)
+
+
+@functools.lru_cache(maxsize=256)
+def _between(
+    law: NormalDistribution, low: float, high: float
+) -> tuple[bool, Array, Array, Array | None]:
+    """Return whether nothing of a law is cut away, its standardised ends, and its log mass there.
+
+    Found once: fits ask for them at every step.
+    """
+    a, b = law._standard(np.asarray(low)), law._standard(np.asarray(high))
+    whole = _is_whole(a, b)
+    return whole, a, b, None if whole else _log_normal_mass(a, b)
 
 
 def _is_whole(a: Array, b: Array) -> bool:

@@ -46,6 +46,27 @@ def test_chain_is_the_derivative_of_the_physical_values(shadow: str) -> None:
             np.testing.assert_allclose(at[:, j], wanted, rtol=1e-7, atol=1e-8)
 
 
+def test_values_that_are_kept_are_those_of_the_coordinates_asked_for() -> None:
+    problem, other = (problem_of(kind, EVERYTHING, TRUTH) for kind in ("pulsed", "sine_wave"))
+    x = np.random.default_rng(6).normal(0, 0.3, len(problem))
+    x[-1] = 0.1
+    for _ in range(3):
+        values, slopes = problem.opened(x)
+        np.testing.assert_array_equal(values, problem.values(x))
+        np.testing.assert_array_equal(slopes, problem.chain(x.copy()))
+        assert not np.array_equal(slopes, other.chain(x))
+        x += 0.01  # in its place
+
+
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+def test_many_coordinates_at_once_are_each_alone(kind: str) -> None:
+    problem = problem_of(kind, EVERYTHING, TRUTH)
+    points = np.random.default_rng(7).normal(0, 0.3, (8, len(problem)))
+    points[:, -1] = np.abs(points[:, -1]) + 0.01
+    alone = [problem.natural(point) for point in points]
+    np.testing.assert_allclose(problem.naturals(points), alone, rtol=1e-13)
+
+
 def test_coordinates_are_the_inverse_of_natural() -> None:
     problem = problem_of("pulsed", EVERYTHING, TRUTH)
     natural = np.array([[0.2, -0.3, 0.4, 1e-3, -2e-3, 0.02, 3.0, 0.1, 0.05]])

@@ -182,3 +182,14 @@ def test_extreme_laws_overflow_without_a_warning() -> None:
     narrow = NormalDistribution(log=False, loc=0.0, scale=1e-320, low=-1.0, high=1.0)
     assert np.all(np.isfinite(narrow.from_normal(z)))
     assert float(narrow.log_density(0.5)) == -math.inf
+
+
+def test_ends_that_are_found_once_are_each_law_s_own() -> None:
+    """Asked in turn, with one pair of bounds for all values or one for each."""
+    x = np.concatenate([np.linspace(-1.0, 5.0, 41), [0.0, 1e-30, 19.0, 1e30]])
+    laws = [prior.distribution() for prior in LAWS.values()]
+    wider = HalfNormal(sd=0.7).distribution()
+    cuts = [(-math.inf, math.inf), (0.0, math.inf), (3.1, 4.9), (3.1, 4.8)]
+    for law, (low, high) in [*itertools.product([*laws, wider], cuts)] * 2:
+        each = law.to_normal(x, np.full(x.size, low), np.full(x.size, high))
+        np.testing.assert_array_equal(law.to_normal(x, low, high), each)

@@ -4,7 +4,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from inference.fits.likelihood.erring_point import (
@@ -54,7 +53,7 @@ def _eliminated(problem: FitProblem, at: Point) -> Information:
         told = told._replace(errors=of_all)
     seen = eliminated(problem.names, at.jacobian, at.along, errors, told)
     # what a range would gain beyond the ends of what is possible no step can take
-    low, high = np.log(problem.support)
+    low, high = problem.log_support
     step = -seen.error_response[:, -1]
     ended = ((at.u <= low) & (step < 0.0)) | ((at.u >= high) & (step > 0.0))
     if not ended.any():
@@ -69,9 +68,11 @@ def _ranges(problem: FitProblem, at: Point, seen: Information, dx: Array, da: Ar
     """Return ranges that follow a step."""
     step = seen.response @ dx + seen.error_response @ np.append(da, -1.0)
     with np.errstate(invalid="ignore"):
-        step = np.clip(step / (1.0 + seen.own_variance), -0.5, 0.5)
+        step = np.minimum(np.maximum(step / (1.0 + seen.own_variance), -0.5), 0.5)
     step[~np.isfinite(step)] = 0.0
-    return np.where(np.isfinite(at.u), np.clip(at.u + step, *np.log(problem.support)), np.nan)
+    low, high = problem.log_support
+    u = np.minimum(np.maximum(at.u + step, low), high)
+    return np.where(np.isfinite(at.u), u, np.nan)
 
 
 def _settled(problem: FitProblem, at: Point) -> Point:
@@ -146,20 +147,18 @@ def climbed(
         seen, bounds = _eliminated(problem, at), problem.bounds(at.x)
         errors, seen_residual = seen.errors[:, :-1], seen.errors[:, -1]
         d = at.x.size
-        rows = np.block(
-            [
-                [errors, seen.jacobian, seen_residual[:, None]],
-                [np.eye(k), np.zeros((k, d)), -at.a[:, None]],
-                [np.zeros((d, k)), slopes, -at.z[:, None]],
-            ]
-        )
+        m = len(errors)
+        rows = np.zeros((m + k + d, k + d + 1))
+        rows[:m, :k], rows[:m, k:-1], rows[:m, -1] = errors, seen.jacobian, seen_residual
+        rows[m : m + k, :k], rows[m : m + k, -1] = np.eye(k), -at.a
+        rows[m + k :, k:-1], rows[m + k :, -1] = slopes, -at.z
         if pull is not None:
             rows = np.vstack([rows, pull.row(seen, at.u)])
-        triangle = scipy.linalg.qr(rows, mode="r")[0]
+        triangle = np.asarray(np.linalg.qr(rows, mode="r"))
         of_x, wanted = triangle[k : k + d, k:-1], triangle[k : k + d, -1]
         if held is not None:
             of_x = np.where(np.arange(d) == held, 0.0, of_x)
-        size = np.linalg.norm(of_x, axis=0)
+        size = np.sqrt(np.square(of_x).sum(axis=0))
         size = np.where(size > 0, size, 1.0)
         remaining = float(wanted @ wanted)
         better = None
@@ -170,7 +169,9 @@ def climbed(
             new = np.clip(at.x + step * min(1.0, _LONGEST / max(longest, 1e-300)), *bounds)
             dx = new - at.x
             left = triangle[:k, -1] - triangle[:k, k:-1] @ dx
-            da = np.linalg.lstsq(triangle[:k, :k], left, rcond=None)[0]
+            da = np.zeros(0)
+            if k > 0:
+                da = np.linalg.lstsq(triangle[:k, :k], left, rcond=None)[0]
             z, slopes_there = standard_and_slopes(problem, new)
             u = _ranges(problem, at, seen, dx, da)
             there = _settled(problem, point_at(problem, new, u, at.a + da, z))

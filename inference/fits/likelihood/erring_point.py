@@ -1,5 +1,6 @@
 """Readings of a model that errs, linearised along unknowns, ranges and errors."""
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -38,6 +39,7 @@ Array = NDArray[np.float64]
 
 _FARTHEST = 30.0  # standard deviations of the priors, beyond which no slope is
 _DIFFERENCE = 1e-4
+_EACH = np.eye(SLOTS)
 
 
 class Point(NamedTuple):
@@ -110,7 +112,8 @@ def standard(problem: FitProblem, points: Array) -> Array:
                 problem.mode.factor, off, lower=True, check_finite=False
             ).T
         z = z[:, columns]
-    return np.clip(np.nan_to_num(z, nan=_FARTHEST), -_FARTHEST, _FARTHEST)
+    z = np.where(np.isnan(z), _FARTHEST, z)
+    return np.minimum(np.maximum(z, -_FARTHEST), _FARTHEST)
 
 
 def deviations_of(problem: FitProblem, x: Array) -> Array:
@@ -137,9 +140,20 @@ def slopes_of_priors(problem: FitProblem, x: Array) -> Array:
 
 def standard_and_slopes(problem: FitProblem, x: Array) -> tuple[Array, Array]:
     """Return `standard` of one point, shape (d,), and its derivatives, at the cost of one call."""
-    around = np.vstack([x, x + _DIFFERENCE * np.eye(x.size)])
-    z = standard(problem, around)
+    z = standard(problem, x + _aside(x.size))
     return np.asarray(z[0]), np.asarray((z[1:] - z[0]).T / _DIFFERENCE)
+
+
+@functools.lru_cache(maxsize=32)
+def _units(n: int) -> Array:
+    """Return a unit matrix for each frame, shape (n, 2, 2); not to be written to."""
+    return np.broadcast_to(np.eye(2), (n, 2, 2))
+
+
+@functools.lru_cache(maxsize=32)
+def _aside(size: int) -> Array:
+    """Return a point and those a difference aside, shape (size + 1, size); not to be written to."""
+    return np.vstack([np.zeros(size), _DIFFERENCE * np.eye(size)])
 
 
 def linearised(
@@ -151,15 +165,15 @@ def linearised(
     where many frames leave little of what errors do not take up, derivatives of the bare light end
     a climb away from its top.
     """
-    n, values = u.size, problem.values(x)
+    n, (values, chain) = u.size, problem.opened(x)
     by_value, along, residual = np.empty((n, 2, SLOTS)), np.empty((n, 2)), np.empty((n, 2))
     fit = problem.kernel_fit()
-    whitened_slopes(by_value, along, residual, values, np.eye(SLOTS), np.ascontiguousarray(u), fit)
+    whitened_slopes(by_value, along, residual, values, _EACH, np.ascontiguousarray(u), fit)
     # crosstalk moves the readings themselves
     whitener = by_value[:, :, list(CROSSTALK)]
     if not (problem.object_errs or problem.shadow_errs or problem.places is not None):
         errors = with_column(problem.known, np.zeros((n, 2, 0)))
-        return residual, by_value @ problem.chain(x), along, errors, whitener
+        return residual, by_value @ chain, along, errors, whitener
     signal = by_value[:, :, Value.C2] * values[Value.C2]
     light = np.linalg.solve(whitener, signal[:, :, None])[:, :, 0]
     parts = [errors_of_readings(problem, light, u)]
@@ -181,7 +195,7 @@ def linearised(
         along = along + (whitener @ np.nan_to_num(further)[:, :, None])[:, :, 0]
     return (
         residual,
-        by_value @ problem.chain(x),
+        by_value @ chain,
         along,
         with_column(problem.known, errors),
         whitener,
@@ -219,7 +233,7 @@ def whitened_of(problem: FitProblem, u: Array, errors: Array, parts: Array) -> A
 def _root_of_covariance(problem: FitProblem, u: Array, errors: Array) -> Array:
     """Return the Cholesky factor of noise and what is left of errors, in units of the noise."""
     if errors.shape[2] == 0:
-        return np.broadcast_to(np.eye(2), (u.size, 2, 2))
+        return _units(u.size)
     with np.errstate(over="ignore", invalid="ignore"):
         left = np.einsum("n,nik,njk->nij", own_share_left(problem, u), errors, errors)
     left = np.where(np.isfinite(left).all(axis=(1, 2), keepdims=True), left, 0.0)

@@ -23,6 +23,7 @@ from inference.frame.blocks import own_blocks
 from inference.frame.sensitivity import Value
 from simulator.errors import RefusedError
 from simulator.frames import Frames
+from simulator.last_call import LastCall
 from simulator.model_error import ModelError
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import Scene
@@ -155,9 +156,31 @@ class FitProblem:
 
     def chain(self, x: Array) -> Array:
         """Return the derivatives of all values along the coordinates, shape (SLOTS, d)."""
-        out = np.empty((SLOTS, x.size))
-        chain(out, self.values(x), x, self.layout, self.bounds(x))
-        return out
+        return self.opened(x)[1]
+
+    def opened(self, x: Array) -> tuple[Array, Array]:
+        """Return `values` and `chain`, of coordinates that were just asked for without a search.
+
+        Nothing may be written to either.
+        """
+        return self._last.of(self._opened_anew, x)
+
+    def _opened_anew(self, x: Array) -> tuple[Array, Array]:
+        values, out = self.values(x), np.empty((SLOTS, x.size))
+        bounds = Bounds(np.empty(x.size), np.empty(x.size))
+        bounds_of(bounds, values, self.layout)
+        chain(out, values, x, self.layout, bounds)
+        return values, out
+
+    @functools.cached_property
+    def _last(self) -> LastCall[tuple[Array, Array]]:
+        return LastCall()
+
+    @functools.cached_property
+    def log_support(self) -> tuple[float, float]:
+        """Ends of log r that the scene allows."""
+        low, high = np.log(self.support).tolist()
+        return low, high
 
     @functools.cached_property
     def columns(self) -> list[int]:
@@ -175,23 +198,24 @@ class FitProblem:
 
     def naturals(self, points: Array) -> Array:
         """Return `natural` of many coordinates at once, shape (m, d) for (m, d)."""
-        natural = np.empty_like(points)
-        columns: dict[int, Array] = {}
+        shapes, sides = self._apart
         with np.errstate(all="ignore"):
-            for j, slot in enumerate(self.slots.tolist()):
-                x = points[:, j]
-                if slot in SHAPES:
-                    c0 = columns.get(slot - 1, self.layout.known[slot - 1])
-                    natural[:, j] = 2 * np.sqrt(c0) * np.expm1(x)
-                elif slot in CROSSTALK:
-                    natural[:, j] = x * self.unit
-                else:
-                    natural[:, j] = np.exp(x) * (self.unit if slot in IN_READINGS else 1.0)
-                columns[slot] = natural[:, j]
-            for j in np.flatnonzero(~self.logarithms).tolist():
-                side = CROSSTALK.index(self.slots[j])
+            natural = np.asarray(np.exp(points) * self.units)
+            columns = {slot: natural[:, j] for j, slot in enumerate(self.slots.tolist())}
+            for j, slot in shapes:
+                c0 = columns.get(slot - 1, self.layout.known[slot - 1])
+                natural[:, j] = 2 * np.sqrt(c0) * np.expm1(points[:, j])
+            for j, side in sides:
                 natural[:, j] = (points[:, j] - self._bare(columns, side)) * self.unit
         return natural
+
+    @functools.cached_property
+    def _apart(self) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+        """Coordinates that are no plain logarithms: of shapes with their slots, and crosstalk's."""
+        slots = self.slots.tolist()
+        shapes = [(j, slot) for j, slot in enumerate(slots) if slot in SHAPES]
+        sides = [(j, CROSSTALK.index(slot)) for j, slot in enumerate(slots) if slot in CROSSTALK]
+        return shapes, sides
 
     def coordinates(self, natural: Array) -> Array:
         """Return coordinates of given unknowns, shape (m, d) for (m, d); nan where impossible."""
