@@ -17,9 +17,11 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.proposal import log_student, student
 from inference.posterior.sampling.reparametrisation import reparametrisation_of
 
-__all__ = ["Effort", "Move", "effort_of", "scouts"]
+__all__ = ["Effort", "Move", "effort_of", "halfway", "scouts"]
 
 Array = NDArray[np.float64]
+
+_FEWEST = 192  # members of a population that stops on its way
 
 Move = Callable[[Array, Array, np.random.Generator], tuple[Array, Array]]
 
@@ -86,6 +88,16 @@ def effort_of(density: CollapsedDensity) -> Effort:
     easy = reparametrisation_of(density) is None
     size, wanted = (384, 1.0) if easy else (12 * d * (d + 1), 3.0)
     return Effort(size, wanted, 20.0, (_jump, _jump, _jump, _evolve), True)
+
+
+def halfway(density: CollapsedDensity) -> Effort:
+    """Return what it takes to begin rounds of importance draws on the way to a posterior.
+
+    A third of the members, moved once at every temperature. What they lose of the ends of a sheet
+    the wide laws of the rounds find again, or weights without a bound tell.
+    """
+    d = len(density.parameters)
+    return Effort(max(_FEWEST, 4 * d * (d + 1)), 1.0, 20.0, (_jump, _jump, _jump, _evolve), True)
 
 
 def scouts(size: int) -> Effort:

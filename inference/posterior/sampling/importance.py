@@ -18,6 +18,7 @@ __all__ = [
     "generalised_pareto",
     "pareto_k_hat",
     "smoothed",
+    "weighted_by",
 ]
 
 Array = NDArray[np.float64]
@@ -195,8 +196,25 @@ def draw_weighted(
         With k_hat inf where no draw has a positive density.
     """
     z = proposal.draw(rng, n)
-    log_density = density(z)
-    log_weights = log_density - proposal.log_density(z)
+    return weighted_by(z, density(z), proposal.log_density(z))
+
+
+def weighted_by(z: Array, log_density: Array, log_proposal: Array) -> WeightedDraws:
+    """Weight draws.
+
+    Parameters
+    ----------
+    z : ndarray, shape (n, d)
+        Draws from a proposal.
+    log_density, log_proposal : ndarray, shape (n,)
+        Log densities of the target and of the proposal there.
+
+    Returns
+    -------
+    WeightedDraws
+        With k_hat inf where no draw has a positive density.
+    """
+    n, log_weights = len(z), log_density - log_proposal
     k_hat = pareto_k_hat(log_weights)
     total = float(scipy.special.logsumexp(log_weights))
     if not math.isfinite(total):

@@ -24,8 +24,8 @@ from inference.posterior.sampling.importance import (
     MAX_K_HAT,
     Law,
     WeightedDraws,
-    draw_weighted,
     pareto_k_hat,
+    weighted_by,
 )
 from inference.posterior.sampling.proposal import Local, Mixture, Proposal, completed
 from inference.posterior.sampling.transport import fit_map
@@ -71,9 +71,13 @@ class Blend(NamedTuple):
 
     def draw(self, rng: np.random.Generator | np.random.RandomState, n: int) -> Array:
         """Draw n points, shape (n, d): from each law its share, rounded."""
-        ends = np.cumsum((0, *self.counts)) * n // sum(self.counts)
-        parts = zip(self.laws, np.diff(ends).tolist(), strict=True)
+        parts = zip(self.laws, self.dealt(n), strict=True)
         return np.concatenate([law.draw(rng, count) for law, count in parts if count])
+
+    def dealt(self, n: int) -> tuple[int, ...]:
+        """Return how many of n draws come from each law."""
+        ends = np.cumsum((0, *self.counts)) * n // sum(self.counts)
+        return tuple(np.diff(ends).tolist())
 
 
 class _Pool(NamedTuple):
@@ -184,20 +188,26 @@ def in_rounds(
         beyond = excess > log_weights.max()
         share = _effective(log_weights) / len(log_weights)
         count = int(min(max(_SPARE * target_ess / share, _LEAST), most))
-        # no room for another round, or nothing that it could follow
-        over = calls + _DRAWS + _LEAST > most or not np.isfinite(log_weights).any()
+        # no room for another round and what counts behind it, or nothing that it could follow
+        room = most - calls - min(count, _LONGEST * _LEAST)
+        over = room < _DRAWS or not np.isfinite(log_weights).any()
         settled = pareto_k_hat(log_weights) < _SURE and _worst(beyond, ends) < tolerated
         settled = settled and len(pool.laws) > _FEWEST * _LAWS
         if over or (settled and count <= _LONGEST * _LEAST):
             count = max(min(count, most - calls), _LEAST)
-            draws = draw_weighted(density, pool.blend, rng, count).that_count
-            calls += count
-            most_drawn = np.max(draws.log_density - pool.blend.log_density(draws.z))
-            found = Rounds(proposal, draws, _worst(excess > most_drawn, ends), calls, tolerated)
-            if over or (found.trusted and draws.ess >= target_ess):
+            more = _more_of_all(pool, density, rng, count)
+            log_blend = _mixed(more.each, pool.counts)
+            draws, calls = weighted_by(more.z, more.target, log_blend), calls + count
+            dissent = _worst(excess > np.max(more.target - log_blend), ends)
+            found = Rounds(proposal, draws.that_count, dissent, calls, tolerated)
+            if over or (found.trusted and found.draws.ess >= target_ess):
                 if not found.trusted:
                     return found
-                return dataclasses.replace(found, proposal=completed(proposal, pool.laws, draws))
+                last = completed(proposal, pool.laws, found.draws)
+                return dataclasses.replace(found, proposal=last)
+            pool = _joined(pool, more)  # they show what the laws left out
+            excess, log_weights = np.split(pool.log_ratios, ends[-1:])
+            beyond = excess > log_weights.max()
         drawn = pool.z[ends[-1] :]
         sample = _sample(drawn, log_weights, members[beyond], len(members), rng)
         flatter = _flatter(log_weights, pool.target[ends[-1] :])
@@ -224,6 +234,24 @@ def _with(
     more = [law.log_density(z) for law in laws[len(pool.laws) :]]
     target = np.concatenate([pool.target, density(new)])
     return _Pool(z, target, laws, pool.counts + counts, np.concatenate([each, more]))
+
+
+def _more_of_all(pool: _Pool, density: CollapsedDensity, rng: np.random.Generator, n: int) -> _Pool:
+    """Return n draws from all laws of a pool in their shares."""
+    z, counts = pool.blend.draw(rng, n), pool.blend.dealt(n)
+    each = np.array([law.log_density(z) for law in pool.laws])
+    return _Pool(z, density(z), pool.laws, counts, each)
+
+
+def _joined(pool: _Pool, more: _Pool) -> _Pool:
+    """Return the draws of two pools of the same laws."""
+    return _Pool(
+        np.concatenate([pool.z, more.z]),
+        np.concatenate([pool.target, more.target]),
+        pool.laws,
+        tuple(a + b for a, b in zip(pool.counts, more.counts, strict=True)),
+        np.concatenate([pool.each, more.each], axis=1),
+    )
 
 
 def _mixed(each: Array, counts: tuple[int, ...]) -> Array:

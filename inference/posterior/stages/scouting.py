@@ -22,8 +22,9 @@ from inference.posterior.sampling.proposal import Proposal
 from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.stages.chunk import evaluations
+from inference.posterior.stages.ensembles import POPULATIONS
 from inference.posterior.stages.stage import Tempering
-from inference.posterior.stages.tempering import SCOUTED_DRAWS
+from inference.posterior.stages.tempering import HALFWAY_DRAWS, SCOUTED_DRAWS
 
 __all__ = ["Scouts", "from_scouts", "send_scouts", "thinned"]
 
@@ -32,6 +33,7 @@ Array = NDArray[np.float64]
 _MOST_FRAMES = 200  # at most; the walkers then start the wider, the more frames there are
 _SCOUTS = 2 * WALKERS
 _HOT = 0.003  # power of the likelihood, from which on places are remembered
+_HALFWAY = 0.3  # power of the likelihood at which small populations stop
 _MOST_S = 10  # seconds that rounds may take
 
 
@@ -86,13 +88,21 @@ def from_scouts(
     stood: Scouts,
     known: WeightedDraws | None,
 ) -> Tempering | None:
-    """Go on from the scouts; None where rounds of importance draws would not do, or take long."""
-    easy = reparametrisation_of(density) is None and aliases_of(density) is None
-    cheap = _MOST_S * evaluations(job) >= SCOUTED_DRAWS and len(density.frames) <= _MOST_FRAMES
-    if not (easy and cheap and len(stood.hot) > stood.hot.shape[1]):
+    """Go on from the scouts; None where rounds of importance draws would take long.
+
+    Where crosstalk and a background are confounded, or a background has aliases, so few points
+    that never unbent what they stand on are no beginning: small populations are carried first.
+    """
+    hard = reparametrisation_of(density) is not None or aliases_of(density) is not None
+    draws = HALFWAY_DRAWS if hard else SCOUTED_DRAWS
+    cheap = _MOST_S * evaluations(job) >= draws and len(density.frames) <= _MOST_FRAMES
+    pending = Verdict(False, ("no steps were made",))
+    if cheap and hard:
+        return Tempering(proposal, (None,) * POPULATIONS, pending, known, reach=_HALFWAY)
+    if not (cheap and len(stood.hot) > stood.hot.shape[1]):
         return None
     arrived = tuple(
         Population(z, np.zeros(len(z)), np.zeros(len(z)), 1.0, 0.0, 0, 0)
         for z in (stood.z, stood.hot)
     )
-    return Tempering(proposal, arrived, Verdict(False, ("no steps were made",)), known, True)
+    return Tempering(proposal, arrived, pending, known, scouted=True)

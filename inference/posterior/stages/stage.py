@@ -105,6 +105,9 @@ class Tempering(_NotBegun):
         Whether the populations are the scouts, and where these stood on their way from the prior:
         they find every branch and weigh none. Rounds of importance sampling are tried from them
         before populations are carried.
+    reach : float
+        Power of the likelihood that populations are carried to. Below 1 they are small, and rounds
+        of importance sampling are tried from them before larger ones are carried all the way.
     """
 
     phase: ClassVar[Phase] = "tempering"
@@ -114,11 +117,21 @@ class Tempering(_NotBegun):
     verdict: Verdict
     weighted: WeightedDraws | None = None
     scouted: bool = False
+    reach: float = 1.0
+
+    @property
+    def early(self) -> bool:
+        """Whether populations are carried all the way only where rounds from these fail."""
+        return self.scouted or self.reach < 1.0
 
     @property
     def arrived(self) -> bool:
         """Whether no population is on its way any more."""
-        return all(each is not None and each.ended for each in self.populations)
+        return all(map(self.has_come, self.populations))
+
+    def has_come(self, population: Population | None) -> bool:
+        """Whether a population is where it is carried to, or died on the way."""
+        return population is not None and (population.ended or population.power >= self.reach)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -124,6 +124,36 @@ def test_draws_that_are_spent_are_not_exceeded_and_too_few_are_no_answer() -> No
     assert found.draws.k_hat > MAX_K_HAT or found.dissent > 0
 
 
+def test_draws_that_do_not_count_join_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planted fault: a fifth of all draws, those with the largest weights, were thrown away."""
+    joined: list[tuple[Any, ...]] = []
+    seen: list[int] = []
+    judged = iter([False])
+    real = rounds._joined
+
+    def noted(*pools: Any) -> Any:
+        joined.append((*pools, real(*pools)))
+        return joined[-1][-1]
+
+    monkeypatch.setattr(rounds, "_joined", noted)
+    monkeypatch.setattr(Rounds, "trusted", property(lambda _: next(judged, True)))
+
+    def target(z: np.ndarray) -> np.ndarray:
+        seen.append(len(z))
+        return _target(z)
+
+    populations = (_population(300, SHARE, 1), _population(300, SHARE, 2))
+    start, rng = Proposal(LAPLACE, None, 0.5), np.random.default_rng(4)
+    found = in_rounds(cast(Any, target), start, populations, rng, 400, 30_000)
+    ((pool, more, both),) = joined
+    assert both.counts == tuple(np.add(pool.counts, more.counts))
+    assert sum(both.counts) == len(both.z) - 600  # members of the populations
+    # a weight by all laws has the integral for its mean, whichever draws it is taken over
+    weights = np.exp(both.log_ratios[600:])
+    assert abs(weights.mean() - 2 * np.pi) < 5 * weights.std() / np.sqrt(len(weights))
+    assert found.calls == sum(seen)
+
+
 def test_a_blend_is_a_density_and_draws_by_its_counts() -> None:
     far = Mixture(np.array([[9.0]]), np.array([[[2.0]]]), np.ones(1))
     near = Mixture(np.array([[0.0]]), np.array([[[0.5]]]), np.ones(1))

@@ -1,0 +1,109 @@
+"""Small populations that stop on their way: where rounds of importance draws begin."""
+
+import dataclasses
+import functools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.coverage.paths import draw_path
+from inference.posterior import fold
+from inference.posterior.sampling.population import Population
+from inference.posterior.sampling.rounds import Rounds, in_rounds
+from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages import tempering
+from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.ensembles import POPULATIONS
+from inference.posterior.stages.stage import Starting, Tempering, Walking, Weighted
+from inference.posterior.stages.starting import begin
+from simulator.scene import parse_scene
+
+SEED = 1
+
+
+@functools.cache
+def _job(method: str) -> fold.Job:
+    """Crosstalk and a wall that both are unknown: the readings tell their sum alone."""
+    data = draw_path("log-spaced", "both", "nothing", SEED)
+    settings = SamplerSettings.model_validate({"seed": SEED, "method": method})
+    return fold.prepare(data.sensor, parse_scene(data.scene), data.frames, settings)
+
+
+@functools.cache
+def _started() -> Checkpoint:
+    return begin(_job("auto"), Starting())
+
+
+@functools.cache
+def _carried() -> Checkpoint:
+    job, checkpoint = _job("auto"), _started()
+    while isinstance(checkpoint.stage, Tempering) and not checkpoint.stage.arrived:
+        parts = [fold.run(task) for task in fold.tasks(job, checkpoint)]
+        checkpoint = fold.merge(job, checkpoint, parts)
+    return checkpoint
+
+
+def _after(method: str) -> Checkpoint:
+    (task,) = fold.tasks(_job(method), _carried())
+    return fold.merge(_job(method), _carried(), [fold.run(task)])
+
+
+def test_where_light_is_confounded_small_populations_set_out() -> None:
+    stage = _started().stage
+    assert isinstance(stage, Tempering)
+    assert stage.early
+    assert not stage.scouted
+    assert stage.populations == (None,) * POPULATIONS
+
+
+def test_they_stop_on_their_way() -> None:
+    stage = _carried().stage
+    assert isinstance(stage, Tempering)
+    for population in stage.populations:
+        assert population is not None
+        assert stage.reach <= population.power < 1.0
+        assert len(population.z) == 288  # a third of what is carried all the way
+
+
+def test_rounds_from_there_answer_at_a_fraction_of_the_cost() -> None:
+    """Planted fault: populations of 864, carried all the way, took 155,000 evaluations alone."""
+    found = _after("auto")
+    assert isinstance(found.stage, Weighted)
+    assert found.stage.verdict.converged
+    assert found.calls < 60_000  # 35,000 with this seed
+
+
+def test_ensembles_start_from_their_draws() -> None:
+    stage = _after("emcee").stage
+    assert isinstance(stage, Walking)
+    assert stage.weighted is not None
+    assert stage.adaptations == 2
+
+
+def test_where_rounds_fail_populations_are_carried_all_the_way(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def doubted(*arguments: Any) -> Rounds:
+        none: Any = (*arguments[:5], 0, arguments[6])  # draws to spend
+        return dataclasses.replace(in_rounds(*none), dissent=1.0)
+
+    monkeypatch.setattr(tempering, "in_rounds", doubted)
+    stage = _after("auto").stage
+    assert isinstance(stage, Tempering)
+    assert not stage.early
+    assert stage.populations == (None,) * POPULATIONS
+    assert {getattr(task, "reach", None) for task in tempering.tasks(_job("auto"), stage)} == {1.0}
+
+
+def test_where_they_die_on_the_way_larger_ones_set_out() -> None:
+    stage, d = _started().stage, 8
+    assert isinstance(stage, Tempering)
+    none = np.empty(0)
+    dead = Population(np.empty((0, d)), none, none, 0.0, -math.inf, 0, 1152)
+    after, calls = tempering.merge(_job("auto"), stage, [dead] * POPULATIONS)
+    assert isinstance(after, Tempering)
+    assert not after.early
+    assert after.populations == (None,) * POPULATIONS
+    assert calls == 1152 * POPULATIONS
