@@ -37,13 +37,14 @@ def standing(stage: Drawing) -> Drawing:
         return stage
     if isinstance(stage, Walking) and stage.steps >= _LEAST_STEPS:
         return stage
-    draws, what = stage.weighted, "importance draws"
-    if isinstance(stage, Tempering) and (draws is None or not _trusted(draws)):
+    found = [(stage.weighted, "importance draws")]
+    if isinstance(stage, Tempering):
         members = _of_populations(stage.populations)
-        if members is not None:
-            draws, what = members, "weighted members of populations on their way"
-    if draws is None:
+        found.append((members, "weighted members of populations on their way"))
+    drawn = [(draws, what) for draws, what in found if draws is not None]
+    if not drawn:
         return stage
+    draws, what = max(drawn, key=lambda each: (_trusted(each[0]), each[0].ess))
     said = f"{what}: effective sample size {draws.ess:.0f}, Pareto k-hat {draws.k_hat:.2f}"
     if not _trusted(draws):
         reasons = (*stage.verdict.reasons, f"there are {said}: too few, or not to be trusted")

@@ -168,6 +168,9 @@ def _set_out(job: Job, stage: Tempering) -> tuple[Tempering | Weighted | Walking
         ensembles = from_weighted(job, density, found.proposal, found.draws, members[0].z)
         walking = Walking(found.proposal, ensembles, stage.verdict, 2, weighted=found.draws)
     else:
+        # until larger populations are on their way an answer is made of the last draws
+        if found.dissent < TOLERATED:
+            stage = dataclasses.replace(stage, weighted=found.draws)
         return _all_the_way(stage), found.calls
     return walking, found.calls + walking.ensembles[0].walkers * len(walking.ensembles)
 

@@ -5,10 +5,12 @@ import pytest
 from scipy import special, stats
 
 from inference.posterior import fold
-from inference.posterior.sampling.importance import pareto_k_hat, smoothed
+from inference.posterior.sampling.importance import WeightedDraws, pareto_k_hat, smoothed
 from inference.posterior.sampling.population import Population
+from inference.posterior.sampling.proposal import Mixture, Proposal
+from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages.stage import Starting, Walking, Weighted
+from inference.posterior.stages.stage import Starting, Tempering, Walking, Weighted
 from inference.posterior.stages.standing import _weighted, standing
 from inference.posterior.stages.starting import begin
 from tests.posterior.scenes import example
@@ -87,3 +89,28 @@ def test_weights_that_differ_by_more_than_numbers_reach_are_smoothed() -> None:
             assert k_hat > 10.0
             assert np.isfinite(log_weights).all()
             assert log_weights.max() <= raw.max()
+
+
+def test_of_draws_and_members_the_larger_number_answers() -> None:
+    """Draws of rounds that failed stand until larger populations are on their way."""
+    rng = np.random.default_rng(6)
+
+    def drawn(n: int, k_hat: float) -> WeightedDraws:
+        return WeightedDraws(rng.standard_normal((n, 1)), np.zeros(n), np.full(n, 1 / n), k_hat, 0)
+
+    def stage(members: int, draws: WeightedDraws | None) -> Tempering:
+        one = np.zeros(members)
+        population = Population(rng.standard_normal((members, 1)), one, one, 1.0, 0.0, 3, 1)
+        optima = Mixture(np.zeros((1, 1)), np.eye(1)[None], np.ones(1))
+        proposal = Proposal(optima, None, 0.5)
+        return Tempering(proposal, (population,), Verdict(False, ("no steps were made",)), draws)
+
+    for members, draws, size in (
+        (400, drawn(100, 0.6), 400),
+        (60, drawn(100, 0.6), 100),
+        (60, drawn(100, 0.8), 60),  # a tail that is not to be trusted, however many
+        (60, None, 60),
+    ):
+        found = standing(stage(members, draws))
+        assert isinstance(found, Weighted)
+        assert len(found.draws.z) == size
