@@ -177,15 +177,18 @@ class Proposal:
             return x, np.zeros(len(x))
         return self.transport.bend(x)
 
-    def log_density(self, z: Array) -> Array:
-        """Return the log density at z of shape (n, d), shape (n,)."""
-        most = self._log_density_of_most(z)
+    def log_density(self, z: Array, laplace: Array | None = None) -> Array:
+        """Return the log density at z of shape (n, d), shape (n,).
+
+        `laplace` is that of ``optima`` there, where it is known from another proposal.
+        """
+        most = self._log_density_of_most(z, laplace)
         if not self.more:
             return most
         return _with_more(most, np.array([law.log_density(z) for law in self.more]))
 
-    def _log_density_of_most(self, z: Array) -> Array:
-        laplace = self.optima.log_density(z)
+    def _log_density_of_most(self, z: Array, laplace: Array | None) -> Array:
+        laplace = self.optima.log_density(z) if laplace is None else laplace
         if self.transport is None:
             return laplace
         x, log_det = self.transport.unbend(z)

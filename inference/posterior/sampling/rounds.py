@@ -2,7 +2,7 @@
 
 Adaptive multiple importance sampling (Cornuet et al. 2012): a draw of any round is weighted by the
 mixture of all proposals (Owen and Zhou 2000), so that what one of them leaves out another holds.
-One of two maps is fitted to draws that are weighted to a small power of the target: along a thin
+One of two maps is fitted to draws that are weighted to a smaller power of the target: along a thin
 ridge, where populations come slowly, it reaches beyond them. Besides, every round has a law around
 the place where the target exceeds the mixture most (incremental mixtures, Raftery and Bao 2010): no
 polynomial follows a narrow second mode. Members of populations that came from the prior begin it,
@@ -12,7 +12,6 @@ no more.
 
 import dataclasses
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,22 +21,22 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.importance import (
     MAX_K_HAT,
-    Law,
     WeightedDraws,
     pareto_k_hat,
     weighted_by,
 )
+from inference.posterior.sampling.pool import Pool, joined, mixed, more_of_all, with_laws
 from inference.posterior.sampling.proposal import Local, Mixture, Proposal, completed
 from inference.posterior.sampling.transport import fit_map
 
-__all__ = ["Blend", "Rounds", "in_rounds"]
+__all__ = ["Rounds", "in_rounds"]
 
 Array = NDArray[np.float64]
 
 _DRAWS = 1000  # of a round
 _LOCAL_SHARE = 0.25  # of them, from around the place that the others hold least of
 _WIDE_SHARE = 0.35  # of them, from a map fitted to draws of
-_WIDE = 0.15  # this power of the target
+_WIDE = (0.15, 0.5)  # these powers of the target, by turns
 _FEWEST, _LAWS = 6, 3  # rounds, and laws of each
 _NEIGHBOURS = 10  # for every unknown, that such a law is fitted to; or
 _NEAR = 0.05  # of all draws
@@ -49,69 +48,6 @@ _SPARE = 1.3  # times the draws that are foreseen
 _FITTED = 2000  # draws that a map is fitted to
 _LEAST_ESS = 150.0  # of them, and
 _PER_PAIR = 4.0  # times the square of the unknowns: weights are flattened until there are as many
-
-
-class Blend(NamedTuple):
-    """A mixture of laws.
-
-    Attributes
-    ----------
-    laws : tuple of Law
-        What it is made of.
-    counts : tuple of int
-        Draws of each, to which their shares are in proportion.
-    """
-
-    laws: tuple[Law, ...]
-    counts: tuple[int, ...]
-
-    def log_density(self, z: Array) -> Array:
-        """Return the log density at z of shape (n, d), shape (n,)."""
-        return _mixed(np.array([law.log_density(z) for law in self.laws]), self.counts)
-
-    def draw(self, rng: np.random.Generator | np.random.RandomState, n: int) -> Array:
-        """Draw n points, shape (n, d): from each law its share, rounded."""
-        parts = zip(self.laws, self.dealt(n), strict=True)
-        return np.concatenate([law.draw(rng, count) for law, count in parts if count])
-
-    def dealt(self, n: int) -> tuple[int, ...]:
-        """Return how many of n draws come from each law."""
-        ends = np.cumsum((0, *self.counts)) * n // sum(self.counts)
-        return tuple(np.diff(ends).tolist())
-
-
-class _Pool(NamedTuple):
-    """Draws of all rounds, and the law of them all.
-
-    Attributes
-    ----------
-    z : ndarray, shape (n, d)
-        Draws; members of the populations come first.
-    target : ndarray, shape (n,)
-        Their log density.
-    laws : tuple of Law
-        What they were drawn from, the members apart.
-    counts : tuple of int
-        How many from each.
-    each : ndarray, shape (laws, n)
-        Log density of every law.
-    """
-
-    z: Array
-    target: Array
-    laws: tuple[Law, ...]
-    counts: tuple[int, ...]
-    each: Array
-
-    @property
-    def blend(self) -> Blend:
-        """The law of them all."""
-        return Blend(self.laws, self.counts)
-
-    @property
-    def log_ratios(self) -> Array:
-        """Log of the target over that law, shape (n,)."""
-        return np.asarray(self.target - _mixed(self.each, self.counts))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -169,7 +105,7 @@ def in_rounds(
     target_ess : int
         Effective sample size wanted.
     most : int
-        Draws that may be spent; those that count are 2000 in any case.
+        Draws that may be spent, but for those that count: 2000 to 8000 are made in any case.
     tolerated : float
         Share of a population's members beyond every weight, below which draws stand.
 
@@ -181,22 +117,26 @@ def in_rounds(
     members = np.concatenate(populations)
     ends = np.cumsum([len(one) for one in populations])
     proposal, calls = _fitted(proposal, members, density), len(members) + _DRAWS
-    pool = _Pool(members, density(members), (), (), np.empty((0, len(members))))
-    pool = _with(pool, (proposal,), (_DRAWS,), density, rng)
+    none, laplace = np.empty((0, len(members))), proposal.optima.log_density(members)
+    pool = Pool(members, density(members), (), (), none, laplace)
+    pool = with_laws(pool, (proposal,), (_DRAWS,), density, rng)
     while True:
         excess, log_weights = np.split(pool.log_ratios, ends[-1:])
         beyond = excess > log_weights.max()
         share = _effective(log_weights) / len(log_weights)
         count = int(min(max(_SPARE * target_ess / share, _LEAST), most))
-        # no room for another round and what counts behind it, or nothing that it could follow
-        room = most - calls - min(count, _LONGEST * _LEAST)
-        over = room < _DRAWS or not np.isfinite(log_weights).any()
-        settled = pareto_k_hat(log_weights) < _SURE and _worst(beyond, ends) < tolerated
+        # no room for another round, or nothing that it could follow
+        over = calls + _DRAWS + _LEAST > most or not np.isfinite(log_weights).any()
+        # behind another round there would be no room for all that are to count
+        sure = MAX_K_HAT if calls + _DRAWS + count > most else _SURE
+        settled = pareto_k_hat(log_weights) < sure and _worst(beyond, ends) < tolerated
         settled = settled and len(pool.laws) > _FEWEST * _LAWS
         if over or (settled and count <= _LONGEST * _LEAST):
-            count = max(min(count, most - calls), _LEAST)
-            more = _more_of_all(pool, density, rng, count)
-            log_blend = _mixed(more.each, pool.counts)
+            # of the last ones as many as are wanted: laws that are trusted cost the more
+            room = max(most - calls, _LONGEST * _LEAST if over else _LEAST)
+            count = max(min(count, room), _LEAST)
+            more = more_of_all(pool, density, rng, count)
+            log_blend = mixed(more.each, pool.counts)
             draws, calls = weighted_by(more.z, more.target, log_blend), calls + count
             dissent = _worst(excess > np.max(more.target - log_blend), ends)
             found = Rounds(proposal, draws.that_count, dissent, calls, tolerated)
@@ -205,69 +145,29 @@ def in_rounds(
                     return found
                 last = completed(proposal, pool.laws, found.draws)
                 return dataclasses.replace(found, proposal=last)
-            pool = _joined(pool, more)  # they show what the laws left out
+            pool = joined(pool, more)  # they show what the laws left out
             excess, log_weights = np.split(pool.log_ratios, ends[-1:])
             beyond = excess > log_weights.max()
         drawn = pool.z[ends[-1] :]
         sample = _sample(drawn, log_weights, members[beyond], len(members), rng)
-        flatter = _flatter(log_weights, pool.target[ends[-1] :])
+        power = _WIDE[len(pool.laws) // _LAWS % len(_WIDE)]
+        flatter = _flatter(log_weights, pool.target[ends[-1] :], power)
         wide = _fitted(proposal, _sample(drawn, flatter, members[:0], 1, rng), density)
         proposal = _fitted(proposal, sample, density)
         local, far = int(_LOCAL_SHARE * _DRAWS), int(_WIDE_SHARE * _DRAWS)
         laws = (proposal, wide, _around(proposal, pool.z, pool.log_ratios))
-        pool = _with(pool, laws, (_DRAWS - local - far, far, local), density, rng)
+        pool = with_laws(pool, laws, (_DRAWS - local - far, far, local), density, rng)
         calls += _DRAWS
-
-
-def _with(
-    pool: _Pool,
-    laws: tuple[Law, ...],
-    counts: tuple[int, ...],
-    density: CollapsedDensity,
-    rng: np.random.Generator,
-) -> _Pool:
-    """Return a pool with draws from more laws."""
-    new = np.concatenate([law.draw(rng, n) for law, n in zip(laws, counts, strict=True)])
-    z, laws = np.concatenate([pool.z, new]), pool.laws + laws
-    old = [law.log_density(new) for law in pool.laws]
-    each = np.concatenate([pool.each, np.reshape(old, (len(old), len(new)))], axis=1)
-    more = [law.log_density(z) for law in laws[len(pool.laws) :]]
-    target = np.concatenate([pool.target, density(new)])
-    return _Pool(z, target, laws, pool.counts + counts, np.concatenate([each, more]))
-
-
-def _more_of_all(pool: _Pool, density: CollapsedDensity, rng: np.random.Generator, n: int) -> _Pool:
-    """Return n draws from all laws of a pool in their shares."""
-    z, counts = pool.blend.draw(rng, n), pool.blend.dealt(n)
-    each = np.array([law.log_density(z) for law in pool.laws])
-    return _Pool(z, density(z), pool.laws, counts, each)
-
-
-def _joined(pool: _Pool, more: _Pool) -> _Pool:
-    """Return the draws of two pools of the same laws."""
-    return _Pool(
-        np.concatenate([pool.z, more.z]),
-        np.concatenate([pool.target, more.target]),
-        pool.laws,
-        tuple(a + b for a, b in zip(pool.counts, more.counts, strict=True)),
-        np.concatenate([pool.each, more.each], axis=1),
-    )
-
-
-def _mixed(each: Array, counts: tuple[int, ...]) -> Array:
-    """Return the log density of a mixture, its laws in proportion to counts."""
-    shares = np.log(np.array(counts) / sum(counts))
-    return np.asarray(special.logsumexp(each + shares[:, None], axis=0))
 
 
 def _fitted(proposal: Proposal, sample: Array, density: CollapsedDensity) -> Proposal:
     return dataclasses.replace(proposal, transport=fit_map(sample, coordinates_of(density)))
 
 
-def _flatter(log_weights: Array, target: Array) -> Array:
-    """Return log weights to a small power of the target, of draws with weights to itself."""
+def _flatter(log_weights: Array, target: Array, power: float) -> Array:
+    """Return log weights to a power of the target, of draws with weights to itself."""
     at = np.where(np.isfinite(log_weights), target, 0.0)
-    return np.asarray(log_weights + (_WIDE - 1.0) * at)
+    return np.asarray(log_weights + (power - 1.0) * at)
 
 
 def _effective(log_weights: Array) -> float:

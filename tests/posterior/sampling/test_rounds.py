@@ -8,8 +8,9 @@ from scipy import integrate
 
 from inference.posterior.sampling import rounds
 from inference.posterior.sampling.importance import MAX_K_HAT
+from inference.posterior.sampling.pool import Blend, joined
 from inference.posterior.sampling.proposal import Local, Mixture, Proposal
-from inference.posterior.sampling.rounds import Blend, Rounds, in_rounds
+from inference.posterior.sampling.rounds import Rounds, in_rounds
 
 D = 2
 SECOND = np.array([4.0, 6.0])  # at the end of the banana
@@ -126,16 +127,15 @@ def test_draws_that_are_spent_are_not_exceeded_and_too_few_are_no_answer() -> No
 
 def test_draws_that_do_not_count_join_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """Planted fault: a fifth of all draws, those with the largest weights, were thrown away."""
-    joined: list[tuple[Any, ...]] = []
+    pools: list[tuple[Any, ...]] = []
     seen: list[int] = []
     judged = iter([False])
-    real = rounds._joined
 
-    def noted(*pools: Any) -> Any:
-        joined.append((*pools, real(*pools)))
-        return joined[-1][-1]
+    def noted(*two: Any) -> Any:
+        pools.append((*two, joined(*two)))
+        return pools[-1][-1]
 
-    monkeypatch.setattr(rounds, "_joined", noted)
+    monkeypatch.setattr(rounds, "joined", noted)
     monkeypatch.setattr(Rounds, "trusted", property(lambda _: next(judged, True)))
 
     def target(z: np.ndarray) -> np.ndarray:
@@ -145,7 +145,7 @@ def test_draws_that_do_not_count_join_the_others(monkeypatch: pytest.MonkeyPatch
     populations = (_population(300, SHARE, 1), _population(300, SHARE, 2))
     start, rng = Proposal(LAPLACE, None, 0.5), np.random.default_rng(4)
     found = in_rounds(cast(Any, target), start, populations, rng, 400, 30_000)
-    ((pool, more, both),) = joined
+    ((pool, more, both),) = pools
     assert both.counts == tuple(np.add(pool.counts, more.counts))
     assert sum(both.counts) == len(both.z) - 600  # members of the populations
     # a weight by all laws has the integral for its mean, whichever draws it is taken over
