@@ -10,7 +10,6 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inference.posterior.job import Job
 from inference.posterior.sampling.effort import effort_of, halfway
@@ -36,8 +35,6 @@ __all__ = [
     "merge",
     "tasks",
 ]
-
-Array = NDArray[np.float64]
 
 _SHARE = 0.5  # of what the populations took, that importance sampling behind them may take
 _MOST_DRAWS = (12_000, 40_000)  # but so many at least, and at most
@@ -168,10 +165,7 @@ def _set_out(job: Job, stage: Tempering) -> tuple[Tempering | Weighted | Walking
     if not stage.early:
         walking = _walking(job, stage, members, found)
     elif found.trusted:
-        others = members[0].z
-        if not stage.scouted:
-            others = _by_weight(members[0], job.stream(Stream.MEMBERS, 0))
-        ensembles = from_weighted(job, density, found.proposal, found.draws, others)
+        ensembles = from_weighted(job, density, found.proposal, found.draws, members[0].z)
         walking = Walking(found.proposal, ensembles, stage.verdict, 2, weighted=found.draws)
     else:
         # until larger populations are on their way an answer is made of the last draws
@@ -179,16 +173,6 @@ def _set_out(job: Job, stage: Tempering) -> tuple[Tempering | Weighted | Walking
             stage = dataclasses.replace(stage, weighted=found.draws)
         return _all_the_way(stage), found.calls
     return walking, found.calls + walking.ensembles[0].walkers * len(walking.ensembles)
-
-
-def _by_weight(population: Population, rng: np.random.Generator) -> Array:
-    """Return members so that the first few are draws of the posterior, none of them twice.
-
-    Those of a population on its way stand wider than that, and walkers leave far places slowly.
-    The largest of log weights with Gumbel's noise are a draw without replacement (Gumbel 1954).
-    """
-    log_weights = (1.0 - population.power) * population.log_likelihood
-    return population.z[np.argsort(-(log_weights + rng.gumbel(size=len(log_weights))))]
 
 
 def _all_the_way(stage: Tempering) -> Tempering:
