@@ -46,7 +46,9 @@ def _evolve(
     scale = 2.38 / math.sqrt(2 * d) * np.exp(spread * rng.standard_normal((n, 1)))
     if rng.random() < hops:
         scale = np.ones((n, 1))
-    new = x + scale * (others[first] - others[second]) + noise * rng.standard_normal((n, d))
+    # a map may carry far members beyond all numbers: a step along these is none, and is not taken
+    with np.errstate(invalid="ignore"):
+        new = x + scale * (others[first] - others[second]) + noise * rng.standard_normal((n, d))
     return new, np.zeros(n)
 
 
@@ -97,7 +99,8 @@ def halfway(density: CollapsedDensity) -> Effort:
     the wide laws of the rounds find again, or weights without a bound tell.
     """
     d = len(density.parameters)
-    return Effort(max(_FEWEST, 4 * d * (d + 1)), 1.0, 20.0, (_jump, _jump, _jump, _evolve), True)
+    size = max(4 * d * (d + 1), min(_FEWEST, 12 * d * (d + 1)))
+    return Effort(size, 1.0, 20.0, (_jump, _jump, _jump, _evolve), True)
 
 
 def scouts(size: int) -> Effort:

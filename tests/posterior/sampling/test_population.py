@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
-from inference.posterior.sampling.effort import effort_of
+from inference.posterior.sampling import population as moves
+from inference.posterior.sampling.effort import effort_of, scouts
 from inference.posterior.sampling.population import Population, first_population, temper
 from tests.posterior.scenes import example
 
@@ -61,6 +62,20 @@ def _carried(density: CollapsedDensity, seed: int) -> Population:
         rng = np.random.default_rng(streams.spawn(1)[0])
         population = temper(density, population, rng, effort)
     return population
+
+
+def test_members_that_a_map_carries_beyond_all_numbers_are_not_followed() -> None:
+    """Planted fault: a warning of the difference of two infinities, where warnings are errors."""
+    rng = np.random.default_rng(1)
+    x = np.full((6, 3), np.inf)
+    new, ratio = scouts(6).moves[0](x, x, rng)
+    assert not np.isfinite(new).any()
+    members = rng.standard_normal((6, 3))
+    target = _Banana()
+    at = Population(members, target.log_likelihood(members), np.zeros(6), 0.5, 0.0, 3, 6)
+    after, moved = moves._accepted(target, at, slice(0, 6), new, ratio, rng)  # type: ignore[arg-type]
+    assert moved == 0.0
+    assert np.array_equal(after.z, members)
 
 
 def test_a_thin_curved_sheet() -> None:
