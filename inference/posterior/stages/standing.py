@@ -16,7 +16,7 @@ from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.stages.stage import Drawing, Tempering, Walking, Weighted
 
-__all__ = ["standing"]
+__all__ = ["best_known", "standing"]
 
 
 _MOST_K_HAT = 0.7  # above it, not even the smoothed weights have a mean (Vehtari et al. 2024)
@@ -37,20 +37,32 @@ def standing(stage: Drawing) -> Drawing:
         return stage
     if isinstance(stage, Walking) and stage.steps >= _LEAST_STEPS:
         return stage
-    found = [(stage.weighted, "importance draws")]
-    if isinstance(stage, Tempering):
-        members = _of_populations(stage.populations)
-        found.append((members, "weighted members of populations on their way"))
-    drawn = [(draws, what) for draws, what in found if draws is not None]
-    if not drawn:
+    found = best_known(stage)
+    if found is None:
         return stage
-    draws, what = max(drawn, key=lambda each: (_trusted(each[0]), each[0].ess))
+    draws, what = found
     said = f"{what}: effective sample size {draws.ess:.0f}, Pareto k-hat {draws.k_hat:.2f}"
     if not _trusted(draws):
         reasons = (*stage.verdict.reasons, f"there are {said}: too few, or not to be trusted")
         return dataclasses.replace(stage, verdict=Verdict(False, reasons))
     verdict = Verdict(False, (f"no ensemble has walked yet: the answer is made of {said}",))
     return Weighted(stage.proposal.optima, draws, verdict)
+
+
+def best_known(stage: Tempering | Walking) -> tuple[WeightedDraws, str] | None:
+    """Return the largest number of weighted draws that there are, trusted ones first; or None.
+
+    Returns
+    -------
+    (WeightedDraws, str)
+        And what they are.
+    """
+    found = [(stage.weighted, "importance draws")]
+    if isinstance(stage, Tempering):
+        members = _of_populations(stage.populations)
+        found.append((members, "weighted members of populations on their way"))
+    drawn = [(draws, what) for draws, what in found if draws is not None]
+    return max(drawn, key=lambda each: (_trusted(each[0]), each[0].ess), default=None)
 
 
 def _trusted(draws: WeightedDraws) -> bool:

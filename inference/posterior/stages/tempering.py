@@ -24,6 +24,7 @@ from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.chunk import evaluations
 from inference.posterior.stages.ensembles import POPULATIONS, from_weighted, new_ensembles
 from inference.posterior.stages.stage import Tempering, Walking, Weighted
+from inference.posterior.stages.standing import best_known
 from inference.posterior.streams import Stream
 
 __all__ = [
@@ -168,9 +169,11 @@ def _set_out(job: Job, stage: Tempering) -> tuple[Tempering | Weighted | Walking
         ensembles = from_weighted(job, density, found.proposal, found.draws, members[0].z)
         walking = Walking(found.proposal, ensembles, stage.verdict, 2, weighted=found.draws)
     else:
-        # until larger populations are on their way an answer is made of the last draws
+        # until larger populations are on their way an answer is made of what there is
         if found.dissent < TOLERATED:
             stage = dataclasses.replace(stage, weighted=found.draws)
+        known = best_known(stage)
+        stage = dataclasses.replace(stage, weighted=None if known is None else known[0])
         return _all_the_way(stage), found.calls
     return walking, found.calls + walking.ensembles[0].walkers * len(walking.ensembles)
 

@@ -17,6 +17,7 @@ from inference.posterior.stages import tempering
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.ensembles import POPULATIONS
 from inference.posterior.stages.stage import Starting, Tempering, Walking, Weighted
+from inference.posterior.stages.standing import best_known
 from inference.posterior.stages.starting import begin
 from simulator.scene import parse_scene
 
@@ -94,6 +95,13 @@ def test_where_rounds_fail_populations_are_carried_all_the_way(
     assert isinstance(stage, Tempering)
     assert not stage.early
     assert stage.populations == (None,) * POPULATIONS
+    carried = _carried().stage
+    assert isinstance(carried, Tempering)
+    known = best_known(carried)
+    assert known is not None
+    # what the small ones know stands until the larger ones are on their way
+    assert stage.weighted is not None
+    assert stage.weighted.ess == known[0].ess
     assert {getattr(task, "reach", None) for task in tempering.tasks(_job("auto"), stage)} == {1.0}
 
 
