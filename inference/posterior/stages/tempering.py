@@ -3,7 +3,7 @@
 Those that arrived are what importance sampling in rounds begins with, and is held to. Its draws are
 the answer where they may be; otherwise they say from where, and through which map, ensembles walk.
 Small populations that stop on their way, and stand wider than the posterior, mostly suffice for
-that, at a tenth to a third of the cost: larger ones follow, from the prior again, where they do not.
+that, at a tenth to a third of the cost. Where they do not, larger ones follow, from the prior anew.
 """
 
 import dataclasses
