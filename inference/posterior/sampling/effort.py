@@ -95,8 +95,8 @@ def effort_of(density: CollapsedDensity) -> Effort:
 def halfway(density: CollapsedDensity) -> Effort:
     """Return what it takes to begin rounds of importance draws on the way to a posterior.
 
-    A third of the members, moved once at every temperature. What they lose of the ends of a sheet
-    the wide laws of the rounds find again, or weights without a bound tell.
+    A third of the members where unknowns are many, moved once at every temperature. What they lose
+    of the ends of a sheet the wide laws of the rounds find again, or weights without a bound tell.
     """
     d = len(density.parameters)
     size = max(4 * d * (d + 1), min(_FEWEST, 12 * d * (d + 1)))
