@@ -12,6 +12,7 @@ from inference.density.collapsed import CollapsedDensity
 
 __all__ = [
     "MAX_K_HAT",
+    "MAX_SMOOTHED_K_HAT",
     "Law",
     "WeightedDraws",
     "draw_weighted",
@@ -23,7 +24,8 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-MAX_K_HAT = 0.5
+MAX_K_HAT = 0.5  # of weights as they are: beyond it they have no variance
+MAX_SMOOTHED_K_HAT = 0.7  # of those whose tail is smoothed (Vehtari et al. 2024)
 _LEAST_EXCESS = 5  # weights above the cut that a shape is fitted to
 _NOTHING = 1e-300  # of the largest weight: what is less counts for none
 _EQUAL = 1e-9  # of the largest weight, by which equal ones differ through rounding
@@ -199,7 +201,9 @@ def draw_weighted(
     return weighted_by(z, density(z), proposal.log_density(z))
 
 
-def weighted_by(z: Array, log_density: Array, log_proposal: Array) -> WeightedDraws:
+def weighted_by(
+    z: Array, log_density: Array, log_proposal: Array, *, smooth: bool = False
+) -> WeightedDraws:
     """Weight draws.
 
     Parameters
@@ -208,6 +212,8 @@ def weighted_by(z: Array, log_density: Array, log_proposal: Array) -> WeightedDr
         Draws from a proposal.
     log_density, log_proposal : ndarray, shape (n,)
         Log densities of the target and of the proposal there.
+    smooth : bool
+        Whether the largest weights follow the Pareto law fitted to them.
 
     Returns
     -------
@@ -215,7 +221,10 @@ def weighted_by(z: Array, log_density: Array, log_proposal: Array) -> WeightedDr
         With k_hat inf where no draw has a positive density.
     """
     n, log_weights = len(z), log_density - log_proposal
-    k_hat = pareto_k_hat(log_weights)
+    if smooth:
+        log_weights, k_hat = smoothed(log_weights)
+    else:
+        k_hat = pareto_k_hat(log_weights)
     total = float(scipy.special.logsumexp(log_weights))
     if not math.isfinite(total):
         return WeightedDraws(z, log_density, np.full(n, 1 / n), math.inf, -math.inf)

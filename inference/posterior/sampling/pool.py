@@ -15,38 +15,12 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.importance import Law
 from inference.posterior.sampling.proposal import Proposal
 
-__all__ = ["Blend", "Pool", "joined", "mixed", "more_of_all", "with_laws"]
+__all__ = ["Pool", "drawn_by", "joined", "mixed", "shares_that_suit", "with_laws"]
 
 Array = NDArray[np.float64]
 
-
-class Blend(NamedTuple):
-    """A mixture of laws.
-
-    Attributes
-    ----------
-    laws : tuple of Law
-        What it is made of.
-    counts : tuple of int
-        Draws of each, to which their shares are in proportion.
-    """
-
-    laws: tuple[Law, ...]
-    counts: tuple[int, ...]
-
-    def log_density(self, z: Array) -> Array:
-        """Return the log density at z of shape (n, d), shape (n,)."""
-        return mixed(np.array([law.log_density(z) for law in self.laws]), self.counts)
-
-    def draw(self, rng: np.random.Generator | np.random.RandomState, n: int) -> Array:
-        """Draw n points, shape (n, d): from each law its share, rounded."""
-        parts = zip(self.laws, self.dealt(n), strict=True)
-        return np.concatenate([law.draw(rng, count) for law, count in parts if count])
-
-    def dealt(self, n: int) -> tuple[int, ...]:
-        """Return how many of n draws come from each law."""
-        ends = np.cumsum((0, *self.counts)) * n // sum(self.counts)
-        return tuple(np.diff(ends).tolist())
+_KEPT = 0.5  # of the shares that laws were drawn in: a law guards what few draws tell of
+_DESCENT = 30
 
 
 class Pool(NamedTuple):
@@ -74,11 +48,6 @@ class Pool(NamedTuple):
     counts: tuple[int, ...]
     each: Array
     laplace: Array
-
-    @property
-    def blend(self) -> Blend:
-        """The law of them all."""
-        return Blend(self.laws, self.counts)
 
     @property
     def log_ratios(self) -> Array:
@@ -124,12 +93,56 @@ def _log_density(law: Law, z: Array, laplace: Array) -> Array:
     return law.log_density(z, laplace) if isinstance(law, Proposal) else law.log_density(z)
 
 
-def more_of_all(pool: Pool, density: CollapsedDensity, rng: np.random.Generator, n: int) -> Pool:
-    """Return n draws from all laws of a pool in their shares, as a pool of their own."""
-    z, counts = pool.blend.draw(rng, n), pool.blend.dealt(n)
+def drawn_by(
+    pool: Pool, shares: Array, n: int, density: CollapsedDensity, rng: np.random.Generator
+) -> Pool:
+    """Return n draws from all laws of a pool in these shares, as a pool of their own."""
+    ends = np.rint(np.cumsum([0.0, *shares]) * n).astype(int)
+    counts = tuple(np.diff(ends).tolist())
+    parts = zip(pool.laws, counts, strict=True)
+    z = np.concatenate([law.draw(rng, count) for law, count in parts if count])
     laplace = _laplace(pool.laws, z)
     each = np.array([_log_density(law, z, laplace) for law in pool.laws])
     return Pool(z, density(z), pool.laws, counts, each, laplace)
+
+
+def shares_that_suit(pool: Pool, members: int) -> tuple[Array, float]:
+    """Return the shares of the laws at which draws of their mixture would count for most.
+
+    Parameters
+    ----------
+    members : int
+        The first of the pool's draws, which came from no law.
+
+    Returns
+    -------
+    (ndarray, shape (laws,), float)
+        They sum to one. Half of a law's share stays as it is. And the effective share of such
+        draws.
+
+    Notes
+    -----
+    The mean square of the weights is convex in the shares (He and Owen 2014, Optimal mixture
+    weights in multiple importance sampling); each step multiplies a share by the root of its slope
+    (power descent: Daudel, Douc and Portier 2021), which keeps it positive and lowers the mean.
+    """
+    given = np.array(pool.counts) / sum(pool.counts)
+    log_weights = pool.log_ratios[members:]
+    some = np.isfinite(log_weights)
+    if not some.any():
+        return given, 0.0
+    log_weights, n = log_weights[some], len(log_weights)
+    log_blend = pool.target[members:][some] - log_weights
+    ratios = np.exp(pool.each[:, members:][:, some] - log_blend)  # at most one over a share
+    weights = np.exp(log_weights - log_weights.max())
+    moved = given
+    for _ in range(_DESCENT):
+        mixture = (_KEPT * given + (1.0 - _KEPT) * moved) @ ratios
+        moved = moved * np.sqrt(ratios @ (weights / mixture) ** 2)
+        moved = moved / moved.sum()
+    shares = _KEPT * given + (1.0 - _KEPT) * moved
+    mean_square = np.sum(weights**2 / (shares @ ratios)) / n
+    return shares, float((np.sum(weights) / n) ** 2 / mean_square)
 
 
 def joined(pool: Pool, more: Pool) -> Pool:
@@ -144,7 +157,7 @@ def joined(pool: Pool, more: Pool) -> Pool:
     )
 
 
-def mixed(each: Array, counts: tuple[int, ...]) -> Array:
+def mixed(each: Array, counts: Sequence[float] | Array) -> Array:
     """Return the log density of a mixture, its laws in proportion to counts.
 
     Parameters
@@ -156,5 +169,5 @@ def mixed(each: Array, counts: tuple[int, ...]) -> Array:
     -------
     ndarray, shape (n,)
     """
-    shares = np.log(np.array(counts) / sum(counts))
+    shares = np.log(np.array(counts) / np.sum(counts))
     return np.asarray(special.logsumexp(each + shares[:, None], axis=0))

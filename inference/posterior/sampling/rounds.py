@@ -20,12 +20,19 @@ from scipy import linalg, optimize, special
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.importance import (
-    MAX_K_HAT,
+    MAX_SMOOTHED_K_HAT,
     WeightedDraws,
     pareto_k_hat,
     weighted_by,
 )
-from inference.posterior.sampling.pool import Pool, joined, mixed, more_of_all, with_laws
+from inference.posterior.sampling.pool import (
+    Pool,
+    drawn_by,
+    joined,
+    mixed,
+    shares_that_suit,
+    with_laws,
+)
 from inference.posterior.sampling.proposal import Local, Mixture, Proposal, completed
 from inference.posterior.sampling.transport import fit_map
 
@@ -40,10 +47,10 @@ _WIDE = (0.15, 0.5)  # these powers of the target, by turns
 _FEWEST, _LAWS = 6, 3  # rounds, and laws of each
 _NEIGHBOURS = 10  # for every unknown, that such a law is fitted to; or
 _NEAR = 0.05  # of all draws
-_LONGEST = 4  # times as many may count before the draws are spent
-_LEAST = 2000  # draws that count: the shape of their weights' tail is known to 0.13
-_SURE = 0.45  # k-hat in the rounds from which that of the draws that count is worth a trial
-_MOST_DISSENT = 0.1  # of a population's members beyond every weight
+_LEAST = 2000  # draws that count: the shape of their weights' tail is known to 0.13; at
+_MOST = 12_000  # most
+_TAIL = 0.01  # of the draws' mass, in the heaviest of them: there may be
+_MOST_DISSENT = 0.03  # so many of a population's members
 _SPARE = 1.3  # times the draws that are foreseen
 _FITTED = 2000  # draws that a map is fitted to
 _LEAST_ESS = 150.0  # of them, and
@@ -62,7 +69,7 @@ class Rounds:
         Those that count.
     dissent : float
         Largest share of a population's members at which the target exceeds the proposals by more
-        than at any draw.
+        than at the heaviest draws.
     calls : int
         Density evaluations.
     tolerated : float
@@ -78,7 +85,7 @@ class Rounds:
     @property
     def trusted(self) -> bool:
         """Whether the draws stand for the posterior, however many they are."""
-        return self.draws.k_hat < MAX_K_HAT and self.dissent < self.tolerated
+        return self.draws.k_hat < MAX_SMOOTHED_K_HAT and self.dissent < self.tolerated
 
 
 def in_rounds(
@@ -89,6 +96,7 @@ def in_rounds(
     target_ess: int,
     most: int,
     tolerated: float = _MOST_DISSENT,
+    tail: float = _TAIL,
 ) -> Rounds:
     """Draw by importance, in rounds that follow what was drawn.
 
@@ -105,9 +113,13 @@ def in_rounds(
     target_ess : int
         Effective sample size wanted.
     most : int
-        Draws that may be spent, but for those that count: 2000 to 8000 are made in any case.
+        Draws that may be spent, but for those that count: 2000 to 12,000 are made in any case.
     tolerated : float
-        Share of a population's members beyond every weight, below which draws stand.
+        Share of a population's members beyond the weights of the heaviest draws, below which draws
+        stand.
+    tail : float
+        Share of all mass in these heaviest draws; 0, and the heaviest alone is meant, where members
+        are none of the posterior.
 
     Returns
     -------
@@ -122,23 +134,20 @@ def in_rounds(
     pool = with_laws(pool, (proposal,), (_DRAWS,), density, rng)
     while True:
         excess, log_weights = np.split(pool.log_ratios, ends[-1:])
-        beyond = excess > log_weights.max()
-        share = _effective(log_weights) / len(log_weights)
-        count = int(min(max(_SPARE * target_ess / share, _LEAST), most))
+        beyond = excess > _heaviest(log_weights, tail)
         # no room for another round, or nothing that it could follow
         over = calls + _DRAWS + _LEAST > most or not np.isfinite(log_weights).any()
-        # behind another round there would be no room for all that are to count
-        sure = MAX_K_HAT if calls + _DRAWS + count > most else _SURE
-        settled = pareto_k_hat(log_weights) < sure and _worst(beyond, ends) < tolerated
-        settled = settled and len(pool.laws) > _FEWEST * _LAWS
-        if over or (settled and count <= _LONGEST * _LEAST):
-            # of the last ones as many as are wanted: laws that are trusted cost the more
-            room = max(most - calls, _LONGEST * _LEAST if over else _LEAST)
-            count = max(min(count, room), _LEAST)
-            more = more_of_all(pool, density, rng, count)
-            log_blend = mixed(more.each, pool.counts)
-            draws, calls = weighted_by(more.z, more.target, log_blend), calls + count
-            dissent = _worst(excess > np.max(more.target - log_blend), ends)
+        settled = len(pool.laws) > _FEWEST * _LAWS and _worst(beyond, ends) < tolerated
+        settled = settled and pareto_k_hat(log_weights) < MAX_SMOOTHED_K_HAT
+        shares, share = shares_that_suit(pool, ends[-1]) if over or settled else (none, 0.0)
+        count = int(max(_SPARE * target_ess / max(share, 1e-9), _LEAST))
+        if over or (settled and count <= _MOST):
+            room = _MOST if over else min(max(most - calls, _LEAST), _MOST)
+            more = _that_count(pool, shares, (min(count, room), room), target_ess, density, rng)
+            draws, calls = _weighed(more, shares), calls + len(more.z)
+            excess = pool.target[: ends[-1]] - mixed(pool.each[:, : ends[-1]], shares)
+            heaviest = _heaviest(more.target - mixed(more.each, shares), tail)
+            dissent = _worst(excess > heaviest, ends)
             found = Rounds(proposal, draws.that_count, dissent, calls, tolerated)
             if over or (found.trusted and found.draws.ess >= target_ess):
                 if not found.trusted:
@@ -147,7 +156,7 @@ def in_rounds(
                 return dataclasses.replace(found, proposal=last)
             pool = joined(pool, more)  # they show what the laws left out
             excess, log_weights = np.split(pool.log_ratios, ends[-1:])
-            beyond = excess > log_weights.max()
+            beyond = excess > _heaviest(log_weights, tail)
         drawn = pool.z[ends[-1] :]
         sample = _sample(drawn, log_weights, members[beyond], len(members), rng)
         power = _WIDE[len(pool.laws) // _LAWS % len(_WIDE)]
@@ -158,6 +167,37 @@ def in_rounds(
         laws = (proposal, wide, _around(proposal, pool.z, pool.log_ratios))
         pool = with_laws(pool, laws, (_DRAWS - local - far, far, local), density, rng)
         calls += _DRAWS
+
+
+def _that_count(
+    pool: Pool,
+    shares: Array,
+    counts: tuple[int, int],
+    target_ess: int,
+    density: CollapsedDensity,
+    rng: np.random.Generator,
+) -> Pool:
+    """Draw from the laws of a pool, which change no more, until enough draws count.
+
+    Parameters
+    ----------
+    counts : (int, int)
+        Draws to begin with, and at most: shares that suit the pool suit other draws less.
+    """
+    first, most = counts
+    drawn = drawn_by(pool, shares, first, density, rng)
+    while True:
+        draws, n = _weighed(drawn, shares), len(drawn.z)
+        enough = int(n * min(_SPARE * target_ess / draws.ess, 2.0))
+        hopeless = draws.k_hat >= MAX_SMOOTHED_K_HAT or enough > most
+        if hopeless or draws.ess >= target_ess:
+            return drawn
+        drawn = joined(drawn, drawn_by(pool, shares, enough - n, density, rng))
+
+
+def _weighed(pool: Pool, shares: Array) -> WeightedDraws:
+    """Return a pool's draws by the mixture of its laws in these shares, their tail smoothed."""
+    return weighted_by(pool.z, pool.target, mixed(pool.each, shares), smooth=True)
 
 
 def _fitted(proposal: Proposal, sample: Array, density: CollapsedDensity) -> Proposal:
@@ -176,6 +216,15 @@ def _effective(log_weights: Array) -> float:
         return 1.0
     weights: Array = special.softmax(log_weights)
     return 1.0 / float(np.sum(weights**2))
+
+
+def _heaviest(log_weights: Array, tail: float) -> float:
+    """Return the log weight above which the heaviest draws hold a share of all mass, or none."""
+    finite = np.sort(log_weights[np.isfinite(log_weights)])[::-1]
+    if not finite.size:
+        return -math.inf
+    held = np.cumsum(special.softmax(finite))
+    return float(finite[np.searchsorted(held, tail)])
 
 
 def _worst(beyond: NDArray[np.bool_], ends: NDArray[np.intp]) -> float:

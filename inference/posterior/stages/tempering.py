@@ -40,7 +40,7 @@ __all__ = [
 _SHARE = 0.5  # of what the populations took, that importance sampling behind them may take
 _MOST_DRAWS = (12_000, 40_000)  # but so many at least, and at most
 SCOUTED_DRAWS = 20_000  # that rounds from scouts may take: as many as carry one population
-HALFWAY_DRAWS = 40_000  # and those from small populations: as many as carry these
+HALFWAY_DRAWS = 80_000  # and those from small populations: as many as carry these
 TOLERATED = 0.01  # of what scouts met on their way from the prior, beyond every weight
 
 
@@ -156,7 +156,7 @@ def _set_out(job: Job, stage: Tempering) -> tuple[Tempering | Weighted | Walking
     if stage.early:
         kind, most = (0, SCOUTED_DRAWS) if stage.scouted else (1, HALFWAY_DRAWS)
         rng = job.stream(Stream.ROUNDS, kind)
-        found = in_rounds(density, proposal, populations, rng, target, most, TOLERATED)
+        found = in_rounds(density, proposal, populations, rng, target, most, TOLERATED, 0.0)
     else:
         most = int(np.clip(_SHARE * sum(each.calls for each in members), *_MOST_DRAWS))
         found = in_rounds(density, proposal, populations, job.stream(Stream.ROUNDS), target, most)
