@@ -164,8 +164,12 @@ def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoi
 def _after(checkpoint: Checkpoint, pieces: Sequence[object]) -> Checkpoint:
     """Return where a task that decides on the next stage has come to."""
     (reached,) = _all(Checkpoint, pieces)
-    calls = checkpoint.calls + reached.calls
-    return dataclasses.replace(reached, calls=calls, selection=checkpoint.selection)
+    return dataclasses.replace(
+        reached,
+        calls=checkpoint.calls + reached.calls,
+        selection=checkpoint.selection,
+        integrated=checkpoint.integrated or reached.integrated,
+    )
 
 
 def _all(kind: type[P], pieces: Sequence[object]) -> tuple[P, ...]:

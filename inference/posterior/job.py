@@ -119,6 +119,24 @@ class Job:
         coupled = integrated or self.scene.motion == "static"
         return not coupled and int(self.usable.sum()) > MOST_SAMPLED
 
+    @property
+    def can_integrate_error(self) -> bool:
+        """Whether there is an error of the flux that is not, but could be, integrated out."""
+        error = self.scene.model_error
+        few = len(self.frames) <= MOST_SAMPLED and self.scene.motion == "radial"
+        return few and error.flux > 0 and not error.integrated
+
+    def with_error_integrated(self) -> "Job":
+        """Return the job with the error of the flux integrated out in full.
+
+        Linear response starts from the posterior of an exact model. Where that lies too far from
+        the truth it cannot be put right to first order (docs/model.md, model-response).
+        """
+        error = self.scene.model_error
+        sizes = ErrorSizes(flux=error.flux, range_m=error.range_m, shadow=error.shadow)
+        scene = self.scene.model_copy(update={"discrepancy": sizes})
+        return dataclasses.replace(self, scene=scene)
+
     def parts(self) -> tuple["Job", ...]:
         """Return jobs of a part of the frames each, none larger than what is judged at once.
 
@@ -180,7 +198,10 @@ def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSetti
         # of 53 bits, which readers of JSON that know only floats do not round
         seed = int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 11)
         settings = settings.model_copy(update={"seed": seed})
-    job = Job(sensor, _with_error_integrated(scene, frames), frames, settings)
+    job = Job(sensor, scene, frames, settings)
+    if columns_of(frames).shape[1] > RANGE and job.can_integrate_error:
+        # readings that outweigh what is known of ranges contradict it where no model is exact
+        job = job.with_error_integrated()
     if not job.usable.any():
         if sensor.temperature is not None:
             raise RefusedError("every frame is saturated, or its temperature_k is null")
@@ -188,18 +209,3 @@ def prepare(sensor: Sensor, scene: Scene, frames: Frames, settings: SamplerSetti
     check_scene_for_posterior(sensor, scene, frames.select(job.usable))
     import_libraries()
     return job
-
-
-def _with_error_integrated(scene: Scene, frames: Frames) -> Scene:
-    """Return a scene whose flux's error is integrated out in full where frames know their ranges.
-
-    Linear response starts from the posterior of an exact model. That of readings that outweigh what
-    is known of ranges contradicts it where no model is exact, and lies too far from the truth to be
-    put right to first order (docs/model.md, model-response).
-    """
-    error = scene.model_error
-    few = len(frames) <= MOST_SAMPLED and scene.motion == "radial"
-    if not (few and error.flux > 0) or error.integrated or columns_of(frames).shape[1] <= RANGE:
-        return scene
-    sizes = ErrorSizes(flux=error.flux, range_m=error.range_m, shadow=error.shadow)
-    return scene.model_copy(update={"discrepancy": sizes})

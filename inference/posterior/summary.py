@@ -132,6 +132,7 @@ def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
         # of the choices the last keeps all optional terms
         begun = begin(job, stage if isinstance(stage, Starting) else stage.starts[-1])
         stage, calls = begun.stage, calls + begun.calls
+        job = job.with_error_integrated() if begun.integrated else job
         job = dataclasses.replace(job, representatives=begun.representatives)
     assert not isinstance(stage, Selecting | Starting)  # noqa: S101  # sampling has begun
     stage = standing(stage)

@@ -33,12 +33,16 @@ class Checkpoint:
         Which optional terms of the scene stay; None where it has none, or nothing is decided.
     representatives : Representatives or None
         Frames that are sampled in the name of all; None where all are.
+    integrated : bool
+        Whether errors of the flux are integrated out in full though the scene does not ask for
+        that: which optimum is the best depends on them.
     """
 
     stage: Stage
     calls: int
     selection: Selection | None = None
     representatives: Representatives | None = None
+    integrated: bool = False
 
     @property
     def method(self) -> str:

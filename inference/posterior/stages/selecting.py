@@ -8,6 +8,7 @@ from inference.posterior.sampling.start import Optimum, refine
 from inference.posterior.selection.models import Candidate, assess, candidate_terms, reduced
 from inference.posterior.selection.selection import Selection, decide
 from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.optima import that_matter
 from inference.posterior.stages.stage import Selecting, Starting
 from inference.posterior.stages.starting import StartTask
 from inference.posterior.streams import Stream
@@ -73,7 +74,8 @@ def tasks(job: Job, stage: Selecting) -> tuple[StartTask, ...] | tuple[AssessTas
     if looking:
         return tuple(looking)
     return tuple(
-        AssessTask(jobs[k], terms, k, stage.starts[k].optima or ()) for k, terms in enumerate(every)
+        AssessTask(jobs[k], terms, k, tuple(that_matter(stage.starts[k].optima or ())))
+        for k, terms in enumerate(every)
     )
 
 
@@ -110,6 +112,8 @@ def decided(
 def sampled(job: Job, checkpoint: Checkpoint) -> Job:
     """Return the job as it is sampled: all terms stay until they are decided."""
     job = dataclasses.replace(job, representatives=checkpoint.representatives)
+    if checkpoint.integrated:
+        job = job.with_error_integrated()
     if not job.scene.optional_terms:
         return job
     selection = checkpoint.selection

@@ -19,6 +19,7 @@ from inference.posterior.sampling.warm import beyond, warm_start
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.chunk import evaluations
 from inference.posterior.stages.ensembles import POPULATIONS, from_weighted
+from inference.posterior.stages.optima import added, depend_on_errors, that_matter
 from inference.posterior.stages.scouting import Scouts, from_scouts, send_scouts, thinned
 from inference.posterior.stages.stage import (
     Drawing,
@@ -74,7 +75,7 @@ class StartTask:
         optima = list(stage.optima)
         if not stage.fitted:
             for fitted in fitted_optima(some, density):
-                optima = _with(optima, fitted)
+                optima = added(optima, fitted)
             return Checkpoint(dataclasses.replace(stage, optima=tuple(optima), fitted=True), 0)
         return _set_out(job, density, optima)
 
@@ -100,10 +101,12 @@ def begin(job: Job, stage: Starting) -> Checkpoint:
         Where no parameters explain the frames at all, or importance sampling alone was asked for
         and cannot be trusted.
     """
-    reached = StartTask(job, stage).run()
+    reached, integrated = StartTask(job, stage).run(), False
     while isinstance(reached.stage, Starting):
+        if reached.integrated:
+            job, integrated = job.with_error_integrated(), True
         reached = StartTask(job, reached.stage).run()
-    return reached
+    return dataclasses.replace(reached, integrated=integrated)
 
 
 def _settled(job: Job) -> Checkpoint:
@@ -129,6 +132,9 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum]) -> Checkpo
     """
     whole = density = job.density()
     optima, scouts, calls = _with_scouts(job, some, optima)
+    if optima and depend_on_errors(job, some, optima):
+        return Checkpoint(Starting(), calls, None, integrated=True)
+    optima = that_matter(optima)
     if job.is_large and optima:
         by, optima, used = represent(density, optima, job.stream(Stream.REPRESENTATIVES))
         job, calls = dataclasses.replace(job, representatives=by), calls + used
@@ -192,19 +198,9 @@ def _with_scouts(
     """Add optima that scouts find, and return these, told to none; with the evaluations."""
     found, calls = send_scouts(thinned(density), job.stream(Stream.SCOUTS))
     if len(found.z):
-        optima = _with(optima, refine(density, climb(density, found.z[0])[0]))
-        optima = _with(optima, refine(density, found.z[0]))
+        optima = added(optima, refine(density, climb(density, found.z[0])[0]))
+        optima = added(optima, refine(density, found.z[0]))
     return optima, found, calls
-
-
-def _with(optima: list[Optimum], found: Optimum | None) -> list[Optimum]:
-    """Add an optimum that is not among those found before, and drop what it makes negligible."""
-    if found is None:
-        return optima
-    if any(other.is_near(found.z) for other in optima):
-        return optima
-    every = sorted([*optima, found], key=lambda optimum: -optimum.log_density)
-    return [o for o in every if o.log_density > every[0].log_density - 20.0]
 
 
 def _has_too_many(density: CollapsedDensity) -> bool:

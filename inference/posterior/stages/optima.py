@@ -1,0 +1,68 @@
+"""Optima that were found: which of them matter, and which an exact model alone rules out.
+
+Sampling follows the noise of the readings, and what the model's errors add is computed by linear
+response around its draws. Where an optimum far below the best one is more probable than that once
+errors of the flux are integrated out, no response around the best one leads there.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inference.density.collapsed import CollapsedDensity
+from inference.density.discrepant import with_discrepancy
+from inference.posterior.job import Job
+from inference.posterior.sampling.start import Optimum, refine
+
+__all__ = ["added", "depend_on_errors", "that_matter"]
+
+_MATTERS = 20.0  # nats below the best: what is there holds some billionths
+_FAR = 5.0  # nats of mass below the largest, from which on draws show little of an optimum
+_AHEAD = 3.0  # nats of mass above that one's, where errors are integrated out
+_WITHIN_REACH = 10.0  # nats, of what is as yet not refined
+_MOST = 3  # optima that are compared with the best
+
+
+def added(optima: Sequence[Optimum], found: Optimum | None) -> list[Optimum]:
+    """Return optima, the best first, with one more if it is not among those found before."""
+    if found is None or any(other.is_near(found.z) for other in optima):
+        return list(optima)
+    return sorted([*optima, found], key=lambda optimum: -optimum.log_density)
+
+
+def that_matter(optima: Sequence[Optimum]) -> list[Optimum]:
+    """Return those, the best first, that are not negligible beside it."""
+    return [one for one in optima if one.log_density > optima[0].log_density - _MATTERS]
+
+
+def depend_on_errors(job: Job, density: CollapsedDensity, optima: Sequence[Optimum]) -> bool:
+    """Tell whether it is the model's errors that decide which optimum is the best.
+
+    Parameters
+    ----------
+    job : Job
+        Whose scene says what errors there may be.
+    density : CollapsedDensity
+        Of an exact model.
+    optima : sequence of Optimum
+        Of this density, all that were found, the best first.
+
+    Returns
+    -------
+    bool
+        False where errors are integrated out already, or cannot be.
+    """
+    best = max(optima, key=lambda one: one.log_mass)
+    far = [one for one in optima if one.log_mass < best.log_mass - _FAR]
+    if not (far and job.can_integrate_error):
+        return False
+    erring = with_discrepancy(density, job.scene.model_error.flux)
+    values = erring(np.array([one.z for one in (best, *far)]))
+    within = zip(far, values[1:] > values[0] - _WITHIN_REACH, strict=True)
+    promising = [one for one, reached in within if reached][:_MOST]
+    if not promising:
+        return False
+    first = refine(erring, best.z)
+    rivals = [refine(erring, one.z) for one in promising]
+    least = -np.inf if first is None else first.log_mass + _AHEAD
+    return any(rival is not None and rival.log_mass > least for rival in rivals)
