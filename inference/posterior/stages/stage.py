@@ -108,6 +108,8 @@ class Tempering(_NotBegun):
     reach : float
         Power of the likelihood that populations are carried to. Below 1 they are small, and rounds
         of importance sampling are tried from them before larger ones are carried all the way.
+    tried : bool
+        Whether rounds from small populations were tried once: what they drew begins them again.
     """
 
     phase: ClassVar[Phase] = "tempering"
@@ -118,6 +120,7 @@ class Tempering(_NotBegun):
     weighted: WeightedDraws | None = None
     scouted: bool = False
     reach: float = 1.0
+    tried: bool = False
 
     @property
     def early(self) -> bool:

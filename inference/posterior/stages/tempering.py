@@ -40,7 +40,8 @@ __all__ = [
 _SHARE = 0.5  # of what the populations took, that importance sampling behind them may take
 _MOST_DRAWS = (12_000, 40_000)  # but so many at least, and at most
 SCOUTED_DRAWS = 20_000  # that rounds from scouts may take: as many as carry one population
-HALFWAY_DRAWS = 80_000  # and those from small populations: as many as carry these
+HALFWAY_DRAWS = 40_000  # and those from small populations, twice: as many as carry these
+_LEADING = 50.0  # effective size of draws, from which on rounds may begin again at them
 TOLERATED = 0.01  # of what scouts met on their way from the prior, beyond every weight
 
 
@@ -150,23 +151,17 @@ def merge(
 def _set_out(job: Job, stage: Tempering) -> tuple[Tempering | Weighted | Walking, int]:
     """Sample by importance from the populations that arrived; set up ensembles where it fails."""
     members = [each for each in stage.populations if each is not None and len(each.z)]
-    density = job.density()
-    proposal = dataclasses.replace(stage.proposal, share=MAP_SHARE)
-    populations, target = tuple(each.z for each in members), job.settings.target_ess
-    if stage.early:
-        kind, most = (0, SCOUTED_DRAWS) if stage.scouted else (1, HALFWAY_DRAWS)
-        rng = job.stream(Stream.ROUNDS, kind)
-        found = in_rounds(density, proposal, populations, rng, target, most, TOLERATED, 0.0)
-    else:
-        most = int(np.clip(_SHARE * sum(each.calls for each in members), *_MOST_DRAWS))
-        found = in_rounds(density, proposal, populations, job.stream(Stream.ROUNDS), target, most)
-    enough = found.trusted and found.draws.ess >= target
-    if enough and job.settings.method == "auto":
+    found, auto = _in_rounds(job, stage, members), job.settings.method == "auto"
+    if auto and found.trusted and found.draws.ess >= job.settings.target_ess:
         return Weighted(found.proposal.optima, found.draws, Verdict(True, ())), found.calls
     if not stage.early:
         walking = _walking(job, stage, members, found)
+    elif _may_try_again(stage, found) and (auto or not found.trusted):
+        # in a chunk of its own: a job may be out of time by now
+        return dataclasses.replace(stage, weighted=found.draws, tried=True), found.calls
     elif found.trusted:
-        ensembles = from_weighted(job, density, found.proposal, found.draws, members[0].z)
+        density, others = job.density(), members[0].z
+        ensembles = from_weighted(job, density, found.proposal, found.draws, others)
         walking = Walking(found.proposal, ensembles, stage.verdict, 2, weighted=found.draws)
     else:
         # until larger populations are on their way an answer is made of what there is
@@ -176,6 +171,31 @@ def _set_out(job: Job, stage: Tempering) -> tuple[Tempering | Weighted | Walking
         stage = dataclasses.replace(stage, weighted=None if known is None else known[0])
         return _all_the_way(stage), found.calls
     return walking, found.calls + walking.ensembles[0].walkers * len(walking.ensembles)
+
+
+def _in_rounds(job: Job, stage: Tempering, members: Sequence[Population]) -> Rounds:
+    """Sample by importance from the populations, and from what was drawn before."""
+    density, target, early = job.density(), job.settings.target_ess, (TOLERATED, 0.0)
+    proposal = dataclasses.replace(stage.proposal, share=MAP_SHARE)
+    populations = tuple(each.z for each in members)
+    if stage.scouted:
+        rng = job.stream(Stream.ROUNDS, 0)
+        return in_rounds(density, proposal, populations, rng, target, SCOUTED_DRAWS, *early)
+    if stage.early:
+        rng = job.stream(Stream.ROUNDS, 1 + stage.tried)
+        if stage.tried and stage.weighted is not None:
+            drawn = stage.weighted
+            some = rng.choice(len(drawn.z), size=len(populations[0]), p=drawn.weights)
+            populations = (*populations, drawn.z[some])
+        return in_rounds(density, proposal, populations, rng, target, HALFWAY_DRAWS, *early)
+    most = int(np.clip(_SHARE * sum(each.calls for each in members), *_MOST_DRAWS))
+    return in_rounds(density, proposal, populations, job.stream(Stream.ROUNDS), target, most)
+
+
+def _may_try_again(stage: Tempering, found: Rounds) -> bool:
+    """Tell whether rounds have come so far that they may begin again where they are."""
+    first = not (stage.scouted or stage.tried)
+    return first and found.dissent < TOLERATED and found.draws.ess >= _LEADING
 
 
 def _all_the_way(stage: Tempering) -> Tempering:

@@ -105,6 +105,82 @@ def test_where_rounds_fail_populations_are_carried_all_the_way(
     assert {getattr(task, "reach", None) for task in tempering.tasks(_job("auto"), stage)} == {1.0}
 
 
+@functools.cache
+def _drawn() -> Rounds:
+    """Draws of rounds that had little to spend."""
+    stage, job = _carried().stage, _job("auto")
+    assert isinstance(stage, Tempering)
+    populations = tuple(each.z for each in stage.populations if each is not None)
+    rng = np.random.default_rng(SEED)
+    return in_rounds(job.density(), stage.proposal, populations, rng, 400, 12_000, 1.0, 0.0)
+
+
+def test_rounds_that_came_far_begin_again_where_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a chunk of their own, as a job may be out of time; and only once.
+
+    Of six sets of which the first rounds of two failed the second ones answered one, for a fifth of
+    the draws that larger populations take.
+    """
+    given: list[tuple[np.ndarray, ...]] = []
+    doubtful = dataclasses.replace(
+        _drawn(), draws=dataclasses.replace(_drawn().draws, k_hat=0.9), dissent=0.0
+    )
+
+    def doubted(*arguments: Any) -> Rounds:
+        given.append(arguments[2])
+        return doubtful
+
+    monkeypatch.setattr(tempering, "in_rounds", doubted)
+    job, first = _job("auto"), _after("auto")
+    assert isinstance(first.stage, Tempering)
+    assert first.stage.early
+    assert first.stage.tried
+    assert first.stage.weighted is doubtful.draws  # what an answer is made of, were there no time
+    assert first.calls == _carried().calls + doubtful.calls
+    stored = Checkpoint.from_bytes(first.to_bytes())
+    (task,) = fold.tasks(job, stored)
+    assert isinstance(task, tempering.SetOutTask)
+    second = fold.merge(job, stored, [fold.run(task)])
+    assert len(given[0]) == POPULATIONS
+    *before, drawn = given[1]
+    assert all(map(np.array_equal, before, given[0]))
+    places = {row.tobytes() for row in doubtful.draws.z}
+    assert all(row.tobytes() in places for row in drawn)
+    assert isinstance(second.stage, Tempering)
+    assert not second.stage.early
+    assert second.stage.populations == (None,) * POPULATIONS
+
+
+def test_rounds_that_came_nowhere_are_not_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    draws = _drawn().draws
+    one = np.zeros(len(draws.weights))
+    one[0] = 1.0
+    poor = dataclasses.replace(draws, weights=one, k_hat=math.inf)
+    found = dataclasses.replace(_drawn(), draws=poor, dissent=0.0)
+    monkeypatch.setattr(tempering, "in_rounds", lambda *_: found)
+    stage = _after("auto").stage
+    assert isinstance(stage, Tempering)
+    assert not stage.early
+
+
+def test_trusted_draws_that_are_too_few_are_drawn_on_only_where_they_answer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Ensembles that were asked for start from them at once."""
+    draws = _drawn().draws
+    some = np.zeros(len(draws.weights))
+    some[np.argsort(draws.weights)[-200:]] = 1 / 200
+    draws = dataclasses.replace(draws, weights=some, k_hat=0.1)
+    few = dataclasses.replace(_drawn(), draws=draws, dissent=0.0)
+    monkeypatch.setattr(Rounds, "trusted", property(lambda _: True))
+    monkeypatch.setattr(tempering, "in_rounds", lambda *_: few)
+    assert few.draws.ess < _job("auto").settings.target_ess
+    again = _after("auto").stage
+    assert isinstance(again, Tempering)
+    assert again.tried
+    assert isinstance(_after("emcee").stage, Walking)
+
+
 def test_where_they_die_on_the_way_larger_ones_set_out() -> None:
     stage, d = _started().stage, 8
     assert isinstance(stage, Tempering)
