@@ -19,8 +19,8 @@ __all__ = ["added", "depend_on_errors", "that_matter"]
 _MATTERS = 20.0  # nats below the best: what is there holds some billionths
 _FAR = 5.0  # nats of mass below the largest, from which on draws show little of an optimum
 _AHEAD = 3.0  # nats of mass above that one's, where errors are integrated out
-_WITHIN_REACH = 10.0  # nats, of what is as yet not refined
-_MOST = 3  # optima that are compared with the best
+_WITHIN_REACH = 100.0  # nats below it, of what is as yet not refined
+_MOST = 2  # optima that are compared with it, the best first
 
 
 def added(optima: Sequence[Optimum], found: Optimum | None) -> list[Optimum]:
