@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from inference.posterior.sampling.importance import pareto_k_hat
+from inference.posterior.sampling.importance import pareto_k_hat, weighted_by
 from inference.posterior.selection.leave_one_out import leave_one_out
 
 
@@ -34,3 +34,33 @@ def test_the_shape_of_a_pareto_law_is_found(shape: float) -> None:
     found = pareto_k_hat(log_weights)
     drawn = (tail * shape + 10 * 0.5) / (tail + 10)
     assert found == pytest.approx(drawn, abs=5 * (1 + shape) / math.sqrt(tail))
+
+
+def test_smoothed_weights_of_no_variance_err_half_as_much() -> None:
+    """Pareto weights of shape 0.65, whose mean is known: it errs by 0.17 and 0.07."""
+    k, n, replicates = 0.65, 2000, 300
+    error, size = np.empty((2, replicates)), np.empty((2, replicates))
+    for seed in range(replicates):
+        u = np.random.default_rng(seed).random(n)
+        for i, smooth in enumerate((False, True)):
+            draws = weighted_by(u[:, None], -k * np.log(u), np.zeros(n), smooth=smooth)
+            error[i, seed], size[i, seed] = draws.log_evidence + np.log1p(-k), draws.ess
+            assert draws.weights.sum() == pytest.approx(1.0, abs=1e-12)
+    rms = np.sqrt(np.mean(error**2, axis=1))
+    # an rms over 300 replicates is known to 4 %, more where tails are heavy
+    assert rms[1] < 0.6 * rms[0]
+    # the relative variance of the weights is n / ess - 1; of the weights' own mean that is not all
+    assert rms[1] < 2.0 * np.sqrt(np.median(1.0 / size[1] - 1.0 / n))
+
+
+def test_smoothing_leaves_all_but_the_tail_and_its_order() -> None:
+    log_weights = np.random.default_rng(3).standard_normal(4000)
+    plain = weighted_by(np.zeros((4000, 1)), log_weights, np.zeros(4000))
+    smooth = weighted_by(np.zeros((4000, 1)), log_weights, np.zeros(4000), smooth=True)
+    assert smooth.k_hat == plain.k_hat
+    order = np.argsort(log_weights)
+    tail = int(3 * math.sqrt(4000))
+    kept = np.log(smooth.weights / plain.weights)[order[:-tail]]
+    assert np.ptp(kept) < 1e-9
+    assert (np.diff(smooth.weights[order]) >= 0).all()
+    assert smooth.weights.max() <= np.exp(kept[0]) * plain.weights.max() * (1 + 1e-9)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from inference.posterior.sampling import rounds
-from inference.posterior.sampling.importance import MAX_K_HAT
-from inference.posterior.sampling.pool import joined
+from inference.posterior.sampling.importance import MAX_K_HAT, weighted_by
+from inference.posterior.sampling.pool import joined, shares_that_suit
 from inference.posterior.sampling.proposal import Local, Mixture, Proposal
 from inference.posterior.sampling.rounds import Rounds, in_rounds
 
@@ -159,6 +159,37 @@ def test_draws_that_do_not_count_join_the_others(monkeypatch: pytest.MonkeyPatch
     weights = np.exp(both.log_ratios[600:])
     assert abs(weights.mean() - 2 * np.pi) < 5 * weights.std() / np.sqrt(len(weights))
     assert found.calls == sum(seen)
+
+
+def test_the_tail_of_draws_that_count_is_smoothed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are trusted up to a k-hat at which weights as they are have no variance."""
+    smooth: list[bool] = []
+
+    def noted(*arguments: Any, **words: bool) -> Any:
+        smooth.append(words.get("smooth", False))
+        return weighted_by(*arguments, **words)
+
+    monkeypatch.setattr(rounds, "weighted_by", noted)
+    _found(SHARE)
+    assert smooth
+    assert all(smooth)
+
+
+def test_draws_go_on_from_the_same_laws_until_enough_count(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Shares that suit the draws so far promise more than others keep."""
+
+    def promising(*arguments: Any) -> Any:
+        shares, effective = shares_that_suit(*arguments)
+        return shares, 3.0 * effective
+
+    monkeypatch.setattr(rounds, "shares_that_suit", promising)
+    populations = (_population(300, SHARE, 1), _population(300, SHARE, 2))
+    start, rng = Proposal(LAPLACE, None, 0.5), np.random.default_rng(4)
+    found = in_rounds(cast(Any, _target), start, populations, rng, 3000, 12_000)
+    assert found.trusted
+    assert found.draws.ess >= 3000
 
 
 def test_a_target_that_is_zero_at_every_draw_is_not_trusted() -> None:

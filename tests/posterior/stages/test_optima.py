@@ -122,6 +122,8 @@ def test_an_answer_that_must_be_given_at_once_has_them_integrated_too(
     begun = begin(_job(), Starting())
     assert begun.integrated
     assert seen == [False, True]
+    answered, _ = fold.draw(_job(), fold.start(_job()))
+    assert answered.scene.model_error.integrated
 
 
 def test_optima_are_kept_apart_and_in_order() -> None:
