@@ -3,7 +3,8 @@
 Those that arrived are what importance sampling in rounds begins with, and is held to. Its draws are
 the answer where they may be; otherwise they say from where, and through which map, ensembles walk.
 Small populations that stop on their way, and stand wider than the posterior, mostly suffice for
-that, at a tenth to a third of the cost. Where they do not, larger ones follow, from the prior anew.
+that, at a tenth to a third of the cost. Where they do not, rounds begin once more at what they drew
+themselves; then larger populations follow, from the prior anew.
 """
 
 import dataclasses

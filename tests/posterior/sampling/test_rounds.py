@@ -165,7 +165,7 @@ def test_the_tail_of_draws_that_count_is_smoothed(monkeypatch: pytest.MonkeyPatc
     """They are trusted up to a k-hat at which weights as they are have no variance."""
     smooth: list[bool] = []
 
-    def noted(*arguments: Any, **words: bool) -> Any:
+    def noted(*arguments: Any, **words: Any) -> Any:
         smooth.append(words.get("smooth", False))
         return weighted_by(*arguments, **words)
 
