@@ -17,10 +17,9 @@ from inference.posterior.sampling.start import Optimum, refine
 __all__ = ["added", "depend_on_errors", "that_matter"]
 
 _MATTERS = 20.0  # nats below the best: what is there holds some billionths
-_FAR = 5.0  # nats of mass below the largest, from which on draws show little of an optimum
-_AHEAD = 3.0  # nats of mass above that one's, where errors are integrated out
-_WITHIN_REACH = 100.0  # nats below it, of what is as yet not refined
-_MOST = 2  # optima that are compared with it, the best first
+_AHEAD = 10.0  # nats of mass, where errors are integrated out: along a sheet it differs by as many
+_WITHIN_REACH = 100.0  # nats below the best there, of what is as yet not refined
+_MOST = 2  # optima of either kind that are compared, the best first
 
 
 def added(optima: Sequence[Optimum], found: Optimum | None) -> list[Optimum]:
@@ -52,17 +51,22 @@ def depend_on_errors(job: Job, density: CollapsedDensity, optima: Sequence[Optim
     bool
         False where errors are integrated out already, or cannot be.
     """
-    best = max(optima, key=lambda one: one.log_mass)
-    far = [one for one in optima if one.log_mass < best.log_mass - _FAR]
+    best = max(one.log_mass for one in optima)
+    near = [one for one in optima if one.log_mass >= best - _MATTERS]
+    far = [one for one in optima if one.log_mass < best - _MATTERS]
     if not (far and job.can_integrate_error):
         return False
     erring = with_discrepancy(density, job.scene.model_error.flux)
-    values = erring(np.array([one.z for one in (best, *far)]))
-    within = zip(far, values[1:] > values[0] - _WITHIN_REACH, strict=True)
-    promising = [one for one, reached in within if reached][:_MOST]
-    if not promising:
+    here, there = (erring(np.array([one.z for one in some])) for some in (near, far))
+    within = there > here.max() - _WITHIN_REACH
+    if not within.any():
         return False
-    first = refine(erring, best.z)
-    rivals = [refine(erring, one.z) for one in promising]
-    least = -np.inf if first is None else first.log_mass + _AHEAD
-    return any(rival is not None and rival.log_mass > least for rival in rivals)
+    near = sorted(near, key=lambda one: -one.log_mass)
+    far = [one for one, reached in zip(far, within, strict=True) if reached]
+    return _mass(erring, far[:_MOST]) > _mass(erring, near[:_MOST]) + _AHEAD
+
+
+def _mass(density: CollapsedDensity, optima: Sequence[Optimum]) -> float:
+    """Return the largest log mass that climbs from some optima come to."""
+    refined = [refine(density, one.z) for one in optima]
+    return max((one.log_mass for one in refined if one is not None), default=-np.inf)
