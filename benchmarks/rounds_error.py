@@ -6,7 +6,8 @@ Data sets of paths before crosstalk and a background (`python -m benchmarks.cove
 --light both`). Rounds begin at the same small populations with every seed. A run's means are held
 to those of all other runs of its set, weighted by their effective sizes: `off` is the root mean
 square over runs and unknowns in units of `sd sqrt(1 / ess + 1 / ess of the others)`, 1 where an
-effective size says how far a mean is off; `sd` that of the logarithm of the standard deviation.
+effective size says how far a mean is off; `farthest` the largest of them over the root of the run's
+own size, about so many standard deviations; `sd` that of the logarithm of the standard deviation.
 """
 
 import argparse
@@ -89,7 +90,7 @@ def main() -> None:
             for each in errors_of(runs_of(path, number, given.seeds)):
                 edge = int(np.searchsorted(EDGES, each[0]))
                 by_class[EDGES[edge - 1], EDGES[edge], each[1] >= 400].append(each)
-    print("| k-hat | effective size | runs | off | worst mean [sd] | sd |")
+    print("| k-hat | effective size | runs | off | farthest [sd] | sd |")
     print("|---|---|---|---|---|---|")
     for (low, high, enough), rows in sorted(by_class.items()):
         off = np.concatenate([row[2] for row in rows])

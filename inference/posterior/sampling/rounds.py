@@ -143,8 +143,9 @@ def in_rounds(
         count = int(max(_SPARE * target_ess / max(share, 1e-9), _LEAST))
         if over or (settled and count <= _MOST):
             room = _MOST if over else min(max(most - calls, _LEAST), _MOST)
-            more = _that_count(pool, shares, (min(count, room), room), target_ess, density, rng)
-            draws, calls = _weighed(more, shares), calls + len(more.z)
+            counts = min(count, room), room
+            more, draws = _that_count(pool, shares, counts, target_ess, density, rng)
+            calls += len(more.z)
             excess = pool.target[: ends[-1]] - mixed(pool.each[:, : ends[-1]], shares)
             heaviest = _heaviest(more.target - mixed(more.each, shares), tail)
             dissent = _worst(excess > heaviest, ends)
@@ -176,7 +177,7 @@ def _that_count(
     target_ess: int,
     density: CollapsedDensity,
     rng: np.random.Generator,
-) -> Pool:
+) -> tuple[Pool, WeightedDraws]:
     """Draw from the laws of a pool, which change no more, until enough draws count.
 
     Parameters
@@ -187,17 +188,13 @@ def _that_count(
     first, most = counts
     drawn = drawn_by(pool, shares, first, density, rng)
     while True:
-        draws, n = _weighed(drawn, shares), len(drawn.z)
+        n, log_mixture = len(drawn.z), mixed(drawn.each, shares)
+        draws = weighted_by(drawn.z, drawn.target, log_mixture, smooth=True)
         enough = int(n * min(_SPARE * target_ess / draws.ess, 2.0))
         hopeless = draws.k_hat >= MAX_SMOOTHED_K_HAT or enough > most
         if hopeless or draws.ess >= target_ess:
-            return drawn
+            return drawn, draws
         drawn = joined(drawn, drawn_by(pool, shares, enough - n, density, rng))
-
-
-def _weighed(pool: Pool, shares: Array) -> WeightedDraws:
-    """Return a pool's draws by the mixture of its laws in these shares, their tail smoothed."""
-    return weighted_by(pool.z, pool.target, mixed(pool.each, shares), smooth=True)
 
 
 def _fitted(proposal: Proposal, sample: Array, density: CollapsedDensity) -> Proposal:

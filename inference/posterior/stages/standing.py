@@ -11,7 +11,11 @@ import dataclasses
 import numpy as np
 import scipy
 
-from inference.posterior.sampling.importance import WeightedDraws, smoothed
+from inference.posterior.sampling.importance import (
+    MAX_SMOOTHED_K_HAT,
+    WeightedDraws,
+    smoothed,
+)
 from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.stages.stage import Drawing, Tempering, Walking, Weighted
@@ -19,7 +23,6 @@ from inference.posterior.stages.stage import Drawing, Tempering, Walking, Weight
 __all__ = ["best_known", "standing"]
 
 
-_MOST_K_HAT = 0.7  # above it, not even the smoothed weights have a mean (Vehtari et al. 2024)
 _LEAST_ESS = 50.0  # below it, quantiles of 5 and 95 % are those of two or three draws
 _LEAST_STEPS = 4  # of ensembles, from which on they speak for themselves
 
@@ -66,7 +69,7 @@ def best_known(stage: Tempering | Walking) -> tuple[WeightedDraws, str] | None:
 
 
 def _trusted(draws: WeightedDraws) -> bool:
-    return draws.k_hat <= _MOST_K_HAT and draws.ess >= _LEAST_ESS
+    return draws.k_hat <= MAX_SMOOTHED_K_HAT and draws.ess >= _LEAST_ESS
 
 
 def _of_populations(populations: tuple[Population | None, ...]) -> WeightedDraws | None:
