@@ -1,9 +1,9 @@
 """Linear algebra of many small steps, by one thread.
 
-A fit solves thousands of systems of some hundred rows. OpenBLAS, which numpy and scipy bring along,
-parts each among all processors and lets the threads spin until the last is done: where another
-program keeps a processor busy, every system waits for its turn there, and processor time is burnt
-meanwhile.
+A fit or a posterior solves thousands of systems of some hundred rows. OpenBLAS, which numpy and
+scipy bring along, parts each among all processors and lets the threads spin until the last is done:
+where another program keeps a processor busy, every system waits for its turn there, and processor
+time is burnt meanwhile.
 """
 
 import contextlib

@@ -47,6 +47,7 @@ from inference.posterior.stages.tempering import SetOutTask, TemperTask
 from inference.posterior.stages.walking import WalkTask
 from inference.posterior.summary import draw, summarise
 from simulator.compiled import at_once
+from simulator.one_thread import one_thread
 
 __all__ = [
     "FORMAT",
@@ -111,6 +112,7 @@ def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float = 0.0) -> tuple[Task, .
             return ()
 
 
+@one_thread()
 def run(task: Task) -> Piece:
     """Run one part of a chunk.
 
@@ -135,6 +137,7 @@ def run(task: Task) -> Piece:
         return task.run()
 
 
+@one_thread()
 def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoint:
     """Take in the parts of a chunk, in the order of `tasks`, and judge the draws so far."""
     calls = checkpoint.calls

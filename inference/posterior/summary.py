@@ -60,6 +60,7 @@ from inference.posterior.stages.standing import standing
 from inference.posterior.stages.starting import begin
 from inference.posterior.streams import Stream
 from inference.posterior.undrawn import without_draws
+from simulator.one_thread import one_thread
 
 __all__ = ["draw", "summarise"]
 
@@ -150,6 +151,7 @@ def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
     return _Drawn(job, density, every, parts, own, stage, calls, sample, draws, whole, bias, rng)
 
 
+@one_thread()
 def draw(job: Job, checkpoint: Checkpoint) -> tuple[Job, Draws]:
     """Return the draws behind the answer of a job, the same as `summarise` makes it from.
 
@@ -188,6 +190,7 @@ def _unfinished(density: CollapsedDensity, z: Array, rng: np.random.Generator) -
     )
 
 
+@one_thread()
 def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> Posterior:
     """Make the answer of a job, finished or not.
 
@@ -234,7 +237,6 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
 def _ranges(drawn: _Drawn, whole: Whole) -> RangeSummary:
     """Summarise the ranges of all frames, part by part."""
     sample, found = drawn.sample, []
-    ess = None if sample.weighted is None else sample.weighted.ess
     for k, part in enumerate(drawn.parts):
         own = drawn.own
         if k > 0:
@@ -243,7 +245,7 @@ def _ranges(drawn: _Drawn, whole: Whole) -> RangeSummary:
             whole = with_model_error(part, own, sample, draws, drawn.density, drawn.bias)
         folds = near_fold(part, own, whole.chosen, whole.log_r)
         shares = _of_all_frames(part, whole.budget.of_log_r)
-        found.append(range_summary(whole.draws, folds, ess, shares))
+        found.append(range_summary(whole.draws, folds, sample.resampled, shares))
     if len(found) == 1:
         return found[0]
     numbers = [part.of_sent(np.arange(len(part.frames))) for part in drawn.parts]

@@ -4,13 +4,24 @@ A fit of 60 frames with odometry took 23 to 27 s of processor time by two thread
 processes on two processors, and takes 0.9 s by one.
 """
 
+import operator
 import threading
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
-from hybridtof import RadialTrajectory, estimate, parse_scene, parse_sensor, simulate
+import inference.posterior.fold
+import inference.posterior.summary
+from hybridtof import (
+    RadialTrajectory,
+    SamplerSettings,
+    estimate,
+    infer,
+    parse_scene,
+    parse_sensor,
+    simulate,
+)
 from inference.realtime.net import rule_out
 from simulator import one_thread as threads
 
@@ -73,4 +84,31 @@ def test_the_last_one_out_restores() -> None:
 def test_an_error_restores() -> None:
     with pytest.raises(ZeroDivisionError), threads.one_thread():
         raise ZeroDivisionError(numbers())
+    assert numbers() == [2, 2]
+
+
+@pytest.mark.usefixtures("two")
+def test_a_posterior_computes_by_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    within: dict[str, list[int]] = {}
+
+    def watched(place: str) -> None:
+        function = operator.attrgetter(place)(inference.posterior)
+
+        def watching(*args: Any, **named: Any) -> Any:
+            within[place] = numbers()
+            return function(*args, **named)
+
+        monkeypatch.setattr(f"inference.posterior.{place}", watching)
+
+    for place in ("fold.import_libraries", "fold._after", "summary.predictive_check"):
+        watched(place)
+    sensor = parse_sensor(
+        {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1e-5, 1e-3]}}
+    )
+    truth = parse_scene({"object": {"c0": 0.08, "c1": 0.05, "c2": 0.1}})
+    path = RadialTrajectory(kind="radial", from_m=0.3, to_m=1.5, frames=12, spacing="log")
+    frames = simulate(sensor, truth, path, seed=2).frames
+    settings = SamplerSettings(method="auto", seed=1)
+    assert infer(sensor, parse_scene({}), frames, settings).verdict.converged
+    assert list(within.values()) == [[1, 1]] * 3
     assert numbers() == [2, 2]
