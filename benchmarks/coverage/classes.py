@@ -208,6 +208,6 @@ def told(data: DataSet, term: str) -> dict[str, Any]:
 def class_row(group: SceneClass, term: str, number: int, version: str = "") -> Row:
     """Draw a data set and hold its posterior's intervals to the truth."""
     data = draw(group, number)
-    settings = SamplerSettings(ensembles=2, seed=number, target_ess=200)
+    settings = SamplerSettings(method="auto", seed=number)
     scene = told(data, term)
     return interval_row(data.name, data.sensor, scene, data.frames, data.range_m, settings, version)

@@ -70,7 +70,7 @@ def recorded_row(term: str, number: int, version: str = "") -> Row:
     """Infer the ranges of a cell; intervals are those of the frames with an object."""
     cell = CELLS[number]
     sensor, scene, frames, truth = recorded_frames(cell, number)
-    settings = SamplerSettings(ensembles=2, seed=number, target_ess=200)
+    settings = SamplerSettings(method="auto", seed=number)
     told = {**scene, **TERMS[term]}
     return interval_row(cell.name, sensor, told, frames, truth, settings, version)
 

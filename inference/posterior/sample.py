@@ -40,6 +40,8 @@ class Sample:
         With emcee, after its first chunk: the same draws.
     weighted : WeightedDraws or None
         With importance sampling: the draws before they were resampled.
+    resampled : ndarray, shape (1, 1, steps), or None
+        With importance sampling: the weight that each draw had before.
     """
 
     z: Array
@@ -49,6 +51,7 @@ class Sample:
     mode: NDArray[np.intp]
     chains: Chains | None
     weighted: WeightedDraws | None
+    resampled: Array | None = None
 
     @property
     def drawn(self) -> bool:
@@ -76,7 +79,8 @@ def sample_of(density: CollapsedDensity, stage: Drawing, rng: np.random.Generato
             weighted = stage.draws
             keep = rng.choice(len(weighted.z), size=len(weighted.z), p=weighted.weights)
             z, log_density = weighted.z[keep], weighted.log_density[keep]
-            return _lined_up(z, log_density, stage.optima, weighted)
+            lined_up = _lined_up(z, log_density, stage.optima, weighted)
+            return dataclasses.replace(lined_up, resampled=weighted.weights[None, None, keep])
         case Settled():
             z, optima = np.empty((_SETTLED_DRAWS, 0)), None
         case _:  # stopped before the first chunk: starting points are no draws

@@ -15,6 +15,7 @@ from inference.posterior.sampling.diagnostics import (
     split_r_hat,
     tail_effective_sample_size,
 )
+from inference.posterior.sampling.importance import weighted_sizes
 
 __all__ = ["summaries_of_chains", "summaries_of_weights"]
 
@@ -98,9 +99,8 @@ def summaries_of_weights(
     Returns
     -------
     dict of str to ParameterSummary
-        R-hat is None; effective sample sizes are importance sample sizes.
+        R-hat is None; effective sample sizes are those of weighted draws.
     """
-    ess = float(1 / np.sum(weights**2))
     # draws that carry next to nothing are no modes
     heavy = weights > 1e-3 * weights.max(initial=0.0)
     result = {}
@@ -126,8 +126,7 @@ def summaries_of_weights(
             q05,
             q50,
             q95,
-            ess,
-            ess,
+            *weighted_sizes(column, weights),
             None,
             math.nan if several else error,
             tuple(modes),

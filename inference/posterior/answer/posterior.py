@@ -60,7 +60,8 @@ class ParameterSummary:
     q05, q50, q95 : float
         Quantiles of its draws, whatever their modes.
     ess_bulk, ess_tail : float
-        Effective sample sizes; importance sample sizes with importance sampling.
+        Effective sample sizes of the mean, and the lesser one of the shares below the quantiles of
+        5 and 95 %; with importance sampling by the weights of the draws.
     rhat : float or None
         None with importance sampling.
     mcse_mean : float

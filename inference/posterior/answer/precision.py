@@ -13,33 +13,37 @@ __all__ = ["mean_error", "quantile_error"]
 Array = NDArray[np.float64]
 
 
-def _effective(draws: Array, importance_ess: float | None) -> float:
+def _effective(draws: Array, weights: Array | None) -> float:
     """Return the number of independent draws that a mean of these is as good as."""
-    if importance_ess is not None:
-        # resampled by weight, with the error of the weights and that of resampling
-        return 1.0 / (1.0 / importance_ess + 1.0 / draws.size)
-    return effective_sample_size(draws)
+    if weights is None:
+        return effective_sample_size(draws)
+    squares = np.square(draws - draws.mean())
+    # resampled by weight: the error of the weights (a sum of squared ones, of which one is the
+    # share of the draw here) and that of resampling
+    error = float(np.mean(weights * squares)) + float(squares.mean()) / draws.size
+    return float(squares.mean()) / error if error > 0 else math.nan
 
 
-def mean_error(draws: Array, importance_ess: float | None) -> float:
+def mean_error(draws: Array, weights: Array | None) -> float:
     """Return the standard error of the mean of draws.
 
     Parameters
     ----------
     draws : ndarray, shape (ensembles, walkers, steps)
         Draws of one quantity.
-    importance_ess : float or None
-        Importance sample size of the draws that these were resampled from; None for walkers.
+    weights : ndarray, shape (ensembles, walkers, steps), or None
+        Of the draws that these were resampled from by weight, which sum to one before; None for
+        walkers.
 
     Returns
     -------
     float
         nan where the draws do not differ.
     """
-    return float(draws.std()) / math.sqrt(_effective(draws, importance_ess))
+    return float(draws.std()) / math.sqrt(_effective(draws, weights))
 
 
-def quantile_error(draws: Array, at: float, importance_ess: float | None) -> float:
+def quantile_error(draws: Array, at: float, weights: Array | None) -> float:
     """Return the standard error of a quantile of draws (Vehtari et al. 2021).
 
     The share of draws below the quantile is known like that of so many independent draws: its law
@@ -52,7 +56,7 @@ def quantile_error(draws: Array, at: float, importance_ess: float | None) -> flo
         Draws of one quantity.
     at : float
         Probability of the quantile.
-    importance_ess : float or None
+    weights : ndarray or None
         As for `mean_error`.
 
     Returns
@@ -61,7 +65,7 @@ def quantile_error(draws: Array, at: float, importance_ess: float | None) -> flo
         nan where the draws do not differ.
     """
     below = (draws <= np.quantile(draws, at)).astype(float)
-    n = _effective(below, importance_ess)
+    n = _effective(below, weights)
     if not math.isfinite(n):
         return math.nan
     one_sd = float(scipy.special.ndtr(1.0))

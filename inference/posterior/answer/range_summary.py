@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 def range_summary(
     draws: Draws,
     near_fold: NDArray[np.bool_],
-    importance_ess: float | None,
+    resampled: Array | None,
     shares: ErrorParts,
 ) -> RangeSummary:
     """Summarise the ranges of all frames of a job.
@@ -33,26 +33,28 @@ def range_summary(
         Draws of the ranges.
     near_fold : ndarray of bool, shape (frames,)
         Frames near a fold.
-    importance_ess : float or None
-        With importance sampling: its effective sample size.
+    resampled : ndarray, shape (1, 1, steps), or None
+        With importance sampling: weights of the draws that those of the parameters were resampled
+        from.
     shares : ErrorParts of ndarray, shape (frames,)
         Of the standard deviations.
     """
     n = draws.range_m.shape[-1]
     columns = {name: np.full(n, np.nan) for name in RANGE_COLUMNS}
     modes: list[tuple[RangeMode, ...]] = [()] * n
+    weights = None if resampled is None else resampled[..., draws.thinned]
     for frame in np.flatnonzero(np.isfinite(draws.range_m[0, 0, 0])):
         r = draws.range_m[..., frame]
         cuts = boundaries(np.log(r).ravel())
-        modes[frame] = _modes(r, labels(np.log(r), cuts), cuts.size + 1, importance_ess)
+        modes[frame] = _modes(r, labels(np.log(r), cuts), cuts.size + 1, weights)
         q = quantiles(r, several_modes=cuts.size > 0)
         for at, value in zip(QUANTILES, q, strict=True):
             name = f"q{100 * at:02.0f}"
             columns[name][frame] = value
-            columns[f"mcse_{name}"][frame] = quantile_error(r, at, importance_ess)
+            columns[f"mcse_{name}"][frame] = quantile_error(r, at, weights)
         if cuts.size == 0:
             columns["mean"][frame], columns["sd"][frame] = r.mean(), r.std(ddof=1)
-            columns["mcse_mean"][frame] = mean_error(r, importance_ess)
+            columns["mcse_mean"][frame] = mean_error(r, weights)
     parts = of_sd(shares, columns["sd"])
     return RangeSummary(**columns, sd_parts=parts, near_fold=near_fold, modes=tuple(modes))
 
@@ -86,16 +88,13 @@ def joined(
 
 
 def _modes(
-    r: Array, label: NDArray[np.intp], count: int, importance_ess: float | None
+    r: Array, label: NDArray[np.intp], count: int, weights: Array | None
 ) -> tuple[RangeMode, ...]:
     result = []
     for k in range(count):
         inside = label == k
         weight = float(inside.mean())
-        if importance_ess is None:
-            error = share_error(inside)
-        else:
-            error = resampled_share_error(weight, r.size, importance_ess)
+        error = share_error(inside) if weights is None else resampled_share_error(inside, weights)
         q05, q50, q95 = quantiles(r[inside], several_modes=False)
         sd = float(r[inside].std(ddof=1)) if inside.sum() > 1 else 0.0
         result.append(RangeMode(q50, weight, error, sd, q05, q95))

@@ -72,16 +72,20 @@ def weighted_share_error(inside: Mask, weights: Array) -> float:
     return float(np.sqrt(np.sum((weights * (inside - share)) ** 2)))
 
 
-def resampled_share_error(share: float, count: int, ess: float) -> float:
+def resampled_share_error(inside: Mask, weights: Array) -> float:
     """Return the standard error of a share of draws that were resampled by weight.
 
     Parameters
     ----------
-    share : float
-        The share.
-    count : int
-        Number of draws.
-    ess : float
-        Importance sample size of the draws that they were resampled from.
+    inside : ndarray of bool
+        Whether each draw counts.
+    weights : ndarray, same shape
+        Of the draws that these were resampled from, which sum to one before.
+
+    Returns
+    -------
+    float
+        From the error of the weights and that of resampling.
     """
-    return math.sqrt(share * (1.0 - share) * (1.0 / count + 1.0 / ess))
+    squares = np.square(inside - inside.mean())
+    return math.sqrt(float(np.mean(squares * (weights + 1.0 / inside.size))))

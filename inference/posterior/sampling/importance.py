@@ -20,12 +20,15 @@ __all__ = [
     "pareto_k_hat",
     "smoothed",
     "weighted_by",
+    "weighted_sizes",
 ]
 
 Array = NDArray[np.float64]
 
 MAX_K_HAT = 0.5  # of weights as they are: beyond it they have no variance
 MAX_SMOOTHED_K_HAT = 0.7  # of those whose tail is smoothed (Vehtari et al. 2024)
+_TAILS = (0.05, 0.95)  # of mass, where the quantiles of an interval are
+_OF_A_MEAN = 0.5  # of a target, that the effective size of every mean has to reach
 _LEAST_EXCESS = 5  # weights above the cut that a shape is fitted to
 _NOTHING = 1e-300  # of the largest weight: what is less counts for none
 _EQUAL = 1e-9  # of the largest weight, by which equal ones differ through rounding
@@ -69,8 +72,19 @@ class WeightedDraws:
 
     @property
     def ess(self) -> float:
-        """Importance sample size."""
+        """Importance sample size: of a quantity that knows nothing of the weights."""
         return float(1.0 / np.sum(self.weights**2))
+
+    @property
+    def worth(self) -> float:
+        """What a target is held to: the importance sample size, and half of it by every mean.
+
+        Weights are heaviest where a proposal holds too little, mostly in a tail: means of unknowns
+        that reach there rest on fewer draws. Of weights with a long tail the last of these come
+        slowly, and what is stated of an unknown is its own size.
+        """
+        sizes = [weighted_sizes(column, self.weights)[0] for column in self.z.T]
+        return min(self.ess, min(sizes, default=math.inf) / _OF_A_MEAN)
 
     @property
     def that_count(self) -> "WeightedDraws":
@@ -78,6 +92,40 @@ class WeightedDraws:
         some = self.weights > 0
         z, log_density = self.z[some], self.log_density[some]
         return dataclasses.replace(self, z=z, log_density=log_density, weights=self.weights[some])
+
+
+def weighted_sizes(x: Array, weights: Array) -> tuple[float, float]:
+    """Return effective sample sizes of weighted draws of one quantity.
+
+    Parameters
+    ----------
+    x, weights : ndarray, shape (n,)
+        Draws, and their weights, which sum to one.
+
+    Returns
+    -------
+    (float, float)
+        Of the mean, and the lesser one of the shares below the quantiles of 5 and 95 %: the
+        variance of a quantity over that of its self-normalised estimate (Owen 2013, 9.2). The
+        importance sample size where the draws do not differ.
+    """
+    # draws of no weight lie far out, where squares overflow
+    some = weights > 0
+    order = np.argsort(x[some])
+    x, w = x[some][order], weights[some][order]
+    square, below = w**2, np.cumsum(w)
+    alone = 1.0 / float(square.sum())
+    centred = x - w @ x
+    centred /= np.abs(centred).max() or 1.0
+    error = float(square @ centred**2)
+    bulk = float(w @ centred**2) / error if error > 0 else alone
+    sizes = [bulk]
+    for cut in np.minimum(np.searchsorted(below, _TAILS), x.size - 1):
+        share = min(float(below[cut]), 1.0)
+        inside = np.arange(x.size) <= cut
+        error = float(square @ (inside - share) ** 2)
+        sizes.append(share * (1.0 - share) / error if error > 0 else alone)
+    return bulk, min(sizes[1:])
 
 
 def generalised_pareto(excess: Array) -> tuple[float, float]:

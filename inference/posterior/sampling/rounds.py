@@ -48,7 +48,7 @@ _FEWEST, _LAWS = 6, 3  # rounds, and laws of each
 _NEIGHBOURS = 10  # for every unknown, that such a law is fitted to; or
 _NEAR = 0.05  # of all draws
 _LEAST = 2000  # draws that count: the shape of their weights' tail is known to 0.13
-_MOST = 12_000  # of them
+_MOST = 20_000  # of them
 _TAIL = 0.01  # of the draws' mass, in the heaviest of them: there may be
 _MOST_DISSENT = 0.03  # so many of a population's members
 _SPARE = 1.3  # times the draws that are foreseen
@@ -113,7 +113,7 @@ def in_rounds(
     target_ess : int
         Effective sample size wanted.
     most : int
-        Draws that may be spent, but for those that count: 2000 to 12,000 are made in any case.
+        Draws that may be spent, but for those that count: 2000 to 20,000 are made in any case.
     tolerated : float
         Share of a population's members beyond the weights of the heaviest draws, below which draws
         stand.
@@ -150,7 +150,7 @@ def in_rounds(
             heaviest = _heaviest(more.target - mixed(more.each, shares), tail)
             dissent = _worst(excess > heaviest, ends)
             found = Rounds(proposal, draws.that_count, dissent, calls, tolerated)
-            if over or (found.trusted and found.draws.ess >= target_ess):
+            if over or (found.trusted and found.draws.worth >= target_ess):
                 if not found.trusted:
                     return found
                 last = completed(proposal, pool.laws, found.draws)
@@ -190,9 +190,9 @@ def _that_count(
     while True:
         n, log_mixture = len(drawn.z), mixed(drawn.each, shares)
         draws = weighted_by(drawn.z, drawn.target, log_mixture, smooth=True)
-        enough = int(n * min(_SPARE * target_ess / draws.ess, 2.0))
+        enough = int(n * min(_SPARE * target_ess / draws.worth, 2.0))
         hopeless = draws.k_hat >= MAX_SMOOTHED_K_HAT or enough > most
-        if hopeless or draws.ess >= target_ess:
+        if hopeless or draws.worth >= target_ess:
             return drawn, draws
         drawn = joined(drawn, drawn_by(pool, shares, enough - n, density, rng))
 

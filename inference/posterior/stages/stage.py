@@ -197,7 +197,7 @@ class Walking:
             target = max(math.ceil(wanted), self.steps + 1)
         ess = self.ess
         if ess is None and self.steps == 0 and self.weighted is not None:
-            ess = self.weighted.ess  # what an answer would be made of now
+            ess = self.weighted.worth  # what an answer would be made of now
         return Progress("sampling", self.steps, target, ess, self.r_hat, False)
 
 
@@ -222,7 +222,7 @@ class Weighted:
     def progress(self, _: int) -> Progress:
         """Tell how far this is."""
         count = len(self.draws.z)
-        return Progress("summarising", count, count, self.draws.ess, None, True)
+        return Progress("summarising", count, count, self.draws.worth, None, True)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -44,7 +44,7 @@ def standing(stage: Drawing) -> Drawing:
     if found is None:
         return stage
     draws, what = found
-    said = f"{what}: effective sample size {draws.ess:.0f}, Pareto k-hat {draws.k_hat:.2f}"
+    said = f"{what}: effective sample size {draws.worth:.0f}, Pareto k-hat {draws.k_hat:.2f}"
     if not _trusted(draws):
         reasons = (*stage.verdict.reasons, f"there are {said}: too few, or not to be trusted")
         return dataclasses.replace(stage, verdict=Verdict(False, reasons))
@@ -65,11 +65,11 @@ def best_known(stage: Tempering | Walking) -> tuple[WeightedDraws, str] | None:
         members = _of_populations(stage.populations)
         found.append((members, "weighted members of populations on their way"))
     drawn = [(draws, what) for draws, what in found if draws is not None]
-    return max(drawn, key=lambda each: (_trusted(each[0]), each[0].ess), default=None)
+    return max(drawn, key=lambda each: (_trusted(each[0]), each[0].worth), default=None)
 
 
 def _trusted(draws: WeightedDraws) -> bool:
-    return draws.k_hat <= MAX_SMOOTHED_K_HAT and draws.ess >= _LEAST_ESS
+    return draws.k_hat <= MAX_SMOOTHED_K_HAT and draws.worth >= _LEAST_ESS
 
 
 def _of_populations(populations: tuple[Population | None, ...]) -> WeightedDraws | None:

@@ -210,7 +210,7 @@ def _has_too_many(density: CollapsedDensity) -> bool:
 
 
 def _enough(weighted: WeightedDraws, job: Job) -> bool:
-    return weighted.k_hat < MAX_K_HAT and weighted.ess >= job.settings.target_ess
+    return weighted.k_hat < MAX_K_HAT and weighted.worth >= job.settings.target_ess
 
 
 def _importance(density: CollapsedDensity, proposal: Proposal, job: Job) -> tuple[Weighted, int]:
@@ -229,7 +229,7 @@ def _importance(density: CollapsedDensity, proposal: Proposal, job: Job) -> tupl
             f"above {MAX_K_HAT}; use the method emcee"
         )
     enough = _enough(weighted, job)
-    reason = f"the effective sample size is {weighted.ess:.0f}, below the target"
+    reason = f"the effective sample size is {weighted.worth:.0f}, below the target"
     verdict = Verdict(enough, () if enough else (reason,))
     return Weighted(proposal.optima, weighted, verdict), calls
 
@@ -243,8 +243,8 @@ def _weighted_draws(
     count = min(max(_IMPORTANCE_DRAWS, 2 * target), most)
     weighted = draw_weighted(density, proposal, job.stream(Stream.IMPORTANCE), count)
     used = count
-    if weighted.k_hat < MAX_K_HAT and weighted.ess < target:
-        count = min(int(1.5 * count * target / max(weighted.ess, 1.0)), most)
+    if weighted.k_hat < MAX_K_HAT and weighted.worth < target:
+        count = min(int(1.5 * count * target / max(weighted.worth, 1.0)), most)
         weighted = draw_weighted(density, proposal, job.stream(Stream.IMPORTANCE), count)
         used += count
     return weighted, used

@@ -153,14 +153,14 @@ def _set_out(job: Job, stage: Tempering) -> tuple[Tempering | Weighted | Walking
     """Sample by importance from the populations that arrived; set up ensembles where it fails."""
     members = [each for each in stage.populations if each is not None and len(each.z)]
     found, auto = _in_rounds(job, stage, members), job.settings.method == "auto"
-    if auto and found.trusted and found.draws.ess >= job.settings.target_ess:
+    if auto and found.trusted and found.draws.worth >= job.settings.target_ess:
         return Weighted(found.proposal.optima, found.draws, Verdict(True, ())), found.calls
     if not stage.early:
         walking = _walking(job, stage, members, found)
     elif _may_try_again(stage, found) and (auto or not found.trusted):
         # in a chunk of its own: a job may be out of time by now
         return dataclasses.replace(stage, weighted=found.draws, tried=True), found.calls
-    elif found.trusted:
+    elif found.trusted and not auto:
         density, others = job.density(), members[0].z
         ensembles = from_weighted(job, density, found.proposal, found.draws, others)
         walking = Walking(found.proposal, ensembles, stage.verdict, 2, weighted=found.draws)

@@ -74,9 +74,9 @@ def test_weighted_shares(resampled: bool) -> None:
         weights /= weights.sum()
         inside = x > 0
         if resampled:
-            inside = inside[rng.choice(500, size=200, p=weights)]
-            found = float(inside.mean())
-            error = resampled_share_error(found, 200, 1 / float(np.sum(weights**2)))
+            keep = rng.choice(500, size=200, p=weights)
+            inside = inside[keep]
+            found, error = float(inside.mean()), resampled_share_error(inside, weights[keep])
         else:
             found, error = float(weights[inside].sum()), weighted_share_error(inside, weights)
         off.append((found - 0.5) / error)
