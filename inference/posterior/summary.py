@@ -35,6 +35,7 @@ from inference.posterior.criticism.discrepancy_check import (
     with_model_part,
 )
 from inference.posterior.criticism.many_frames import bias_of_many_frames
+from inference.posterior.criticism.other_optima import Stated, mark_other_optima
 from inference.posterior.criticism.predictive_check import predictive_check
 from inference.posterior.criticism.prior_conflict import prior_conflicts
 from inference.posterior.criticism.prior_contradiction import contradicted
@@ -55,6 +56,7 @@ from inference.posterior.stages.stage import (
     Tempering,
     Walking,
     Weighted,
+    optima_of,
 )
 from inference.posterior.stages.standing import standing
 from inference.posterior.stages.starting import begin
@@ -81,8 +83,9 @@ def _parameters(
     return {}  # nothing is unknown
 
 
-def _judged(job: Job, density: CollapsedDensity, whole: Whole) -> tuple[Identifiability, ...]:
+def _judged(drawn: "_Drawn", whole: Whole) -> tuple[Identifiability, ...]:
     """Judge every unknown by its draws, and by what it owes to model and prior of the ranges."""
+    job, density = drawn.parts[0], drawn.own
     chosen, log_r, static = whole.chosen, whole.log_r, job.scene.motion == "static"
     rows = statuses_of_draws(
         job.sensor,
@@ -98,7 +101,14 @@ def _judged(job: Job, density: CollapsedDensity, whole: Whole) -> tuple[Identifi
     )
     rows = with_model_part(rows, whole.scale_error, whole.spread.scale, whole.budget.curvature)
     rows = mark_sensitive(density.parameters.names, rows, whole.sensitivity)
-    return mark_dark(density, rows, chosen, log_r)
+    rows = mark_dark(density, rows, chosen, log_r)
+    optima = optima_of(drawn.stage)
+    if optima is None or drawn.every is not None:  # draws are of other frames then
+        return rows
+    stated = Stated(
+        chosen, drawn.sample.log_density, log_r, whole.spread.parameters, whole.spread.scale
+    )
+    return mark_other_optima(density, rows, optima.centres, stated)
 
 
 def _of_all_frames(job: Job, shares: ErrorParts) -> ErrorParts:
@@ -283,7 +293,7 @@ def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
     if drawn.every is not None:
         reasons = (*reasons, *doubts(drawn.every, density, sample.flat))
     fit, larger = _checked(drawn, whole)
-    judged = _judged(job, drawn.own, whole)
+    judged = _judged(drawn, whole)
     if larger is not None:
         fit = judge_fit(fit, larger)
         if larger.bayes_factor > MISFIT and rates_of(drawn.own.frames) is not None:

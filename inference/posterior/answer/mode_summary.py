@@ -4,7 +4,7 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.answer.posterior import JointMode
 from inference.posterior.answer.shares import share_error, weighted_share_error
 from inference.posterior.sample import Sample
-from inference.posterior.stages.stage import Drawing, Settled, Weighted
+from inference.posterior.stages.stage import Drawing, optima_of
 
 __all__ = ["mode_summary"]
 
@@ -26,9 +26,9 @@ def mode_summary(
     tuple of JointMode
         In the order of the optima; none where nothing is unknown.
     """
-    if isinstance(stage, Settled):
+    optima = optima_of(stage)
+    if optima is None:
         return ()
-    optima = stage.optima if isinstance(stage, Weighted) else stage.proposal.optima
     natural = density.parameters.natural(optima.centres)
     heights = density(optima.centres)
     result = []

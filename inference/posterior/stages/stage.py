@@ -33,6 +33,7 @@ __all__ = [
     "Tempering",
     "Walking",
     "Weighted",
+    "optima_of",
 ]
 
 MOST_STEPS = 20_000
@@ -240,4 +241,13 @@ class Settled:
 
 
 Drawing = Tempering | Walking | Weighted | Settled
+
+
+def optima_of(stage: Drawing) -> Mixture | None:
+    """Return Laplace approximations at the optima; None where nothing is unknown."""
+    if isinstance(stage, Settled):
+        return None
+    return stage.optima if isinstance(stage, Weighted) else stage.proposal.optima
+
+
 Stage = Selecting | Starting | Drawing
