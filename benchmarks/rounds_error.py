@@ -4,10 +4,11 @@
 
 Data sets of paths before crosstalk and a background (`python -m benchmarks.coverage.path_study
 --light both`). Rounds begin at the same small populations with every seed. A run's means are held
-to those of all other runs of its set, weighted by their effective sizes: `off` is the root mean
-square over runs and unknowns in units of `sd sqrt(1 / ess + 1 / ess of the others)`, 1 where an
-effective size says how far a mean is off; `farthest` the largest of them over the root of the run's
-own size, about so many standard deviations; `sd` that of the logarithm of the standard deviation.
+to those of all other runs of its set, weighted by their effective sizes, which every unknown has of
+its own: `off` is the root mean square over runs and unknowns in units of `sd sqrt(1 / ess + 1 / ess
+of the others)`, 1 where an effective size says how far a mean is off; `by one size` the same with
+the importance sample size for all unknowns; `farthest` the largest error in standard deviations;
+`sd` the root mean square of the error of the logarithm of the standard deviation.
 """
 
 import argparse
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from benchmarks.coverage.paths import PATHS, draw_path
 from inference.posterior import fold
+from inference.posterior.sampling.importance import weighted_sizes
 from inference.posterior.sampling.rounds import in_rounds
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages.stage import Tempering, Walking, Weighted
@@ -26,6 +28,7 @@ from inference.posterior.stages.tempering import HALFWAY_DRAWS, TOLERATED
 from simulator.scene import parse_scene
 
 Array = NDArray[np.float64]
+_TARGET = 400
 EDGES = (-np.inf, 0.4, 0.5, 0.6, 0.7, np.inf)
 
 
@@ -33,8 +36,21 @@ class Run(NamedTuple):
     """Draws of one seed."""
 
     k_hat: float
-    ess: float
+    enough: bool
+    ess: float  # importance sample size
+    sizes: Array  # of every unknown's mean
     mean: Array
+    sd: Array
+
+
+class Errors(NamedTuple):
+    """How far the draws of one seed are off, by all others."""
+
+    k_hat: float
+    enough: bool
+    off: Array  # standard deviations
+    own: Array  # what is stated of each
+    one: Array  # what one size for all says
     sd: Array
 
 
@@ -54,27 +70,31 @@ def runs_of(path: str, number: int, seeds: int) -> list[Run]:
     for seed in range(seeds):
         rng = np.random.default_rng([number, seed])
         rounds = in_rounds(
-            density, stage.proposal, populations, rng, 400, HALFWAY_DRAWS, TOLERATED, 0.0
+            density, stage.proposal, populations, rng, _TARGET, HALFWAY_DRAWS, TOLERATED, 0.0
         )
         draws = rounds.draws
         mean = draws.weights @ draws.z
         sd = np.sqrt(draws.weights @ (draws.z - mean) ** 2)
-        found.append(Run(draws.k_hat, draws.ess, mean, sd))
+        sizes = [weighted_sizes(column, draws.weights)[0] for column in draws.z.T]
+        enough = draws.worth >= _TARGET
+        found.append(Run(draws.k_hat, enough, draws.ess, np.array(sizes), mean, sd))
     return found
 
 
-def errors_of(runs: list[Run]) -> list[tuple[float, float, Array, Array]]:
-    """Return k-hat, effective size and errors of means and deviations of runs of one set."""
+def errors_of(runs: list[Run]) -> list[Errors]:
+    """Return how far runs of one set are off."""
     found = []
     for k, run in enumerate(runs):
         others = [*runs[:k], *runs[k + 1 :]]
-        sizes = np.array([each.ess for each in others])
+        sizes = np.array([each.sizes for each in others])
         mean, sd = (
             np.average([getattr(each, name) for each in others], axis=0, weights=sizes)
             for name in ("mean", "sd")
         )
-        off = (run.mean - mean) / (sd * np.sqrt(1.0 / run.ess + 1.0 / sizes.sum()))
-        found.append((run.k_hat, run.ess, off, np.log(run.sd / sd)))
+        off = (run.mean - mean) / sd
+        own = off / np.sqrt(1.0 / run.sizes + 1.0 / sizes.sum(axis=0))
+        one = off / np.sqrt(1.0 / run.ess + 1.0 / sum(each.ess for each in others))
+        found.append(Errors(run.k_hat, run.enough, off, own, one, np.log(run.sd / sd)))
     return found
 
 
@@ -83,22 +103,23 @@ def main() -> None:
     parser.add_argument("--sets", type=int, default=2, help="of every class of paths")
     parser.add_argument("--seeds", type=int, default=8)
     given = parser.parse_args()
-    by_class: dict[tuple[Any, ...], list[tuple[float, float, Array, Array]]]
-    by_class = collections.defaultdict(list)
+    by_class: dict[tuple[Any, ...], list[Errors]] = collections.defaultdict(list)
     for path in PATHS:
         for number in range(given.sets):
             for each in errors_of(runs_of(path, number, given.seeds)):
-                edge = int(np.searchsorted(EDGES, each[0]))
-                by_class[EDGES[edge - 1], EDGES[edge], each[1] >= 400].append(each)
-    print("| k-hat | effective size | runs | off | farthest [sd] | sd |")
-    print("|---|---|---|---|---|---|")
+                edge = int(np.searchsorted(EDGES, each.k_hat))
+                by_class[EDGES[edge - 1], EDGES[edge], each.enough].append(each)
+    print("| k-hat | enough | runs | off | by one size | farthest [sd] | sd |")
+    print("|---|---|---|---|---|---|---|")
     for (low, high, enough), rows in sorted(by_class.items()):
-        off = np.concatenate([row[2] for row in rows])
-        worst = max(float(np.abs(row[2]).max() / np.sqrt(row[1])) for row in rows)
-        sd = np.concatenate([row[3] for row in rows])
+        off, own, one, sd = (
+            np.concatenate([getattr(row, name) for row in rows])
+            for name in ("off", "own", "one", "sd")
+        )
+        own_rms, one_rms, sd_rms = (np.sqrt(np.mean(each**2)) for each in (own, one, sd))
         print(
-            f"| {low:g} to {high:g} | {'400 and more' if enough else 'below 400'} | {len(rows)} "
-            f"| {np.sqrt(np.mean(off**2)):.2f} | {worst:.2f} | {np.sqrt(np.mean(sd**2)):.3f} |"
+            f"| {low:g} to {high:g} | {'yes' if enough else 'no'} | {len(rows)} | {own_rms:.2f} "
+            f"| {one_rms:.2f} | {np.abs(off).max():.2f} | {sd_rms:.3f} |"
         )
 
 
