@@ -119,13 +119,13 @@ def weighted_sizes(x: Array, weights: Array) -> tuple[float, float]:
     centred /= np.abs(centred).max() or 1.0
     error = float(square @ centred**2)
     bulk = float(w @ centred**2) / error if error > 0 else alone
-    sizes = [bulk]
+    tails = []
     for cut in np.minimum(np.searchsorted(below, _TAILS), x.size - 1):
         share = min(float(below[cut]), 1.0)
         inside = np.arange(x.size) <= cut
         error = float(square @ (inside - share) ** 2)
-        sizes.append(share * (1.0 - share) / error if error > 0 else alone)
-    return bulk, min(sizes[1:])
+        tails.append(share * (1.0 - share) / error if error > 0 else alone)
+    return bulk, min(tails)
 
 
 def generalised_pareto(excess: Array) -> tuple[float, float]:
