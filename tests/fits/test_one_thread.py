@@ -1,4 +1,4 @@
-"""Fits and posteriors compute by one thread, and leave as many as before: what many cost on a busy machine.
+"""Fits and posteriors compute by one thread, and leave as many as before; what many cost.
 
 A fit of 60 frames with odometry took 23 to 27 s of processor time by two threads beside ten other
 processes on two processors, and takes 0.9 s by one.
