@@ -22,9 +22,10 @@ from benchmarks.coverage.paths import PATHS, draw_path
 from inference.posterior import fold
 from inference.posterior.sampling.importance import weighted_sizes
 from inference.posterior.sampling.rounds import in_rounds
+from inference.posterior.sampling.rounds_so_far import Wanted
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages.setting_out import HALFWAY_DRAWS, TOLERATED
 from inference.posterior.stages.stage import Tempering, Walking, Weighted
-from inference.posterior.stages.tempering import HALFWAY_DRAWS, TOLERATED
 from simulator.scene import parse_scene
 
 Array = NDArray[np.float64]
@@ -69,9 +70,8 @@ def runs_of(path: str, number: int, seeds: int) -> list[Run]:
     populations = tuple(each.z for each in stage.populations if each is not None)
     for seed in range(seeds):
         rng = np.random.default_rng([number, seed])
-        rounds = in_rounds(
-            density, stage.proposal, populations, rng, _TARGET, HALFWAY_DRAWS, TOLERATED, 0.0
-        )
+        wanted = Wanted(_TARGET, HALFWAY_DRAWS, TOLERATED, 0.0)
+        rounds = in_rounds(density, stage.proposal, populations, rng, wanted)
         draws = rounds.draws
         mean = draws.weights @ draws.z
         sd = np.sqrt(draws.weights @ (draws.z - mean) ** 2)

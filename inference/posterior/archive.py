@@ -14,9 +14,11 @@ from inference.density.representatives import Representatives
 from inference.posterior.sampling.ensemble import Ensemble
 from inference.posterior.sampling.flux_coordinate import FluxCoordinate
 from inference.posterior.sampling.importance import WeightedDraws
+from inference.posterior.sampling.pool import Pool
 from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.proposal import Local, Mixture, Proposal
 from inference.posterior.sampling.reparametrisation import Reparametrisation
+from inference.posterior.sampling.rounds_so_far import LastDraws, RoundsSoFar, Wanted
 from inference.posterior.sampling.start import Ends, Optimum
 from inference.posterior.sampling.transport import TriangularMap
 from inference.posterior.sampling.verdict import Verdict
@@ -131,10 +133,11 @@ _PARTS = {
         Ensemble,
         FluxCoordinate,
         Frames,
-        Settled,
+        LastDraws,
         Local,
         Mixture,
         Optimum,
+        Pool,
         Population,
         Proposal,
         Reported,
@@ -142,11 +145,14 @@ _PARTS = {
         Selection,
         Reparametrisation,
         Representatives,
+        RoundsSoFar,
+        Settled,
         Starting,
         Tempering,
         TriangularMap,
         Verdict,
         Walking,
+        Wanted,
         Weighted,
         WeightedDraws,
     )

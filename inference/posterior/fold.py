@@ -34,6 +34,7 @@ from inference.posterior.selection.models import Candidate
 from inference.posterior.stages import selecting, tempering, walking
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.selecting import AssessTask, sampled
+from inference.posterior.stages.setting_out import SetOutTask
 from inference.posterior.stages.stage import (
     Selecting,
     Settled,
@@ -43,7 +44,7 @@ from inference.posterior.stages.stage import (
     Weighted,
 )
 from inference.posterior.stages.starting import StartTask
-from inference.posterior.stages.tempering import SetOutTask, TemperTask
+from inference.posterior.stages.tempering import TemperTask
 from inference.posterior.stages.walking import WalkTask
 from inference.posterior.summary import draw, summarise
 from simulator.compiled import at_once

@@ -4,8 +4,9 @@ What one law leaves out another holds (Owen and Zhou 2000): a draw counts by the
 mixture, whichever law it came from.
 """
 
+import dataclasses
+import functools
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,11 @@ _KEPT = 0.5  # of the shares that laws were drawn in: a law guards what few draw
 _DESCENT = 30
 
 
-class Pool(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False)
+class Pool:
     """Draws of all rounds, and the law of them all.
+
+    More draws, and more laws, append to every array of it: a store is given what is new.
 
     Attributes
     ----------
@@ -36,7 +40,7 @@ class Pool(NamedTuple):
         What they were drawn from, the members apart.
     counts : tuple of int
         How many from each.
-    each : ndarray, shape (laws, n)
+    each : tuple of ndarray, shape (n,)
         Log density of every law.
     laplace : ndarray, shape (n,)
         Log density of the optima's mixture, which all maps have a part of.
@@ -46,13 +50,18 @@ class Pool(NamedTuple):
     target: Array
     laws: tuple[Law, ...]
     counts: tuple[int, ...]
-    each: Array
+    each: tuple[Array, ...]
     laplace: Array
 
-    @property
+    @functools.cached_property
+    def log_mixture(self) -> Array:
+        """Log density of the law of them all, shape (n,)."""
+        return mixed(self.each, self.counts)
+
+    @functools.cached_property
     def log_ratios(self) -> Array:
         """Log of the target over that law, shape (n,)."""
-        return np.asarray(self.target - mixed(self.each, self.counts))
+        return np.asarray(self.target - self.log_mixture)
 
 
 def with_laws(
@@ -76,10 +85,13 @@ def with_laws(
     z, laplace = np.concatenate([pool.z, new]), np.concatenate([pool.laplace, there])
     laws = pool.laws + laws
     old = [_log_density(law, new, there) for law in pool.laws]
-    each = np.concatenate([pool.each, np.reshape(old, (len(old), len(new)))], axis=1)
-    more = [_log_density(law, z, laplace) for law in laws[len(pool.laws) :]]
+    more = tuple(_log_density(law, z, laplace) for law in laws[len(pool.laws) :])
     target = np.concatenate([pool.target, density(new)])
-    return Pool(z, target, laws, pool.counts + counts, np.concatenate([each, more]), laplace)
+    return Pool(z, target, laws, pool.counts + counts, _appended(pool.each, old) + more, laplace)
+
+
+def _appended(each: Sequence[Array], more: Sequence[Array]) -> tuple[Array, ...]:
+    return tuple(np.concatenate(two) for two in zip(each, more, strict=True))
 
 
 def _laplace(laws: Sequence[Law], z: Array) -> Array:
@@ -102,7 +114,7 @@ def drawn_by(
     parts = zip(pool.laws, counts, strict=True)
     z = np.concatenate([law.draw(rng, count) for law, count in parts if count])
     laplace = _laplace(pool.laws, z)
-    each = np.array([_log_density(law, z, laplace) for law in pool.laws])
+    each = tuple(_log_density(law, z, laplace) for law in pool.laws)
     return Pool(z, density(z), pool.laws, counts, each, laplace)
 
 
@@ -133,7 +145,8 @@ def shares_that_suit(pool: Pool, members: int) -> tuple[Array, float]:
         return given, 0.0
     log_weights, n = log_weights[some], len(log_weights)
     log_blend = pool.target[members:][some] - log_weights
-    ratios = np.exp(pool.each[:, members:][:, some] - log_blend)  # at most one over a share
+    each = np.array([one[members:][some] for one in pool.each])
+    ratios = np.exp(each - log_blend)  # at most one over a share
     weights = np.exp(log_weights - log_weights.max())
     moved = given
     for _ in range(_DESCENT):
@@ -152,17 +165,17 @@ def joined(pool: Pool, more: Pool) -> Pool:
         np.concatenate([pool.target, more.target]),
         pool.laws,
         tuple(a + b for a, b in zip(pool.counts, more.counts, strict=True)),
-        np.concatenate([pool.each, more.each], axis=1),
+        _appended(pool.each, more.each),
         np.concatenate([pool.laplace, more.laplace]),
     )
 
 
-def mixed(each: Array, counts: Sequence[float] | Array) -> Array:
+def mixed(each: Sequence[Array] | Array, counts: Sequence[float] | Array) -> Array:
     """Return the log density of a mixture, its laws in proportion to counts.
 
     Parameters
     ----------
-    each : ndarray, shape (laws, n)
+    each : sequence of ndarray, shape (n,)
         Log density of every law.
 
     Returns
@@ -170,4 +183,4 @@ def mixed(each: Array, counts: Sequence[float] | Array) -> Array:
     ndarray, shape (n,)
     """
     shares = np.log(np.array(counts) / np.sum(counts))
-    return np.asarray(special.logsumexp(each + shares[:, None], axis=0))
+    return np.asarray(special.logsumexp(np.array(each) + shares[:, None], axis=0))

@@ -3,13 +3,14 @@
 from inference.posterior.job import Job
 from inference.posterior.stages.stage import MOST_STEPS
 
-__all__ = ["evaluations", "steps_from"]
+__all__ = ["draws_of_rounds", "evaluations", "steps_from"]
 
 _CHUNK_S = 0.33  # half of the longest chunk
 _EVALUATION_S = 2.5e-6  # a frame under one parameter vector, for sizing chunks only
 _WITH_DISCREPANCY = 10.0  # times as long, where the flux's error is integrated out
 _EASIEST = 90  # steps: 50 times of a little more than one, and a burn-in of a fifth
 _GROWTH = 0.25
+_DRAW_S = 2e-4  # of rounds, beside its evaluation: maps are fitted, and other laws are asked
 _STEP_S = 5e-4  # of an ensemble, beside its evaluations
 
 
@@ -23,6 +24,11 @@ def _evaluation_s(job: Job) -> float:
 def evaluations(job: Job) -> int:
     """Return the density evaluations after which the tempering of a population pauses."""
     return int(3 * _CHUNK_S / _evaluation_s(job))
+
+
+def draws_of_rounds(job: Job) -> int:
+    """Return the draws after which rounds of importance sampling pause."""
+    return int(3 * _CHUNK_S / (_evaluation_s(job) + _DRAW_S))
 
 
 def steps_from(job: Job, done: int, walkers: int, warm: bool) -> int:

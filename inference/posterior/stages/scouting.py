@@ -23,8 +23,8 @@ from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.stages.chunk import evaluations
 from inference.posterior.stages.ensembles import POPULATIONS
+from inference.posterior.stages.setting_out import HALFWAY_DRAWS, SCOUTED_DRAWS
 from inference.posterior.stages.stage import Tempering
-from inference.posterior.stages.tempering import HALFWAY_DRAWS, SCOUTED_DRAWS
 
 __all__ = ["Scouts", "from_scouts", "send_scouts", "thinned"]
 

@@ -20,6 +20,7 @@ from inference.posterior.sampling.ensemble import Ensemble
 from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.proposal import Mixture, Proposal
+from inference.posterior.sampling.rounds_so_far import RoundsSoFar
 from inference.posterior.sampling.start import Ends, Optimum
 from inference.posterior.sampling.verdict import Chains, Verdict, chains_of
 
@@ -111,6 +112,9 @@ class Tempering(_NotBegun):
         of importance sampling are tried from them before larger ones are carried all the way.
     tried : bool
         Whether rounds from small populations were tried once: what they drew begins them again.
+    rounds : RoundsSoFar or None
+        Rounds of importance sampling that the populations that arrived began; None before, and
+        behind them.
     """
 
     phase: ClassVar[Phase] = "tempering"
@@ -122,6 +126,7 @@ class Tempering(_NotBegun):
     scouted: bool = False
     reach: float = 1.0
     tried: bool = False
+    rounds: RoundsSoFar | None = None
 
     @property
     def early(self) -> bool:

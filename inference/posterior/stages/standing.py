@@ -62,6 +62,8 @@ def best_known(stage: Tempering | Walking) -> tuple[WeightedDraws, str] | None:
     """
     found = [(stage.weighted, "importance draws")]
     if isinstance(stage, Tempering):
+        drawn_so_far = None if stage.rounds is None else stage.rounds.draws
+        found.append((drawn_so_far, "importance draws of rounds that were not ended"))
         members = _of_populations(stage.populations)
         found.append((members, "weighted members of populations on their way"))
     drawn = [(draws, what) for draws, what in found if draws is not None]

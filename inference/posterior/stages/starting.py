@@ -21,6 +21,7 @@ from inference.posterior.stages.chunk import evaluations
 from inference.posterior.stages.ensembles import POPULATIONS, from_weighted
 from inference.posterior.stages.optima import added, depend_on_errors, that_matter
 from inference.posterior.stages.scouting import Scouts, from_scouts, send_scouts, thinned
+from inference.posterior.stages.setting_out import TOLERATED
 from inference.posterior.stages.stage import (
     Drawing,
     Settled,
@@ -29,7 +30,6 @@ from inference.posterior.stages.stage import (
     Walking,
     Weighted,
 )
-from inference.posterior.stages.tempering import TOLERATED
 from inference.posterior.streams import Stream
 from simulator.errors import RefusedError
 

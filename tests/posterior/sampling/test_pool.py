@@ -1,5 +1,6 @@
 """Draws of many laws at once: their shares, and what suits a target best."""
 
+import dataclasses
 from typing import Any, cast
 
 import numpy as np
@@ -27,7 +28,7 @@ def _target(z: np.ndarray) -> np.ndarray:
 def _pool(factor: float = 0.0) -> Pool:
     rng = np.random.default_rng(1)
     z = np.concatenate([law.draw(rng, n) for law, n in zip(LAWS, COUNTS, strict=True)])
-    each = np.array([law.log_density(z) for law in LAWS])
+    each = tuple(law.log_density(z) for law in LAWS)
     return Pool(z, _target(z) + factor, LAWS, COUNTS, each, each[0])
 
 
@@ -37,7 +38,7 @@ def test_shares_are_those_of_the_least_mean_square() -> None:
     shares, effective = shares_that_suit(pool, 0)
     given = np.array(COUNTS) / sum(COUNTS)
     weights = np.exp(pool.log_ratios)
-    ratios = np.exp(pool.each - mixed(pool.each, COUNTS))
+    ratios = np.exp(np.array(pool.each) - mixed(pool.each, COUNTS))
 
     def mean_square(own: np.ndarray) -> float:
         moved = np.exp(own - np.max(own))
@@ -66,19 +67,19 @@ def test_shares_do_not_depend_on_the_size_of_the_target(factor: float) -> None:
 def test_draws_without_a_weight_and_members_change_nothing() -> None:
     """What lies where the target is zero counts as a draw, members of populations do not."""
     pool = _pool()
-    empty = pool._replace(target=np.where(pool.z[:, 0] > 6.5, -np.inf, pool.target))
+    empty = dataclasses.replace(pool, target=np.where(pool.z[:, 0] > 6.5, -np.inf, pool.target))
     shares, effective = shares_that_suit(empty, 0)
     assert np.isfinite(shares).all()
     assert shares[2] == pytest.approx(0.5 * COUNTS[2] / sum(COUNTS), rel=1e-3)
     assert 0.5 < effective < 1.0
-    nothing = pool._replace(target=np.full(len(pool.z), -np.inf))
+    nothing = dataclasses.replace(pool, target=np.full(len(pool.z), -np.inf))
     assert shares_that_suit(nothing, 0)[1] == 0.0
     members = Pool(
         np.concatenate([pool.z[:500], pool.z]),
         np.concatenate([pool.target[:500] + 50.0, pool.target]),
         LAWS,
         COUNTS,
-        np.concatenate([pool.each[:, :500], pool.each], axis=1),
+        tuple(np.concatenate([one[:500], one]) for one in pool.each),
         np.concatenate([pool.laplace[:500], pool.laplace]),
     )
     assert np.array_equal(shares_that_suit(members, 500)[0], shares_that_suit(pool, 0)[0])

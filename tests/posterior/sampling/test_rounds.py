@@ -5,11 +5,12 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from inference.posterior.sampling import rounds
+from inference.posterior.sampling import next_laws, rounds
 from inference.posterior.sampling.importance import MAX_K_HAT, weighted_by
 from inference.posterior.sampling.pool import joined, shares_that_suit
 from inference.posterior.sampling.proposal import Local, Mixture, Proposal
-from inference.posterior.sampling.rounds import Rounds, in_rounds
+from inference.posterior.sampling.rounds import in_rounds
+from inference.posterior.sampling.rounds_so_far import Rounds, Wanted
 
 D = 2
 SECOND = np.array([4.0, 6.0])  # at the end of the banana
@@ -42,12 +43,12 @@ def _found(share: float, most: int = 12_000, seed: int = 4) -> Rounds:
     populations = (_population(300, share, 1), _population(300, share, 2))
     rng = np.random.default_rng(seed)
     start = Proposal(LAPLACE, None, 0.5)
-    return in_rounds(cast(Any, _target), start, populations, rng, 400, most)
+    return in_rounds(cast(Any, _target), start, populations, rng, Wanted(400, most))
 
 
 @pytest.fixture(autouse=True)
 def straight(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rounds, "coordinates_of", lambda _: None)
+    monkeypatch.setattr(next_laws, "coordinates_of", lambda _: None)
 
 
 def test_a_narrow_second_mode_is_held_by_its_share() -> None:
@@ -77,12 +78,12 @@ def test_the_planted_fault_of_maps_alone_is_not_trusted(
     Of 32 runs three are trusted, where one of the mode's edges was drawn often enough; 13 were
     while a tenth of the members could lie beyond the heaviest draw.
     """
-    nothing = rounds._around
+    nothing = next_laws._around
 
     def elsewhere(proposal: Proposal, z: np.ndarray, values: np.ndarray) -> Local:
         return nothing(proposal, z, np.where(np.linalg.norm(z - SECOND, axis=1) < 1, -90, values))
 
-    monkeypatch.setattr(rounds, "_around", elsewhere)
+    monkeypatch.setattr(next_laws, "_around", elsewhere)
     found = _found(SHARE, most=6000, seed=seed)
     assert not found.trusted
 
@@ -108,7 +109,7 @@ def test_jumps_lead_wherever_the_draws_show_mass(width: float) -> None:
     )
     start = Proposal(Mixture(np.zeros((1, D)), np.eye(D)[None], np.ones(1)), None, 0.5)
     rng = np.random.default_rng(5 if width < 50.0 else 4)
-    found = in_rounds(cast(Any, target), start, populations, rng, 400, 12_000)
+    found = in_rounds(cast(Any, target), start, populations, rng, Wanted(400, 12_000))
     draws = found.draws
     assert found.trusted
     excess = draws.log_density - draws.log_evidence - found.proposal.log_density(draws.z)
@@ -119,7 +120,7 @@ def test_mass_that_one_population_alone_knows_is_found() -> None:
     populations = (_population(300, 0.0, 1), _population(300, SHARE, 2))
     rng = np.random.default_rng(6)
     start = Proposal(LAPLACE, None, 0.5)
-    found = in_rounds(cast(Any, _target), start, populations, rng, 400, 12_000)
+    found = in_rounds(cast(Any, _target), start, populations, rng, Wanted(400, 12_000))
     inside = np.linalg.norm(found.draws.z - SECOND, axis=1) < 8 * NARROW
     share = float(found.draws.weights @ inside)
     assert abs(share - SHARE) < 5 * np.sqrt(SHARE / found.draws.ess)
@@ -151,7 +152,7 @@ def test_draws_that_do_not_count_join_the_others(monkeypatch: pytest.MonkeyPatch
 
     populations = (_population(300, SHARE, 1), _population(300, SHARE, 2))
     start, rng = Proposal(LAPLACE, None, 0.5), np.random.default_rng(4)
-    found = in_rounds(cast(Any, target), start, populations, rng, 400, 30_000)
+    found = in_rounds(cast(Any, target), start, populations, rng, Wanted(400, 30_000))
     ((pool, more, both),) = pools
     assert both.counts == tuple(np.add(pool.counts, more.counts))
     assert sum(both.counts) == len(both.z) - 600  # members of the populations
@@ -187,7 +188,7 @@ def test_draws_go_on_from_the_same_laws_until_enough_count(
     monkeypatch.setattr(rounds, "shares_that_suit", promising)
     populations = (_population(300, SHARE, 1), _population(300, SHARE, 2))
     start, rng = Proposal(LAPLACE, None, 0.5), np.random.default_rng(4)
-    found = in_rounds(cast(Any, _target), start, populations, rng, 3000, 12_000)
+    found = in_rounds(cast(Any, _target), start, populations, rng, Wanted(3000, 12_000))
     assert found.trusted
     assert found.draws.ess >= 3000
 
@@ -202,7 +203,9 @@ def test_a_target_that_is_zero_at_every_draw_is_not_trusted() -> None:
     angle = np.linspace(0.0, 2 * np.pi, 300)
     ring = np.column_stack([np.cos(angle), np.sin(angle)])
     rng = np.random.default_rng(4)
-    found = in_rounds(cast(Any, target), Proposal(LAPLACE, None, 0.5), (ring,), rng, 400, 5000)
+    found = in_rounds(
+        cast(Any, target), Proposal(LAPLACE, None, 0.5), (ring,), rng, Wanted(400, 5000)
+    )
     assert not found.trusted
     assert found.dissent == 1.0
 
@@ -232,7 +235,9 @@ def test_a_thin_ridge_is_followed_beyond_the_populations(seed: int) -> None:
     x = np.interp(rng.random(768), below / below[-1], grid)
     members = np.column_stack([x, 0.3 * x**2 + thin * rng.standard_normal(768)])
     start = Proposal(LAPLACE, None, 0.5)
-    found = in_rounds(cast(Any, target), start, (members[::2], members[1::2]), rng, 400, 20_000)
+    found = in_rounds(
+        cast(Any, target), start, (members[::2], members[1::2]), rng, Wanted(400, 20_000)
+    )
     assert found.trusted
     # wide laws draw where the target underflows, and where squares of what is drawn may overflow
     assert (found.draws.weights > 0).all()

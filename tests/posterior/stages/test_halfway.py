@@ -11,9 +11,10 @@ import pytest
 from benchmarks.coverage.paths import draw_path
 from inference.posterior import fold
 from inference.posterior.sampling.population import Population
-from inference.posterior.sampling.rounds import Rounds, in_rounds
+from inference.posterior.sampling.rounds import in_rounds
+from inference.posterior.sampling.rounds_so_far import Rounds, Wanted
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages import tempering
+from inference.posterior.stages import setting_out, tempering
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.ensembles import POPULATIONS
 from inference.posterior.stages.stage import Starting, Tempering, Walking, Weighted
@@ -47,8 +48,16 @@ def _carried() -> Checkpoint:
 
 
 def _after(method: str) -> Checkpoint:
-    (task,) = fold.tasks(_job(method), _carried())
-    return fold.merge(_job(method), _carried(), [fold.run(task)])
+    """Return what rounds lead to, in however many chunks."""
+    return _led_to(_job(method), _carried())
+
+
+def _led_to(job: fold.Job, checkpoint: Checkpoint) -> Checkpoint:
+    while True:
+        (task,) = fold.tasks(job, checkpoint)
+        checkpoint = fold.merge(job, checkpoint, [fold.run(task)])
+        if not (isinstance(checkpoint.stage, Tempering) and checkpoint.stage.rounds):
+            return checkpoint
 
 
 def test_where_light_is_confounded_small_populations_set_out() -> None:
@@ -87,10 +96,11 @@ def test_where_rounds_fail_populations_are_carried_all_the_way(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def doubted(*arguments: Any) -> Rounds:
-        none: Any = (*arguments[:5], 0, arguments[6])  # draws to spend
+        wanted = dataclasses.replace(arguments[4], most=0)  # draws to spend
+        none: Any = (*arguments[:4], wanted)
         return dataclasses.replace(in_rounds(*none), dissent=1.0)
 
-    monkeypatch.setattr(tempering, "in_rounds", doubted)
+    monkeypatch.setattr(setting_out, "begun", doubted)
     stage = _after("auto").stage
     assert isinstance(stage, Tempering)
     assert not stage.early
@@ -112,7 +122,8 @@ def _drawn() -> Rounds:
     assert isinstance(stage, Tempering)
     populations = tuple(each.z for each in stage.populations if each is not None)
     rng = np.random.default_rng(SEED)
-    return in_rounds(job.density(), stage.proposal, populations, rng, 400, 12_000, 1.0, 0.0)
+    wanted = Wanted(400, 12_000, 1.0, 0.0)
+    return in_rounds(job.density(), stage.proposal, populations, rng, wanted)
 
 
 def test_rounds_that_came_far_begin_again_where_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,7 +141,7 @@ def test_rounds_that_came_far_begin_again_where_they_are(monkeypatch: pytest.Mon
         given.append(arguments[2])
         return doubtful
 
-    monkeypatch.setattr(tempering, "in_rounds", doubted)
+    monkeypatch.setattr(setting_out, "begun", doubted)
     job, first = _job("auto"), _after("auto")
     assert isinstance(first.stage, Tempering)
     assert first.stage.early
@@ -139,7 +150,7 @@ def test_rounds_that_came_far_begin_again_where_they_are(monkeypatch: pytest.Mon
     assert first.calls == _carried().calls + doubtful.calls
     stored = Checkpoint.from_bytes(first.to_bytes())
     (task,) = fold.tasks(job, stored)
-    assert isinstance(task, tempering.SetOutTask)
+    assert isinstance(task, setting_out.SetOutTask)
     second = fold.merge(job, stored, [fold.run(task)])
     assert len(given[0]) == POPULATIONS
     *before, drawn = given[1]
@@ -157,7 +168,7 @@ def test_rounds_that_came_nowhere_are_not_tried_again(monkeypatch: pytest.Monkey
     one[0] = 1.0
     poor = dataclasses.replace(draws, weights=one, k_hat=math.inf)
     found = dataclasses.replace(_drawn(), draws=poor, dissent=0.0)
-    monkeypatch.setattr(tempering, "in_rounds", lambda *_: found)
+    monkeypatch.setattr(setting_out, "begun", lambda *_: found)
     stage = _after("auto").stage
     assert isinstance(stage, Tempering)
     assert not stage.early
@@ -174,7 +185,7 @@ def test_trusted_draws_that_are_too_few_are_drawn_on_only_where_they_answer(
     draws = dataclasses.replace(draws, weights=some, k_hat=0.1)
     few = dataclasses.replace(_drawn(), draws=draws, dissent=0.0)
     monkeypatch.setattr(Rounds, "trusted", property(lambda _: True))
-    monkeypatch.setattr(tempering, "in_rounds", lambda *_: few)
+    monkeypatch.setattr(setting_out, "begun", lambda *_: few)
     assert few.draws.ess < _job("auto").settings.target_ess
     again = _after("auto")
     assert isinstance(again.stage, Tempering)

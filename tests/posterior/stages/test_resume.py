@@ -41,7 +41,7 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any], str, int, int, tuple[type
         {"background": UNKNOWN_WALL},
         "emcee",
         3,
-        10,
+        40,
         (Starting, Tempering, Walking),
     ),
     "weighted": (

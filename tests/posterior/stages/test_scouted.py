@@ -8,9 +8,10 @@ import pytest
 
 from benchmarks.answer_times import _case
 from inference.posterior import fold
-from inference.posterior.sampling.rounds import Rounds, in_rounds
+from inference.posterior.sampling.rounds import in_rounds
+from inference.posterior.sampling.rounds_so_far import Rounds, Wanted
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages import tempering, walking
+from inference.posterior.stages import setting_out, walking
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.ensembles import POPULATIONS
 from inference.posterior.stages.stage import Starting, Tempering, Walking, Weighted
@@ -40,14 +41,13 @@ def _rounds(*_: Any) -> Rounds:
     assert isinstance(stage, Tempering)
     job = _job()
     populations = tuple(each.z for each in stage.populations if each is not None)
-    rng, most = np.random.default_rng(1), tempering.SCOUTED_DRAWS
-    return in_rounds(
-        job.density(), stage.proposal, populations, rng, 400, most, tempering.TOLERATED
-    )
+    wanted = Wanted(400, setting_out.SCOUTED_DRAWS, setting_out.TOLERATED)
+    rng = np.random.default_rng(1)
+    return in_rounds(job.density(), stage.proposal, populations, rng, wanted)
 
 
 def _after(method: str, monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.setattr(tempering, "in_rounds", lambda *_: _rounds())
+    monkeypatch.setattr(setting_out, "begun", lambda *_: _rounds())
     job = _job(method)
     (task,) = fold.tasks(job, _started())
     return fold.merge(job, _started(), [fold.run(task)]).stage

@@ -1,0 +1,172 @@
+"""Where rounds of importance sampling stand, and what they come to."""
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from inference.posterior.sampling.importance import (
+    MAX_SMOOTHED_K_HAT,
+    WeightedDraws,
+    weighted_by,
+)
+from inference.posterior.sampling.pool import Pool, joined
+from inference.posterior.sampling.proposal import Proposal
+
+__all__ = ["LastDraws", "Rounds", "RoundsSoFar", "Wanted", "heaviest_of", "worst"]
+
+Array = NDArray[np.float64]
+
+_TAIL = 0.01  # of the draws' mass, in the heaviest of them: there may be
+_MOST_DISSENT = 0.03  # so many of a population's members
+
+
+@dataclasses.dataclass(frozen=True)
+class Wanted:
+    """What rounds are to come to, and what they may take.
+
+    Attributes
+    ----------
+    target_ess : int
+        Effective sample size wanted.
+    most : int
+        Draws that may be spent, but for those that count: 2000 to 20,000 are made in any case.
+    tolerated : float
+        Share of a population's members beyond the weights of the heaviest draws, below which draws
+        stand.
+    tail : float
+        Share of all mass in these heaviest draws; 0, and the heaviest alone is meant, where members
+        are none of the posterior.
+    """
+
+    target_ess: int
+    most: int
+    tolerated: float = _MOST_DISSENT
+    tail: float = _TAIL
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Rounds:
+    """What importance sampling in rounds came to.
+
+    Attributes
+    ----------
+    proposal : Proposal
+        With the last map, and laws of any round that hold the places of which it holds too little.
+    draws : WeightedDraws
+        Those that count.
+    dissent : float
+        Largest share of a population's members at which the target exceeds the proposals by more
+        than at the heaviest draws.
+    calls : int
+        Density evaluations.
+    tolerated : float
+        Dissent below which the draws stand.
+    """
+
+    proposal: Proposal
+    draws: WeightedDraws
+    dissent: float
+    calls: int
+    tolerated: float
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the draws stand for the posterior, however many they are."""
+        return self.draws.k_hat < MAX_SMOOTHED_K_HAT and self.dissent < self.tolerated
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LastDraws:
+    """The draws that count, while they are made: the laws change no more.
+
+    Attributes
+    ----------
+    shares : ndarray, shape (laws,)
+        Of the laws.
+    count : int
+        Draws after which they are judged: shares that suit the pool suit other draws less, and
+        more are made then where these are too few.
+    most : int
+        Draws at most.
+    last : bool
+        Whether they are the end, good or not; otherwise rounds may go on.
+    drawn : Pool or None
+        Those that there are.
+    """
+
+    shares: Array
+    count: int
+    most: int
+    last: bool
+    drawn: Pool | None = None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RoundsSoFar:
+    """Where rounds stand between two steps.
+
+    Attributes
+    ----------
+    wanted : Wanted
+        What they are to come to.
+    proposal : Proposal
+        With the last map.
+    pool : Pool
+        All draws, the members of the populations first.
+    ends : tuple of int
+        Of the members of each population.
+    calls : int
+        Density evaluations.
+    steps : int
+        Made so far, the beginning among them.
+    last : LastDraws or None
+        The draws that count, while they are made.
+    """
+
+    wanted: Wanted
+    proposal: Proposal
+    pool: Pool
+    ends: tuple[int, ...]
+    calls: int
+    steps: int = 1
+    last: LastDraws | None = None
+
+    @property
+    def members(self) -> int:
+        """How many members of populations the pool begins with."""
+        return self.ends[-1]
+
+    @property
+    def beyond(self) -> NDArray[np.bool_]:
+        """Which members lie beyond the heaviest draws, shape (members,)."""
+        heaviest = heaviest_of(self.pool.log_ratios[self.members :], self.wanted.tail)
+        return np.asarray(self.pool.log_ratios[: self.members] > heaviest)
+
+    @property
+    def draws(self) -> WeightedDraws | None:
+        """All draws so far, by weight; None where members of the populations contradict them."""
+        now = self
+        if self.last is not None and self.last.drawn is not None:
+            now = dataclasses.replace(self, pool=joined(self.pool, self.last.drawn))
+        if worst(now.beyond, self.ends) >= self.wanted.tolerated:
+            return None
+        pool, m = now.pool, self.members
+        draws = weighted_by(pool.z[m:], pool.target[m:], pool.log_mixture[m:], smooth=True)
+        return draws.that_count
+
+
+def heaviest_of(log_weights: Array, tail: float) -> float:
+    """Return the log weight above which the heaviest draws hold a share of all mass, or none."""
+    finite = np.sort(log_weights[np.isfinite(log_weights)])[::-1]
+    if not finite.size:
+        return -math.inf
+    held = np.cumsum(special.softmax(finite))
+    return float(finite[np.searchsorted(held, tail)])
+
+
+def worst(beyond: NDArray[np.bool_], ends: tuple[int, ...]) -> float:
+    """Return the largest share of any population's members."""
+    return max(float(part.mean()) for part in np.split(beyond, ends[:-1]))

@@ -1,0 +1,178 @@
+"""What comes of populations that arrived: rounds of importance draws, and what these lead to.
+
+Rounds begin at the members, and are made in chunks of some steps each. Their draws are the answer
+where they may be; otherwise they say from where, and through which map, ensembles walk. Rounds from
+small populations that fail begin once more at what they drew themselves; then larger populations
+follow, from the prior anew.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from inference.density.collapsed import CollapsedDensity
+from inference.posterior.job import Job
+from inference.posterior.sampling.ensemble import WALKERS, warm_walkers
+from inference.posterior.sampling.flux_coordinate import coordinates_of
+from inference.posterior.sampling.population import Population
+from inference.posterior.sampling.rounds import begun, step
+from inference.posterior.sampling.rounds_so_far import Rounds, RoundsSoFar, Wanted
+from inference.posterior.sampling.transport import fit_map
+from inference.posterior.sampling.verdict import Verdict
+from inference.posterior.sampling.warm import MAP_SHARE
+from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.ensembles import POPULATIONS, from_weighted, new_ensembles
+from inference.posterior.stages.stage import Tempering, Walking, Weighted
+from inference.posterior.stages.standing import best_known
+from inference.posterior.streams import Stream
+
+__all__ = [
+    "HALFWAY_DRAWS",
+    "SCOUTED_DRAWS",
+    "TOLERATED",
+    "SetOutTask",
+    "all_the_way",
+    "walking_from",
+]
+
+_SHARE = 0.5  # of what the populations took, that importance sampling behind them may take
+_MOST_DRAWS = (12_000, 40_000)  # but so many at least, and at most
+SCOUTED_DRAWS = 20_000  # that rounds from scouts may take: as many as carry one population
+HALFWAY_DRAWS = 40_000  # and those from small populations, twice: as many as carry these
+_LEADING = 50.0  # effective size of draws, from which on rounds may begin again at them
+TOLERATED = 0.01  # of what scouts met on their way from the prior, beyond every weight
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SetOutTask:
+    """Some steps of importance sampling from populations that arrived; at the end what they led to.
+
+    Attributes
+    ----------
+    stage : Tempering
+        With populations of which at least one has arrived, and with rounds where some were made.
+    calls : int
+        Density evaluations after which to stop.
+    """
+
+    job: Job
+    stage: Tempering
+    calls: int
+
+    def run(self) -> Checkpoint:
+        """Return where rounds stand; at their end the answer, or ensembles that set out."""
+        job, stage, density = self.job, self.stage, self.job.density()
+        members = [each for each in stage.populations if each is not None and len(each.z)]
+        before = 0 if stage.rounds is None else stage.rounds.calls
+        reached = self._next(density, members, stage.rounds)
+        while isinstance(reached, RoundsSoFar) and reached.calls - before < self.calls:
+            reached = self._next(density, members, reached)
+        after: Tempering | Weighted | Walking
+        if isinstance(reached, RoundsSoFar):
+            after, calls = dataclasses.replace(stage, rounds=reached), reached.calls
+        else:
+            after, calls = _set_out(job, dataclasses.replace(stage, rounds=None), members, reached)
+        return Checkpoint(after, calls - before, None, job.representatives)
+
+    def _next(
+        self, density: CollapsedDensity, members: Sequence[Population], so_far: RoundsSoFar | None
+    ) -> RoundsSoFar | Rounds:
+        """Make the next step of rounds; the first begins them at what was drawn before."""
+        job, stage = self.job, self.stage
+        if so_far is not None:
+            return step(density, so_far, self._stream(so_far.steps))
+        rng, populations = self._stream(0), tuple(each.z for each in members)
+        if stage.tried and stage.early and stage.weighted is not None:
+            drawn = stage.weighted
+            some = rng.choice(len(drawn.z), size=len(populations[0]), p=drawn.weights)
+            populations = (*populations, drawn.z[some])
+        proposal = dataclasses.replace(stage.proposal, share=MAP_SHARE)
+        return begun(density, proposal, populations, rng, _wanted(job, stage, members))
+
+    def _stream(self, steps: int) -> np.random.Generator:
+        """Return the stream of a step: rounds that a job begins in turn have their own."""
+        stage = self.stage
+        which = 0 if stage.scouted else 1 + stage.tried if stage.early else 3
+        return self.job.stream(Stream.ROUNDS, which, steps)
+
+
+def _wanted(job: Job, stage: Tempering, members: Sequence[Population]) -> Wanted:
+    """Return what rounds are to come to: populations that stop on their way are held to more."""
+    target = job.settings.target_ess
+    if stage.early:
+        most = SCOUTED_DRAWS if stage.scouted else HALFWAY_DRAWS
+        return Wanted(target, most, TOLERATED, 0.0)
+    most = int(np.clip(_SHARE * sum(each.calls for each in members), *_MOST_DRAWS))
+    return Wanted(target, most)
+
+
+def _set_out(
+    job: Job, stage: Tempering, members: list[Population], found: Rounds
+) -> tuple[Tempering | Weighted | Walking, int]:
+    """Answer by the draws of rounds; set up ensembles, or begin again, where they fail."""
+    auto = job.settings.method == "auto"
+    if auto and found.trusted and found.draws.worth >= job.settings.target_ess:
+        return Weighted(found.proposal.optima, found.draws, Verdict(True, ())), found.calls
+    if not stage.early:
+        walking = walking_from(job, stage, members, found)
+    elif _may_try_again(stage, found) and (auto or not found.trusted):
+        # in a chunk of its own: a job may be out of time by now
+        return dataclasses.replace(stage, weighted=found.draws, tried=True), found.calls
+    elif found.trusted and not auto:
+        density, others = job.density(), members[0].z
+        ensembles = from_weighted(job, density, found.proposal, found.draws, others)
+        walking = Walking(found.proposal, ensembles, stage.verdict, 2, weighted=found.draws)
+    else:
+        # until larger populations are on their way an answer is made of what there is
+        if found.dissent < TOLERATED:
+            stage = dataclasses.replace(stage, weighted=found.draws)
+        known = best_known(stage)
+        stage = dataclasses.replace(stage, weighted=None if known is None else known[0])
+        return all_the_way(stage), found.calls
+    return walking, found.calls + walking.ensembles[0].walkers * len(walking.ensembles)
+
+
+def _may_try_again(stage: Tempering, found: Rounds) -> bool:
+    """Tell whether rounds have come so far that they may begin again where they are."""
+    first = not (stage.scouted or stage.tried)
+    return first and found.dissent < TOLERATED and found.draws.ess >= _LEADING
+
+
+def all_the_way(stage: Tempering) -> Tempering:
+    """Return the stage in which larger populations set out from the prior."""
+    return dataclasses.replace(stage, populations=(None,) * POPULATIONS, scouted=False, reach=1.0)
+
+
+def walking_from(
+    job: Job, stage: Tempering, arrived: list[Population], found: Rounds | None
+) -> Walking:
+    """Set up ensembles in the coordinates of the best map that there is.
+
+    The last ensemble starts around the optima of the multistart, the others from populations that
+    came from the prior and know nothing of them: they can contradict one another.
+    """
+    proposal, density = stage.proposal, job.density()
+    count = job.settings.ensembles
+    starts = [np.empty((0, len(density.parameters)))] * count
+    if arrived:
+        members = [population.z for population in arrived]
+        transport = fit_map(np.concatenate(members), coordinates_of(density))
+        proposal = dataclasses.replace(proposal, transport=transport, share=MAP_SHARE)
+        orders = [job.stream(Stream.MEMBERS, k).permutation(len(z)) for k, z in enumerate(members)]
+        sharing = -(-(count - 1) // len(members))
+        for k in range(count - 1):
+            # ensembles that share a population begin in parts of their own
+            turn, which = divmod(k, len(members))
+            order = np.roll(orders[which], -(turn * len(members[which]) // sharing))
+            starts[k] = members[which][order]
+    trusted = found is not None and found.trusted
+    if found is not None and trusted:
+        proposal = found.proposal
+    walkers = warm_walkers(len(density.parameters)) if trusted else WALKERS
+    seeds = job.seeds(Stream.ENSEMBLES)
+    ensembles = new_ensembles(density, proposal, tuple(starts), seeds, walkers)
+    weighted = found.draws if found is not None and trusted else None
+    # a law that was held to weighted draws is left for one fitted to walkers only where these stay
+    adaptations = 2 if trusted else 1
+    return Walking(proposal, ensembles, stage.verdict, adaptations, weighted=weighted)
