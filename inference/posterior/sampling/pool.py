@@ -108,9 +108,14 @@ def _log_density(law: Law, z: Array, laplace: Array) -> Array:
 def drawn_by(
     pool: Pool, shares: Array, n: int, density: CollapsedDensity, rng: np.random.Generator
 ) -> Pool:
-    """Return n draws from all laws of a pool in these shares, as a pool of their own."""
-    ends = np.rint(np.cumsum([0.0, *shares]) * n).astype(int)
-    counts = tuple(np.diff(ends).tolist())
+    """Return n draws from all laws of a pool in these shares, as a pool of their own.
+
+    A law gives its share of n, to within one draw, and in the mean its share exactly (systematic
+    sampling, Madow 1949): draws that are made in parts are of the same mixture.
+    """
+    ends = np.floor(np.cumsum(shares) * n + rng.uniform()).astype(int)
+    ends[-1] = n
+    counts = tuple(np.diff(ends, prepend=0).tolist())
     parts = zip(pool.laws, counts, strict=True)
     z = np.concatenate([law.draw(rng, count) for law, count in parts if count])
     laplace = _laplace(pool.laws, z)

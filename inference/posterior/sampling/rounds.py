@@ -18,7 +18,7 @@ from inference.posterior.sampling.importance import (
     pareto_k_hat,
     weighted_by,
 )
-from inference.posterior.sampling.next_laws import LAWS, fitted, next_laws
+from inference.posterior.sampling.next_laws import fitted, next_laws
 from inference.posterior.sampling.pool import (
     Pool,
     drawn_by,
@@ -45,7 +45,6 @@ STEP = 2000  # density evaluations of a step at most
 _DRAWS = 1000  # of a round
 _LOCAL_SHARE = 0.25  # of them, from around the place that the others hold least of
 _WIDE_SHARE = 0.35  # of them, from the wider map
-_FEWEST = 6  # rounds
 _LEAST = 2000  # draws that count: the shape of their weights' tail is known to 0.13
 _MOST = 20_000  # of them
 _SPARE = 1.3  # times the draws that are foreseen
@@ -148,8 +147,7 @@ def _judged(so_far: RoundsSoFar) -> RoundsSoFar:
     log_weights = pool.log_ratios[so_far.members :]
     # no room for another round, or nothing that it could follow
     over = calls + _DRAWS + _LEAST > wanted.most or not np.isfinite(log_weights).any()
-    settled = len(pool.laws) > _FEWEST * LAWS
-    settled = settled and worst(so_far.beyond, so_far.ends) < wanted.tolerated
+    settled = so_far.telling and worst(so_far.beyond, so_far.ends) < wanted.tolerated
     settled = settled and pareto_k_hat(log_weights) < MAX_SMOOTHED_K_HAT
     if not (over or settled):
         return so_far

@@ -12,6 +12,7 @@ from inference.posterior.sampling.importance import (
     WeightedDraws,
     weighted_by,
 )
+from inference.posterior.sampling.next_laws import LAWS
 from inference.posterior.sampling.pool import Pool, joined
 from inference.posterior.sampling.proposal import Proposal
 
@@ -19,6 +20,7 @@ __all__ = ["LastDraws", "Rounds", "RoundsSoFar", "Wanted", "heaviest_of", "worst
 
 Array = NDArray[np.float64]
 
+_FEWEST = 6  # rounds: before, even weights are those of draws that all leave out the same
 _TAIL = 0.01  # of the draws' mass, in the heaviest of them: there may be
 _MOST_DISSENT = 0.03  # so many of a population's members
 
@@ -146,8 +148,15 @@ class RoundsSoFar:
         return np.asarray(self.pool.log_ratios[: self.members] > heaviest)
 
     @property
+    def telling(self) -> bool:
+        """Whether rounds are so many that the weights tell what was left out."""
+        return len(self.pool.laws) > _FEWEST * LAWS
+
+    @property
     def draws(self) -> WeightedDraws | None:
-        """All draws so far, by weight; None where members of the populations contradict them."""
+        """All draws so far, by weight; None where they tell little, or members contradict them."""
+        if not self.telling:
+            return None
         now = self
         if self.last is not None and self.last.drawn is not None:
             now = dataclasses.replace(self, pool=joined(self.pool, self.last.drawn))

@@ -55,6 +55,9 @@ def standing(stage: Drawing) -> Drawing:
 def best_known(stage: Tempering | Walking) -> tuple[WeightedDraws, str] | None:
     """Return the largest number of weighted draws that there are, trusted ones first; or None.
 
+    Those of rounds that go on, if they are trusted, stand before what these began at and hold them
+    to: members that stayed where there is little mass have even weights.
+
     Returns
     -------
     (WeightedDraws, str)
@@ -62,12 +65,14 @@ def best_known(stage: Tempering | Walking) -> tuple[WeightedDraws, str] | None:
     """
     found = [(stage.weighted, "importance draws")]
     if isinstance(stage, Tempering):
-        drawn_so_far = None if stage.rounds is None else stage.rounds.draws
-        found.append((drawn_so_far, "importance draws of rounds that were not ended"))
+        drawn = None if stage.rounds is None else stage.rounds.draws
+        found.append((drawn, "importance draws of rounds that were not ended"))
+        if drawn is not None and _trusted(drawn):
+            return drawn, found[-1][1]
         members = _of_populations(stage.populations)
         found.append((members, "weighted members of populations on their way"))
-    drawn = [(draws, what) for draws, what in found if draws is not None]
-    return max(drawn, key=lambda each: (_trusted(each[0]), each[0].worth), default=None)
+    known = [(draws, what) for draws, what in found if draws is not None]
+    return max(known, key=lambda each: (_trusted(each[0]), each[0].worth), default=None)
 
 
 def _trusted(draws: WeightedDraws) -> bool:

@@ -6,8 +6,10 @@ from scipy import special, stats
 
 from inference.posterior import fold
 from inference.posterior.sampling.importance import WeightedDraws, pareto_k_hat, smoothed
+from inference.posterior.sampling.pool import Pool
 from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.proposal import Mixture, Proposal
+from inference.posterior.sampling.rounds_so_far import RoundsSoFar, Wanted
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages.stage import Starting, Tempering, Walking, Weighted
@@ -114,3 +116,28 @@ def test_of_draws_and_members_the_larger_number_answers() -> None:
         found = standing(stage(members, draws))
         assert isinstance(found, Weighted)
         assert len(found.draws.z) == size
+
+
+def test_trusted_draws_of_rounds_stand_before_what_these_began_at(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Members that stayed where there is little mass have even weights, and may be more."""
+    rng, one = np.random.default_rng(6), np.zeros(400)
+    population = Population(rng.standard_normal((400, 1)), one, one, 1.0, 0.0, 3, 1)
+    optima = Mixture(np.zeros((1, 1)), np.eye(1)[None], np.ones(1))
+    none = np.empty(0)
+    pool = Pool(np.empty((0, 1)), none, (), (), (), none)
+    proposal = Proposal(optima, None, 0.5)
+    rounds = RoundsSoFar(Wanted(400, 12_000), proposal, pool, (0,), 0)
+    verdict = Verdict(False, ("no steps were made",))
+    stage = Tempering(proposal, (population,), verdict, rounds=rounds)
+    known: list[WeightedDraws | None] = []
+    monkeypatch.setattr(RoundsSoFar, "draws", property(lambda _: known[-1]))
+    for n, k_hat, size in ((100, 0.6, 100), (100, 0.8, 400), (40, 0.6, 400), (0, 0.0, 400)):
+        z = rng.standard_normal((n, 1))
+        draws = WeightedDraws(z, np.zeros(n), np.full(n, 1 / max(n, 1)), k_hat, 0)
+        known.append(draws if n else None)
+        found = standing(stage)
+        assert isinstance(found, Weighted)
+        assert len(found.draws.z) == size
+        assert not found.verdict.converged
