@@ -1,15 +1,18 @@
 """Rounds of importance draws in chunks: the same in however many, and honest where time ends."""
 
+import dataclasses
 import functools
 import itertools
+from typing import Any
 
 import pytest
 
 from benchmarks.answer_times import _case
 from inference.posterior import fold
-from inference.posterior.sampling.rounds import STEP
+from inference.posterior.sampling.rounds import STEP, step
+from inference.posterior.sampling.rounds_so_far import Rounds, RoundsSoFar
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages import tempering
+from inference.posterior.stages import setting_out, tempering
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.chunk import draws_of_rounds, evaluations
 from inference.posterior.stages.stage import Starting, Tempering, Weighted
@@ -74,6 +77,30 @@ def test_a_chunk_of_rounds_is_bounded_by_its_evaluations() -> None:
     assert isinstance(stage, Tempering)
     members = sum(len(each.z) for each in stage.populations if each is not None)
     assert most <= taken[0] < most + STEP + members
+
+
+def test_every_step_has_a_stream_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planted fault: of one stream for all steps, every round drew the same normal numbers."""
+    states: list[str] = []
+
+    def noted(*arguments: Any) -> RoundsSoFar | Rounds:
+        states.append(str(arguments[2].bit_generator.state))
+        return step(*arguments)
+
+    monkeypatch.setattr(setting_out, "step", noted)
+    stage = _merged(_merged(_started())).stage
+    assert isinstance(stage, Tempering)
+    begun_again = dataclasses.replace(_started(), stage=dataclasses.replace(stage, rounds=None))
+    assert len(set(states)) == len(states) > 2
+    first = list(states)
+    _merged(begun_again)
+    assert set(states[len(first) :]) <= set(first)  # and the same one whenever it is made
+    tried = dataclasses.replace(stage, rounds=None, scouted=False, reach=0.3)
+    for once in (False, True):
+        before = len(states)
+        _merged(dataclasses.replace(begun_again, stage=dataclasses.replace(tried, tried=once)))
+        assert len(states) > before
+        assert not set(states[before:]) & set(states[:before])
 
 
 def test_one_step_is_made_however_short_a_chunk_is(monkeypatch: pytest.MonkeyPatch) -> None:
