@@ -25,9 +25,10 @@ class SamplerSettings(Validated):
     max_seconds : float
         Processor time [s], compiling apart, after which no chunk begins and an unfinished run is
         summarised as it is: the sum over all ensembles, in whatever process they run. What has
-        begun is ended first: a chunk of about a second, importance sampling of ten seconds at
-        most, or the search for starting points, which takes a second for 100 frames and half a
-        minute for the most frames and nine unknowns, and several times as long with a discrepancy.
+        begun is ended first: a chunk of about a second, of every ensemble or population, or of
+        rounds of importance draws; the draws of `importance`, ten seconds at most; or the search
+        for starting points, which takes a second for 100 frames and half a minute for the most
+        frames and nine unknowns, and several times as long with a discrepancy.
     seed : int, optional
         Left out: drawn, and returned with the answer.
     """

@@ -41,9 +41,8 @@ __all__ = ["STEP", "begun", "in_rounds", "step"]
 
 Array = NDArray[np.float64]
 
-STEP = 2000  # density evaluations of a step at most
-_DRAWS = 1000  # of a round
-_LOCAL_SHARE = 0.25  # of them, from around the place that the others hold least of
+STEP = 1000  # draws: of a round, or some of those that count
+_LOCAL_SHARE = 0.25  # of a round's, from around the place that the others hold least of
 _WIDE_SHARE = 0.35  # of them, from the wider map
 _LEAST = 2000  # draws that count: the shape of their weights' tail is known to 0.13
 _MOST = 20_000  # of them
@@ -108,14 +107,14 @@ def begun(
     proposal = fitted(proposal, members, density)
     laplace = proposal.optima.log_density(members)
     pool = Pool(members, density(members), (), (), (), laplace)
-    pool = with_laws(pool, (proposal,), (_DRAWS,), density, rng)
-    return _judged(RoundsSoFar(wanted, proposal, pool, tuple(ends), len(members) + _DRAWS))
+    pool = with_laws(pool, (proposal,), (STEP,), density, rng)
+    return _judged(RoundsSoFar(wanted, proposal, pool, tuple(ends), len(members) + STEP))
 
 
 def step(
     density: CollapsedDensity, so_far: RoundsSoFar, rng: np.random.Generator
 ) -> RoundsSoFar | Rounds:
-    """Make one round, or some of the draws that count: at most `STEP` evaluations.
+    """Make one round, or some of the draws that count: `STEP` evaluations, or fewer.
 
     Parameters
     ----------
@@ -135,9 +134,9 @@ def step(
     if so_far.last is not None:
         return _counted(density, so_far, so_far.last, rng)
     laws = next_laws(density, so_far.proposal, so_far.pool, so_far.beyond, rng)
-    local, far = int(_LOCAL_SHARE * _DRAWS), int(_WIDE_SHARE * _DRAWS)
-    pool = with_laws(so_far.pool, laws, (_DRAWS - local - far, far, local), density, rng)
-    calls = so_far.calls + _DRAWS
+    local, far = int(_LOCAL_SHARE * STEP), int(_WIDE_SHARE * STEP)
+    pool = with_laws(so_far.pool, laws, (STEP - local - far, far, local), density, rng)
+    calls = so_far.calls + STEP
     return _judged(dataclasses.replace(so_far, proposal=laws[0], pool=pool, calls=calls))
 
 
@@ -146,7 +145,7 @@ def _judged(so_far: RoundsSoFar) -> RoundsSoFar:
     pool, wanted, calls = so_far.pool, so_far.wanted, so_far.calls
     log_weights = pool.log_ratios[so_far.members :]
     # no room for another round, or nothing that it could follow
-    over = calls + _DRAWS + _LEAST > wanted.most or not np.isfinite(log_weights).any()
+    over = calls + STEP + _LEAST > wanted.most or not np.isfinite(log_weights).any()
     settled = so_far.telling and worst(so_far.beyond, so_far.ends) < wanted.tolerated
     settled = settled and pareto_k_hat(log_weights) < MAX_SMOOTHED_K_HAT
     if not (over or settled):

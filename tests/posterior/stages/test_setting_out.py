@@ -132,7 +132,7 @@ def test_out_of_time_draws_of_rounds_answer_and_say_so(monkeypatch: pytest.Monke
 
 
 def test_after_few_rounds_their_draws_do_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Planted fault: after three rounds even weights (k-hat 0.3, an effective size of 260) held a
+    """Planted fault: after two rounds even weights (k-hat 0.3, an effective size of 260) held a
     tenth of an unknown's standard deviation, in a random set."""
     monkeypatch.setattr(tempering, "draws_of_rounds", lambda _: 1)
     stage = _merged(_merged(_merged(_started()))).stage
