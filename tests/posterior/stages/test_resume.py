@@ -41,7 +41,7 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any], str, int, int, tuple[type
         {"background": UNKNOWN_WALL},
         "emcee",
         3,
-        40,
+        60,
         (Starting, Tempering, Walking),
     ),
     "weighted": (
@@ -80,12 +80,14 @@ def test_in_every_stage(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
         if isinstance(stage, Walking) and stage.steps > was > 0:  # steps are not written anew
             chains = sum(ensemble.chain.nbytes for ensemble in stage.ensembles)
             assert len(kept[-1]) < len(checkpoint.to_bytes()) - 0.5 * chains * was / stage.steps
+        if isinstance(stage, Tempering) and stage.rounds and stage.rounds.steps > 5:
+            assert len(kept[-1]) < 0.6 * len(checkpoint.to_bytes())  # nor are draws of rounds
         before = checkpoint
         again = fold.Job.from_bytes(stored_job)
         pieces = [fold.run(task) for task in fold.tasks(job, checkpoint)]
         others = [fold.run(task) for task in fold.tasks(again, stored)]
         assert same(tuple(pieces), tuple(others))
-        if not pieces:
+        if not pieces or seen.count(Walking) > 3:
             break
         assert same(fold.merge(again, stored, others), fold.merge(job, checkpoint, pieces))
         checkpoint = fold.merge(job, checkpoint, pieces)
