@@ -39,6 +39,7 @@ class Stream(enum.IntEnum):
     PARTS = 14
     """Which frames of many are judged together, and the draws of their ranges."""
     ROUNDS = 15
-    """Importance draws from maps that are fitted to populations, and to those before."""
+    """Importance draws from maps that are fitted to populations, and to those before; every step of
+    such rounds by its number."""
     CANDIDATES = 1000
     """Assessment of the models with and without optional terms, each by its number."""

@@ -3,7 +3,8 @@
 Members of a population at some temperature are draws of the posterior by weight, whose tail is
 smoothed by a Pareto law (Vehtari et al. 2024). Copies of a member say as much as one of them, so
 that the effective sample size counts each place once. Where the shape of the tail says that the
-weights cannot be trusted, or a few places are all there is, nothing stands.
+weights cannot be trusted, or a few places are all there is, nothing stands. Draws of rounds that go
+on stand before what these began at, where there are enough rounds and the populations agree.
 """
 
 import dataclasses
