@@ -1,0 +1,164 @@
+"""How draws of a posterior that takes its model for exact follow errors of flux and shadow.
+
+Some draws are taken, and each is followed linearly (`inference.identifiability.model_response`);
+where that bends, steps are repeated from fewer of them.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.density.collapsed import CollapsedDensity
+from inference.density.discrepant import DiscrepantDensity
+from inference.frame.blocks import DISPLACEMENT, RANGE
+from inference.frame.known_range import rates_of
+from inference.frame.warmth import gains_of
+from inference.identifiability.experiment import Experiment
+from inference.identifiability.model_response import (
+    ModelResponse,
+    common_pull,
+    curvature_of_response,
+    model_response,
+)
+from inference.posterior.job import Job
+
+__all__ = ["Responses", "chosen_draws", "responses_at"]
+
+Array = NDArray[np.float64]
+
+_REFERENCES = 100  # draws at which the response is computed
+_FRAMES = 20_000  # that this may cost
+_FEWEST = 20
+_STRAIGHT = 0.1  # share of the response that the next order adds, below which the first is all
+_THINNED = 4  # of them one is followed further
+# errors that are followed beyond the first order at draws: to tell whether that is of any size, and
+# of what size, which few far draws decide
+_TRIED, _MEASURED = 24, 200
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Responses:
+    """Responses of some draws to errors of flux and shadow.
+
+    Attributes
+    ----------
+    z, log_r : ndarray, shape (m, d) and (m, frames)
+        The draws; nan for a frame without object.
+    experiments : tuple of Experiment
+        The draws with the sizes of the errors.
+    each : tuple of ModelResponse
+        Their responses.
+    readings : ndarray, shape (frames, 2 or 4)
+        What they answer to.
+    curvature : float
+        What the next order would add to a response, as a share of it, root mean square over ranges
+        and draws; 0 where there is no such error.
+    repeated : bool
+        Whether steps were repeated until they settled, because the first one bends.
+    """
+
+    z: Array
+    log_r: Array
+    experiments: tuple[Experiment, ...]
+    each: tuple[ModelResponse, ...]
+    readings: Array
+    curvature: float
+    repeated: bool
+
+    @property
+    def by_z(self) -> Array:
+        """Change of z, and with each of k standard normal errors, shape (m, d, 1 + k)."""
+        shift = np.array([of.shift[0] for of in self.each])[:, :, None]
+        return self._beside(shift, np.array([of.parameters for of in self.each]))
+
+    @property
+    def by_log_r(self) -> Array:
+        """Change of log r likewise, shape (m, frames, 1 + k)."""
+        shift = np.array([of.shift[1] for of in self.each])[:, :, None]
+        return self._beside(shift, np.array([of.log_r for of in self.each]))
+
+    def _beside(self, shift: Array, moved: Array) -> Array:
+        stretch = np.hypot(1.0, min(self.curvature, 1.0))  # the next order makes nothing narrower
+        return np.concatenate([shift, stretch * moved], axis=2)
+
+
+def chosen_draws(count: int, frames: int) -> NDArray[np.intp]:
+    """Return which of so many draws are followed, evenly spread over them."""
+    most = int(np.clip(_FRAMES // max(frames, 1), _FEWEST, _REFERENCES))
+    return np.linspace(0, count - 1, min(most, count)).astype(np.intp)
+
+
+def responses_at(
+    job: Job, density: CollapsedDensity, z: Array, log_r: Array, rng: np.random.Generator
+) -> Responses:
+    """Follow draws.
+
+    Parameters
+    ----------
+    density : CollapsedDensity
+        Of which they are draws.
+    z : ndarray, shape (m, d)
+        Draws, as `chosen_draws` chooses them.
+    log_r : ndarray, shape (m, frames)
+        Their ranges; nan for a frame without object.
+
+    Returns
+    -------
+    Responses
+        Of all of these draws, or of every fourth where they bend.
+    """
+    error, rates = job.scene.model_error, rates_of(density.frames)
+    flux = 0.0 if error.integrated else error.flux
+    shadow = error.shadow if density.parameters.has_background else 0.0
+    experiments = [
+        Experiment(
+            density.sensor,
+            density.parameters,
+            z[i],
+            log_r[i],
+            gains_of(density.frames),
+            discrepancy=flux or None,
+            shadow=0.0 if isinstance(density, DiscrepantDensity) else shadow,
+            common_range=job.scene.motion == "static",
+            rates=rates,
+        )
+        for i in range(len(z))
+    ]
+    readings = density.frames[:, [0, 1] if rates is None else [0, 1, RANGE, DISPLACEMENT]]
+    each = [model_response(one, readings) for one in experiments]
+    erring = each[0].parameters.shape[1] > 0
+    curvature = _curvature(experiments, each, _TRIED, rng) if erring else 0.0
+    pull = common_pull(each)
+    further = erring and job.scene.motion != "static"
+    repeated = further and (curvature > _STRAIGHT or bool(pull.any()))
+    if repeated:
+        fewer = slice(None, None, _THINNED)
+        z, log_r, experiments = z[fewer], log_r[fewer], experiments[fewer]
+        each = [model_response(one, readings, pull) for one in experiments]
+        measured = int(np.clip(_FRAMES // max(log_r.shape[1], 1), len(experiments), _MEASURED))
+        curvature = _curvature(experiments, each, measured, rng)
+    return Responses(z, log_r, tuple(experiments), tuple(each), readings, curvature, repeated)
+
+
+def _curvature(
+    experiments: Sequence[Experiment],
+    responses: Sequence[ModelResponse],
+    tried: int,
+    rng: np.random.Generator,
+) -> float:
+    """Return the share of the response that the next order would add, by so many random errors."""
+    missed, size = 0.0, 0.0
+    for i in np.linspace(0, len(experiments) - 1, tried).astype(int):
+        of = responses[i]
+        normal = rng.standard_normal(of.log_r.shape[1])
+        present = np.isfinite(experiments[i].log_r)
+        if not present.any():
+            return 0.0
+        # what is wildly off counts as wholly off, and no more
+        moved = float(np.mean(np.square((of.log_r @ normal + of.shift[1])[present])))
+        off = curvature_of_response(experiments[i], of, normal)
+        missed += min(off**2, moved)
+        size += moved
+    return float(np.sqrt(missed / size)) if size > 0 else 0.0
