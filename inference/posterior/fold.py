@@ -31,8 +31,9 @@ from inference.posterior.progress import Progress
 from inference.posterior.sampling.ensemble import Ensemble
 from inference.posterior.sampling.population import Population
 from inference.posterior.selection.models import Candidate
-from inference.posterior.stages import selecting, tempering, walking
+from inference.posterior.stages import responding, selecting, tempering, walking
 from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.responding import RespondTask
 from inference.posterior.stages.selecting import AssessTask, sampled
 from inference.posterior.stages.setting_out import SetOutTask
 from inference.posterior.stages.stage import (
@@ -67,7 +68,7 @@ __all__ = [
     "tasks",
 ]
 
-Task = AssessTask | StartTask | TemperTask | SetOutTask | WalkTask
+Task = AssessTask | StartTask | TemperTask | SetOutTask | WalkTask | RespondTask
 Piece = Candidate | Checkpoint | Population | Ensemble
 P = TypeVar("P")
 
@@ -107,10 +108,10 @@ def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float = 0.0) -> tuple[Task, .
             return (StartTask(sampled(job, checkpoint), stage),)
         case Tempering() as stage:
             return tempering.tasks(sampled(job, checkpoint), stage)
-        case Walking() as stage:
+        case Walking() as stage if not stage.finished:
             return walking.tasks(sampled(job, checkpoint), stage)
-        case Weighted() | Settled():
-            return ()
+        case Walking() | Weighted() | Settled():
+            return responding.tasks(job, checkpoint)
 
 
 @one_thread()
@@ -157,23 +158,27 @@ def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoi
             carried = _all(Population, pieces)
             after, used = tempering.merge(sampled(job, checkpoint), stage, carried)
             return dataclasses.replace(checkpoint, stage=after, calls=calls + used)
-        case Walking() as stage:
+        case Walking() as stage if not stage.finished:
             ensembles = _all(Ensemble, pieces)
             after, used = walking.merge(sampled(job, checkpoint), stage, ensembles)
             return dataclasses.replace(checkpoint, stage=after, calls=calls + used)
-        case Weighted() | Settled():
-            raise ValueError("the job is finished: there is nothing to take in")
+        case Walking() | Weighted() | Settled():
+            if not responding.tasks(job, checkpoint):
+                raise ValueError("the job is finished: there is nothing to take in")
+            return _after(checkpoint, pieces)
 
 
 def _after(checkpoint: Checkpoint, pieces: Sequence[object]) -> Checkpoint:
     """Return where a task that decides on the next stage has come to."""
     (reached,) = _all(Checkpoint, pieces)
-    return dataclasses.replace(
+    after = dataclasses.replace(
         reached,
         calls=checkpoint.calls + reached.calls,
         selection=checkpoint.selection,
         integrated=checkpoint.integrated or reached.integrated,
+        exact=reached.exact or checkpoint.exact,
     )
+    return responding.decided(after)
 
 
 def _all(kind: type[P], pieces: Sequence[object]) -> tuple[P, ...]:

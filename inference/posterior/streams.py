@@ -41,5 +41,7 @@ class Stream(enum.IntEnum):
     ROUNDS = 15
     """Importance draws from maps that are fitted to populations, and to those before; every step of
     such rounds by its number."""
+    RESPONSE = 16
+    """Draws at which the response to errors of the model is looked at, and what moves them."""
     CANDIDATES = 1000
     """Assessment of the models with and without optional terms, each by its number."""

@@ -99,7 +99,9 @@ def _judged(drawn: "_Drawn", whole: Whole) -> tuple[Identifiability, ...]:
         common_range=static,
         rates=rates_of(density.frames),
     )
-    rows = with_model_part(rows, whole.scale_error, whole.spread.scale, whole.budget.curvature)
+    shares = dict(zip(density.parameters.names, whole.budget.of_z.model.tolist(), strict=True))
+    scale = whole.scale_error, whole.spread.scale
+    rows = with_model_part(rows, *scale, whole.budget.curvature, shares)
     rows = mark_sensitive(density.parameters.names, rows, whole.sensitivity)
     rows = mark_dark(density, rows, chosen, log_r)
     optima = optima_of(drawn.stage)
@@ -138,6 +140,7 @@ class _Drawn:
 
 def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
     """Draw what the answer of a job is made of: the one place where its stream is begun."""
+    checkpoint = checkpoint.answering
     job, stage, calls = sampled(job, checkpoint), checkpoint.stage, checkpoint.calls
     if isinstance(stage, Selecting | Starting):  # there was no time for more
         # of the choices the last keeps all optional terms
@@ -182,7 +185,7 @@ def draw(job: Job, checkpoint: Checkpoint) -> tuple[Job, Draws]:
 
 def _out_of_time(job: Job, checkpoint: Checkpoint, cpu_s: float) -> tuple[str, ...]:
     limit = job.settings.max_seconds
-    if cpu_s < limit or checkpoint.stage.progress(job.settings.target_ess).finished:
+    if cpu_s < limit or checkpoint.answering.stage.progress(job.settings.target_ess).finished:
         return ()
     return (f"stopped at the time limit of {limit:g} s",)
 

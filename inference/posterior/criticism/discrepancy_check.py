@@ -13,6 +13,7 @@ at most.
 
 import dataclasses
 import math
+from collections.abc import Mapping
 
 import numpy as np
 import scipy
@@ -31,6 +32,7 @@ __all__ = [
     "MISFIT",
     "LargerDiscrepancy",
     "beside_shadow",
+    "is_bent",
     "judge_fit",
     "larger_discrepancy",
     "with_model_part",
@@ -42,7 +44,7 @@ _FACTOR = 2.0
 _COUNT = 0.3  # of the draws, that an effective size has to reach
 _FURTHER = 2.0  # times as far as weights move means, beyond which nothing is continued
 MISFIT = 1e3  # Bayes factor: a false-alarm rate of at most 1e-3
-_BENT = 0.5  # share of a linear response that the next order adds, above which it is no guide
+_BENT = 0.3  # share of a linear response that the next order adds, above which it is no guide
 _MOST = 0.5  # of the uncertainty, above which that matters
 
 
@@ -149,8 +151,25 @@ def judge_fit(fit: Fit, larger: LargerDiscrepancy) -> Fit:
     return dataclasses.replace(fit, misfit=True, reasons=(*fit.reasons, reason))
 
 
+def is_bent(model: float, whole: float, curvature: float) -> bool:
+    """Tell whether the response to errors of the model is not linear, and most of what is unknown.
+
+    Parameters
+    ----------
+    model, whole : float
+        Standard deviations of the mean of log r: from the model's errors, and from everything.
+    curvature : float
+        What the next order would add to the response to them, as a share of it.
+    """
+    return curvature > _BENT and model > _MOST * whole
+
+
 def with_model_part(
-    rows: tuple[Identifiability, ...], model: float, whole: float, curvature: float
+    rows: tuple[Identifiability, ...],
+    model: float,
+    whole: float,
+    curvature: float,
+    shares: Mapping[str, float],
 ) -> tuple[Identifiability, ...]:
     """Say how much of the common scale's uncertainty is the model's, and whether it is known.
 
@@ -162,29 +181,30 @@ def with_model_part(
         Standard deviations of the mean of log r: from the model's errors, and from everything.
     curvature : float
         What the next order would add to the response to them, as a share of it.
+    shares : mapping of str to float
+        The model's part of the standard deviation of each unknown.
 
     Returns
     -------
     tuple of Identifiability
-        The same rows, but that of ``range_m``: with the figure, and `weak` at best where the
-        response is not linear and most of the uncertainty.
+        The same rows, that of ``range_m`` with the figure. Where the response is not linear and
+        most of the uncertainty, it is `weak` at best, and so are unknowns of whose uncertainty it
+        is most.
     """
     if not model > 0:
         return rows
-    text = f"; model error: +-{100 * model:.2g} %"
-    bent = curvature > _BENT and model > _MOST * whole
-    if bent:
-        text += (
-            f", by a linear response that the next order changes by {100 * curvature:.0f} % of "
-            "itself: state `discrepancy` as a number, and the error is integrated out in full"
-        )
-    return tuple(
-        dataclasses.replace(
-            row,
-            status="weak" if bent and row.status == "identified" else row.status,
-            reason=row.reason + text,
-        )
-        if row.parameter == "range_m"
-        else row
-        for row in rows
+    text, bent = f"; model error: +-{100 * model:.2g} %", is_bent(model, whole, curvature)
+    further = (
+        f"by a linear response that the next order changes by {100 * curvature:.0f} % of itself: "
+        "state `discrepancy` as a number, and the error is integrated out in full"
     )
+    found = []
+    for row in rows:
+        scale = row.parameter == "range_m"
+        said = row.reason + text if scale else row.reason
+        most = bent and (scale or shares.get(row.parameter, 0.0) > _MOST)
+        if most:
+            said += f", {further}" if scale else f"; most of that is the model's error, {further}"
+        status = "weak" if most and row.status == "identified" else row.status
+        found.append(dataclasses.replace(row, status=status, reason=said))
+    return tuple(found)

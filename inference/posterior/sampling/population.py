@@ -22,7 +22,7 @@ from inference.posterior.sampling.effort import Effort, Move
 from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.transport import TriangularMap, fit_map, straight_map
 
-__all__ = ["Population", "carried", "first_population", "temper"]
+__all__ = ["Population", "arrived_at", "carried", "first_population", "temper"]
 
 Array = NDArray[np.float64]
 
@@ -63,6 +63,11 @@ class Population:
     def ended(self) -> bool:
         """Whether it is at the posterior, or died on the way."""
         return self.power == 1.0 or len(self.z) == 0
+
+
+def arrived_at(z: Array) -> Population:
+    """Return points that stand for a population which has come to the posterior."""
+    return Population(z, np.zeros(len(z)), np.zeros(len(z)), 1.0, 0.0, 0, 0)
 
 
 def first_population(

@@ -14,7 +14,7 @@ from inference.posterior.archive import (
     unpack_parts,
 )
 from inference.posterior.selection.selection import Selection
-from inference.posterior.stages.stage import Settled, Stage, Weighted
+from inference.posterior.stages.stage import Drawing, Settled, Stage, Weighted
 
 __all__ = ["Checkpoint"]
 
@@ -35,7 +35,12 @@ class Checkpoint:
         Frames that are sampled in the name of all; None where all are.
     integrated : bool
         Whether errors of the flux are integrated out in full though the scene does not ask for
-        that: which optimum is the best depends on them.
+        that: which optimum is the best depends on them, or linear response to them bends.
+    exact : Drawing or None
+        What the exact model came to, while errors are integrated out because linear response
+        around it bends: the answer until that is done.
+    linear : bool
+        Whether linear response was looked at, and stands.
     """
 
     stage: Stage
@@ -43,6 +48,15 @@ class Checkpoint:
     selection: Selection | None = None
     representatives: Representatives | None = None
     integrated: bool = False
+    exact: Drawing | None = None
+    linear: bool = False
+
+    @property
+    def answering(self) -> "Checkpoint":
+        """The checkpoint that an answer is made of."""
+        if self.exact is None:
+            return self
+        return dataclasses.replace(self, stage=self.exact, exact=None, integrated=False)
 
     @property
     def method(self) -> str:

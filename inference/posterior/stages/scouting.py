@@ -17,7 +17,7 @@ from inference.posterior.sampling.aliases import aliases_of
 from inference.posterior.sampling.effort import scouts
 from inference.posterior.sampling.ensemble import WALKERS
 from inference.posterior.sampling.importance import WeightedDraws
-from inference.posterior.sampling.population import Population, first_population, temper
+from inference.posterior.sampling.population import arrived_at, first_population, temper
 from inference.posterior.sampling.proposal import Proposal
 from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.verdict import Verdict
@@ -101,8 +101,5 @@ def from_scouts(
         return Tempering(proposal, (None,) * POPULATIONS, pending, known, reach=_HALFWAY)
     if not (cheap and len(stood.hot) > stood.hot.shape[1]):
         return None
-    arrived = tuple(
-        Population(z, np.zeros(len(z)), np.zeros(len(z)), 1.0, 0.0, 0, 0)
-        for z in (stood.z, stood.hot)
-    )
+    arrived = arrived_at(stood.z), arrived_at(stood.hot)
     return Tempering(proposal, arrived, pending, known, scouted=True)

@@ -122,16 +122,26 @@ def test_a_few_draws_in_the_tail_do_not_decide(unit: float) -> None:
 
 def test_the_model_error_is_a_number_and_small_ones_take_no_status_away() -> None:
     """Issue 12.7: a scale known to 0.03 % that the model's error moves by as much."""
-    small = with_model_part(ROWS, model=3e-4, whole=4e-4, curvature=0.0)
+    small = with_model_part(ROWS, 3e-4, 4e-4, 0.0, {"object.c2": 0.9})
     assert small[0] == ROWS[0]
     assert small[1].status == "identified"
     assert small[1].reason.endswith("model error: +-0.03 %")
-    bent = with_model_part(ROWS, model=0.03, whole=0.04, curvature=0.7)
-    assert bent[1].status == "weak"
-    assert "state `discrepancy` as a number" in bent[1].reason
-    # it matters only where the model's part does
-    assert with_model_part(ROWS, model=0.01, whole=0.04, curvature=0.7)[1].status == "identified"
-    assert with_model_part(ROWS, model=0.0, whole=0.04, curvature=0.0) == ROWS
+    assert with_model_part(ROWS, 0.0, 0.04, 0.0, {}) == ROWS
+
+
+def test_what_is_mostly_told_by_a_bent_response_is_weak() -> None:
+    """The scale, and such unknowns as owe most of their uncertainty to it."""
+    rows = tuple(dataclasses.replace(row, status="identified") for row in ROWS)
+    bent = with_model_part(rows, 0.03, 0.04, 0.4, {"object.c2": 0.6})
+    assert [row.status for row in bent] == ["weak", "weak"]
+    assert all("changes by 40 % of itself: state `discrepancy`" in row.reason for row in bent)
+    own = with_model_part(rows, 0.03, 0.04, 0.4, {"object.c2": 0.4})
+    assert own[0] == rows[0]
+    # it matters only where the model's part does, and nothing becomes better by it
+    assert with_model_part(rows, 0.01, 0.04, 0.7, {"object.c2": 0.6})[0] == rows[0]
+    lost = tuple(dataclasses.replace(row, status="not_identified") for row in ROWS)
+    still = with_model_part(lost, 0.03, 0.04, 0.4, {"object.c2": 0.6})
+    assert [row.status for row in still] == ["not_identified"] * 2
 
 
 def test_a_misfit_that_was_seen_stays() -> None:
