@@ -125,4 +125,6 @@ def _adapted(job: Job, stage: Walking, kept: Chains) -> Tempering | Walking:
     transport = fit_map(pilot, coordinates_of(job.density()))
     new = dataclasses.replace(old, transport=transport, share=MAP_SHARE)
     restarted = tuple(restart(ensemble, old, new) for ensemble in stage.ensembles)
-    return Walking(new, restarted, pending, stage.adaptations + 1)
+    # an answer until they walk anew, and what they are held to
+    known = stage.weighted
+    return Walking(new, restarted, pending, stage.adaptations + 1, weighted=known)
