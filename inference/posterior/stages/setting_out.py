@@ -41,6 +41,7 @@ _MOST_DRAWS = (12_000, 40_000)  # but so many at least, and at most
 SCOUTED_DRAWS = 20_000  # that rounds from scouts may take: as many as carry one population
 HALFWAY_DRAWS = 40_000  # and those from small populations, twice: as many as carry these
 _LEADING = 50.0  # effective size of draws, from which on rounds may begin again at them
+_ERRING = 4  # number of the streams of rounds with errors of the model integrated out, the first
 TOLERATED = 0.01  # of what scouts met on their way from the prior, beyond every weight
 
 
@@ -92,8 +93,9 @@ class SetOutTask:
 
     def _stream(self, steps: int) -> np.random.Generator:
         """Return the stream of a step: rounds that a job begins in turn have their own."""
-        stage = self.stage
+        stage, erring = self.stage, self.job.scene.model_error.integrated
         which = 0 if stage.scouted else 1 + stage.tried if stage.early else 3
+        which += _ERRING if erring else 0  # they may follow those of an exact model
         return self.job.stream(Stream.ROUNDS, which, steps)
 
 
