@@ -31,6 +31,7 @@ from inference.posterior.answer.where_bent import best_ends, where_bent
 from inference.posterior.answer.where_known import where_known
 from inference.posterior.criticism.discrepancy_check import LargerDiscrepancy
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
+from inference.posterior.criticism.size_prior import WiderPrior
 from inference.posterior.job import Job
 from simulator.discrepancy import discrepancy_basis
 
@@ -50,11 +51,19 @@ class ErrorBudget(Moves):
     curvature : float
         What the next order would add to the response to the errors of flux and shadow, as a share
         of it, root mean square over ranges and draws; 0 where the flux's was integrated out.
+    of_scene : int
+        How many of the errors, the last, are what rests on priors of the scene.
     """
 
     of_z: ErrorParts
     of_log_r: ErrorParts
     curvature: float
+    of_scene: int
+
+    @property
+    def model(self) -> slice:
+        """Which of the errors are the model's, the constant apart."""
+        return slice(1, -self.of_scene or None)
 
 
 def error_budget(
@@ -64,6 +73,7 @@ def error_budget(
     log_r: Array,
     larger: LargerDiscrepancy | None,
     sensitivity: PriorSensitivity | None,
+    wider: WiderPrior | None,
     rng: np.random.Generator,
 ) -> ErrorBudget:
     """Compute the response to the model's errors at draws, and the parts of their spread.
@@ -79,6 +89,8 @@ def error_budget(
     sensitivity : PriorSensitivity or None
         Where the answer rests on the law of the ranges: what the reference prior would change, as
         the last of the errors.
+    wider : WiderPrior or None
+        Where nothing is said of the object's size: what a wider prior of it would change.
     """
     error, rates = job.scene.model_error, rates_of(density.frames)
     shadow = error.shadow if density.parameters.has_background else 0.0
@@ -112,10 +124,14 @@ def error_budget(
         for by, moved in zip((by_z, by_log_r), follow, strict=True):
             by[0] = by[0] + moved[:, :, :1]
             by.append(moved[:, :, 1:])
+    if wider is not None:
+        by_z.append(np.broadcast_to(wider.of_z, (*at.shape, 2)))
+        by_log_r.append(np.broadcast_to(wider.of_log_r, (*ranges.shape, 2)))
     if sensitivity is not None:
         by_z.append(np.broadcast_to(sensitivity.of_z[:, None], (*at.shape, 1)))
         moved = np.broadcast_to(sensitivity.of_log_r[:, None], (*ranges.shape, 1))
         by_log_r.append(moved)
+    of_scene = (0 if wider is None else 2) + (0 if sensitivity is None else 1)
     of_z, of_log_r = np.concatenate(by_z, axis=2), np.concatenate(by_log_r, axis=2)
     return ErrorBudget(
         at,
@@ -128,9 +144,10 @@ def error_budget(
             responses,
             (of_z, of_log_r),
             integrated=larger is not None,
-            leaning=sensitivity is not None,
+            of_scene=of_scene,
         ),
         found.curvature,
+        of_scene,
     )
 
 

@@ -20,7 +20,7 @@ def error_shares(
     moved: tuple[Array, Array],
     *,
     integrated: bool,
-    leaning: bool,
+    of_scene: int,
 ) -> tuple[ErrorParts, ErrorParts]:
     """Divide the variance of draws of z and of log r into what it comes of.
 
@@ -34,8 +34,8 @@ def error_shares(
         By what errors move those.
     integrated : bool
         Whether the draws have the error of the flux already.
-    leaning : bool
-        Whether the last of the errors is what rests on the law of the ranges; it is the scene's.
+    of_scene : int
+        How many of the errors, the last, are what rests on priors of the scene.
 
     Returns
     -------
@@ -46,14 +46,14 @@ def error_shares(
         name: np.mean(np.square([getattr(each, name) for each in responses]), axis=0)
         for name in ("own", "alone", "shared", "sd")
     }
-    last = -1 if leaning else None
+    last = -of_scene or None
     found = []
     for values, own, shared, part in (
         (z, mean["alone"], mean["sd"] - mean["alone"], moved[0]),
         (log_r, mean["own"], mean["shared"], moved[1]),
     ):
         added = np.square(part[:, :, 1:last]).sum(axis=2).mean(axis=0)
-        of_law = np.square(part[:, :, last:]).sum(axis=2).mean(axis=0) if leaning else 0.0
+        of_law = np.square(part[:, :, last:]).sum(axis=2).mean(axis=0) if of_scene else 0.0
         variance = values.var(axis=0)
         first = np.fmin(own, variance)
         scene = variance - first

@@ -18,6 +18,7 @@ from inference.posterior.criticism.prior_sensitivity import (
     leaning,
     prior_sensitivity,
 )
+from inference.posterior.criticism.size_prior import wider_prior
 from inference.posterior.job import Job
 from inference.posterior.sample import Sample
 from inference.posterior.streams import Stream
@@ -68,9 +69,7 @@ class Whole:
         present = np.isfinite(self.log_r[0])
         if not present.any():
             return 0.0
-        # the law of the ranges is the last of the errors, and none of the model's
-        last = None if leaning(self.sensitivity) is None else -1
-        mean = self.budget.by_log_r[:, present, 1:last].mean(axis=1)
+        mean = self.budget.by_log_r[:, present, self.budget.model].mean(axis=1)
         return float(np.sqrt(np.square(mean).sum(axis=1).mean()))
 
 
@@ -105,7 +104,8 @@ def with_model_error(
     if bias is not None and leaning(sensitivity) is None:
         sensitivity = following(bias, chosen, log_r)
     owed = leaning(sensitivity)
-    budget = error_budget(job, density, chosen, log_r, larger, owed, rng)
+    wider = wider_prior(job.scene, density.parameters.names, chosen, log_r)
+    budget = error_budget(job, density, chosen, log_r, larger, owed, wider, rng)
     errors = budget.errors(m, rng)
     z = budget.moved(sample.flat, budget.errors(len(sample.flat), rng)).reshape(sample.z.shape)
     z[:, :, draws.thinned] = budget.moved(chosen, errors).reshape(thinned.shape)
@@ -122,12 +122,11 @@ def with_model_error(
         reported = density.parameters.natural(budget.moved(each, budget.errors(len(each), rng)))
     present = np.isfinite(moved[0])
     scale = float(moved[:, present].mean(axis=1).std()) if present.any() else math.nan
+    widened = owed is not None or wider is not None
     return Whole(
         chosen,
         log_r,
-        dataclasses.replace(
-            draws, parameters=parameters, range_m=range_m, widened=owed is not None
-        ),
+        dataclasses.replace(draws, parameters=parameters, range_m=range_m, widened=widened),
         reported,
         Spread(density.parameters.marginal(flat).std(axis=0), scale),
         budget,

@@ -6,9 +6,8 @@ weight is the Bayes factor of the larger size against the stated one. Under the 
 exceeds b with a probability of at most 1/b, whatever the scene (Markov's inequality).
 
 The larger size reaches further than the draws do, and of plain weights a few in the tail are often
-all: answers of one posterior by other seeds were then half as wide again. So means are moved by
-weights to a power at which enough draws count, and that is continued in proportion, twice as far
-at most.
+all: answers of one posterior by other seeds were then half as wide again. So weights are flattened
+(`inference.posterior.criticism.flattened`).
 """
 
 import dataclasses
@@ -27,6 +26,7 @@ from inference.identifiability.response_rows import ResponseRows
 from inference.identifiability.status import Identifiability
 from inference.posterior.answer.fit import Fit
 from inference.posterior.criticism.best_point import BestPoint
+from inference.posterior.criticism.flattened import flattened
 
 __all__ = [
     "MISFIT",
@@ -41,8 +41,6 @@ __all__ = [
 Array = NDArray[np.float64]
 
 _FACTOR = 2.0
-_COUNT = 0.3  # of the draws, that an effective size has to reach
-_FURTHER = 2.0  # times as far as weights move means, beyond which nothing is continued
 MISFIT = 1e3  # Bayes factor: a false-alarm rate of at most 1e-3
 _BENT = 0.3  # share of a linear response that the next order adds, above which it is no guide
 _MOST = 0.5  # of the uncertainty, above which that matters
@@ -90,27 +88,8 @@ def larger_discrepancy(density: DiscrepantDensity, z: Array, log_r: Array) -> La
     factor = float(np.exp(min(scipy.special.logsumexp(gain) - np.log(len(z)), 700.0)))
     if not np.isfinite(gain).any():
         return LargerDiscrepancy(factor, np.zeros(z.shape[1]), np.zeros(log_r.shape[1]))
-    power = _power(gain)
-    weights = scipy.special.softmax(power * gain)
-    ranges = np.where(np.isfinite(log_r), log_r, 0.0)
-    further = min(1.0 / power, _FURTHER)
-    moved = (weights @ each - each.mean(axis=0) for each in (z, ranges))
-    return LargerDiscrepancy(factor, *(np.asarray(further * by) for by in moved))
-
-
-def _power(gain: Array) -> float:
-    """Return the largest power of weights, at most one, at which enough draws count."""
-    finite = gain[np.isfinite(gain)]
-    spread = float(np.ptp(finite))
-
-    def surplus(reach: float) -> float:
-        weights = scipy.special.softmax(reach / spread * finite)
-        return float(1.0 / np.sum(weights**2)) - _COUNT * len(finite)
-
-    # weights within a factor e of one another count for nine tenths
-    if spread <= 1.0 or surplus(spread) >= 0:
-        return 1.0
-    return float(scipy.optimize.brentq(surplus, 1.0, spread)) / spread
+    by, ranges = flattened(gain), np.where(np.isfinite(log_r), log_r, 0.0)
+    return LargerDiscrepancy(factor, by.moved(z), by.moved(ranges))
 
 
 def beside_shadow(larger: LargerDiscrepancy, at: BestPoint) -> LargerDiscrepancy:
