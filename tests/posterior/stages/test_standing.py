@@ -1,5 +1,7 @@
 """What stands as an answer before any ensemble has walked."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy import special, stats
@@ -12,6 +14,7 @@ from inference.posterior.sampling.proposal import Mixture, Proposal
 from inference.posterior.sampling.rounds_so_far import RoundsSoFar, Wanted
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages import walking
 from inference.posterior.stages.stage import Starting, Tempering, Walking, Weighted
 from inference.posterior.stages.standing import _weighted, standing
 from inference.posterior.stages.starting import begin
@@ -43,6 +46,23 @@ def test_stopped_before_the_first_chunk_the_weighted_draws_answer() -> None:
         assert first.parameters[name].q05 == pytest.approx(row.q05, abs=0.5 * row.sd)
         assert first.parameters[name].q95 == pytest.approx(row.q95, abs=0.5 * row.sd)
     assert np.all(np.abs(first.range_m.q50 - last.range_m.q50) < 0.5 * last.range_m.sd)
+
+
+def test_weighted_draws_stand_while_a_proposal_is_adapted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was walked is forgotten then; that there was an answer is not."""
+    settings = SamplerSettings(method="emcee", seed=7)
+    job = fold.prepare(*example("pulsed", crosstalk=False), settings)
+    stage = begin(job, Starting()).stage
+    assert isinstance(stage, Walking)
+    assert stage.weighted is not None
+    monkeypatch.setattr(walking, "is_slow", lambda *_: True)
+    adapted = dataclasses.replace(stage, adaptations=2)
+    pieces = [task.run() for task in walking.tasks(job, adapted)]
+    after, _ = walking.merge(job, adapted, pieces)
+    assert isinstance(after, Walking)
+    assert after.steps == 0
+    assert after.weighted is stage.weighted
+    assert isinstance(standing(after), Weighted)
 
 
 def test_members_at_some_power_are_draws_of_the_posterior_by_weight() -> None:
