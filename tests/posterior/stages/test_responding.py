@@ -8,6 +8,7 @@ object.c2 was 6.5 standard deviations off and `identified`, and none of 21 range
 import dataclasses
 import functools
 
+import numpy as np
 import pytest
 
 from benchmarks.coverage.paths import PathSet
@@ -69,6 +70,11 @@ def test_a_bent_response_is_followed_by_rounds_from_the_moved_draws() -> None:
     assert begun.exact is _exact().stage
     assert isinstance(begun.stage, Tempering)
     assert begun.stage.scouted
+    exact, (members,) = _exact().stage, begun.stage.populations
+    assert isinstance(exact, Weighted)
+    assert members is not None
+    spread = exact.draws.weights @ (exact.draws.z - exact.draws.weights @ exact.draws.z) ** 2
+    assert np.all(members.z.var(axis=0) > 4 * spread)  # the errors are most of what is not known
     (task, *_) = fold.tasks(_job(), begun)
     assert isinstance(task, SetOutTask)
     assert task.job.scene.model_error.integrated
