@@ -15,8 +15,9 @@ and points from the prior do not contradict them, they are the answer with the m
 ensembles walk at once with `emcee`. Where not, rounds of weighted draws follow from the points from
 the prior, and where these do not do from populations that are carried from the prior to the
 posterior. Such draws are the answer with `auto`, where the points or populations agree with them;
-otherwise ensembles walk in the last map's coordinates. What each stage does is in
-`inference.posterior.stages`.
+otherwise ensembles walk in the last map's coordinates. Where linear response to the model's errors
+bends around such draws, rounds follow from where it moves them, with the errors integrated out.
+What each stage does is in `inference.posterior.stages`.
 """
 
 import dataclasses

@@ -32,7 +32,7 @@ def test_a_wide_branch_is_not_taken_for_all_where_errors_of_a_shadow_lead_to_ano
     density, rng = job.density(), np.random.default_rng(1)
     draws = np.repeat(DRAWS, 4, axis=0)  # of which climbs begin at every fourth
     log_r = density.best_ranges(draws)[:, :, 0]
-    budget = error_budget(job, density, draws, log_r, None, None, rng)
+    budget = error_budget(job, density, draws, log_r, None, None, None, rng)
     off = np.abs(np.median(log_r, axis=0) + budget.by_log_r[0, :, 0] - np.log(given.truth))
     sd = np.sqrt(np.square(budget.by_log_r[0, :, 1:]).sum(axis=1) + log_r.var(axis=0))
     assert np.median(off) > 0.1

@@ -91,7 +91,13 @@ def chosen_draws(count: int, frames: int) -> NDArray[np.intp]:
 
 
 def responses_at(
-    job: Job, density: CollapsedDensity, z: Array, log_r: Array, rng: np.random.Generator
+    job: Job,
+    density: CollapsedDensity,
+    z: Array,
+    log_r: Array,
+    rng: np.random.Generator,
+    *,
+    shadow: bool = True,
 ) -> Responses:
     """Follow draws.
 
@@ -103,6 +109,8 @@ def responses_at(
         Draws, as `chosen_draws` chooses them.
     log_r : ndarray, shape (m, frames)
         Their ranges; nan for a frame without object.
+    shadow : bool
+        Whether errors of a shadow are among them.
 
     Returns
     -------
@@ -111,7 +119,8 @@ def responses_at(
     """
     error, rates = job.scene.model_error, rates_of(density.frames)
     flux = 0.0 if error.integrated else error.flux
-    shadow = error.shadow if density.parameters.has_background else 0.0
+    shadow = shadow and density.parameters.has_background
+    shadow = shadow and not isinstance(density, DiscrepantDensity)
     experiments = [
         Experiment(
             density.sensor,
@@ -120,7 +129,7 @@ def responses_at(
             log_r[i],
             gains_of(density.frames),
             discrepancy=flux or None,
-            shadow=0.0 if isinstance(density, DiscrepantDensity) else shadow,
+            shadow=error.shadow if shadow else 0.0,
             common_range=job.scene.motion == "static",
             rates=rates,
         )

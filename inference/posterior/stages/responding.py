@@ -3,7 +3,8 @@
 Draws of an exact model are moved by its errors along straight lines. Where the next order would
 change that by much, and it is most of what the answer does not know, the error of the flux is
 integrated out in full: rounds of importance draws begin at the moved draws. Where these do not come
-to draws that can be trusted, what the exact model came to remains the answer, and says so.
+to draws that can be trusted, or the errors are mostly those of a shadow, what the exact model came
+to remains the answer, and says so.
 """
 
 import dataclasses
@@ -40,6 +41,7 @@ __all__ = ["RespondTask", "decided", "tasks"]
 Array = NDArray[np.float64]
 
 _MEMBERS = 400  # draws that are moved
+_OF_FLUX = 0.6  # of what all errors move the scale by, that those of the flux move it by alone
 _CLIMBS = 2  # from the best of them
 
 
@@ -69,8 +71,13 @@ class RespondTask:
         if not np.isfinite(log_r[0]).any():
             return stands
         found = responses_at(job, density, chosen, log_r, rng)
-        if not is_bent(*_scale(found, log_r), found.curvature):
+        model, whole = _scale(found, log_r)
+        if not is_bent(model, whole, found.curvature):
             return stands
+        if found.experiments[0].shadow > 0:  # which is not integrated out
+            alone = responses_at(job, density, chosen, log_r, rng, shadow=False)
+            if _scale(alone, log_r)[0] < _OF_FLUX * model:
+                return stands
         if isinstance(self.stage, Settled):
             return Checkpoint(Starting(), 0, integrated=True)
         erring = job.with_error_integrated().density()

@@ -8,7 +8,8 @@
                            +-> Walking -> (Tempering -> Weighted or Walking)
 
 A job without optional terms begins with `Starting`. Ensembles that hardly move call for
-populations, once.
+populations, once. Where errors of the model are integrated out behind an exact model, `Tempering`
+follows once more, on its moved draws, and the checkpoint keeps what the exact model came to.
 """
 
 import dataclasses

@@ -16,6 +16,7 @@ from benchmarks.random_sets.sets import random_set
 from inference.posterior import fold
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages import responding
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.responding import RespondTask, decided, tasks
 from inference.posterior.stages.setting_out import SetOutTask
@@ -158,6 +159,16 @@ def test_what_is_straight_stays_as_it_is() -> None:
     assert after.linear
     assert after.stage is checkpoint.stage
     assert fold.tasks(job, after) == ()
+
+
+def test_errors_of_a_shadow_are_no_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is integrated out is the flux's error: it has to be what the scale owes most to."""
+    (task,) = fold.tasks(_job(), _exact())
+    monkeypatch.setattr(responding, "_OF_FLUX", 1.1)
+    stands = fold.run(task)
+    assert isinstance(stands, Checkpoint)
+    assert stands.linear
+    assert stands.stage is _exact().stage
 
 
 def test_a_thin_sheet_is_answered_right() -> None:
