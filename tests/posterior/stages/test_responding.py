@@ -1,7 +1,8 @@
 """Whether linear response to the model's errors stands, and what follows where it does not.
 
 Two sets of the random study. 34 is an unknown object before unknown crosstalk: quick, and bent. Of
-82 the exact model's draws are a thin sheet: by linear response around them object.c2 was 6.5 standard deviations off and `identified`, and none of 21 ranges was held.
+82 the exact model's draws are a thin sheet: by linear response around them object.c2 was 6.5
+standard deviations off and `identified`, and none of 21 ranges was held.
 """
 
 import dataclasses
