@@ -170,9 +170,17 @@ class CollapsedDensity:
             out[good] = self.frame_log_likelihoods(z[good])
         return out
 
-    def _with_flux_errors(self, rows: Rows, z: Array, rng: np.random.Generator) -> Rows:  # noqa: ARG002
-        """Draw what multiplies the object's flux given each z: here nothing."""
-        return rows
+    def _with_flux_errors(
+        self,
+        rows: Rows,
+        z: Array,  # noqa: ARG002
+        rng: np.random.Generator,  # noqa: ARG002
+    ) -> tuple[Rows, Array | None]:
+        """Draw what multiplies the object's flux given each z: here nothing.
+
+        Beside it shares of the log likelihood, shape (n, frames), where they are found on the way.
+        """
+        return rows, None
 
     def draw_log_ranges(self, z: Array, rng: np.random.Generator) -> Array:
         """Draw the range of every frame given each parameter vector.
@@ -191,6 +199,11 @@ class CollapsedDensity:
         """
         return self.common(self._draw_blocks(z, rng)[0])
 
+    def draw_with_likelihoods(self, z: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Draw ranges as `draw_log_ranges`; beside them `frame_log_likelihoods` of z."""
+        log_r, _, known = self._draw_blocks(z, rng)
+        return self.common(log_r), self.frame_log_likelihoods(z) if known is None else known
+
     def unfinished_integrals(self, z: Array, rng: np.random.Generator) -> int:
         """Count the integrals over ranges that did not settle: density and draws are wrong there.
 
@@ -208,15 +221,18 @@ class CollapsedDensity:
         """
         return int(np.count_nonzero(self._draw_blocks(z, rng)[1]))
 
-    def _draw_blocks(self, z: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Draw log r of every block, and count what did not settle, each of shape (n, blocks)."""
+    def _draw_blocks(self, z: Array, rng: np.random.Generator) -> tuple[Array, Array, Array | None]:
+        """Draw log r of every block, and count what did not settle, each of shape (n, blocks).
+
+        Beside them shares of the log likelihood as `_with_flux_errors`.
+        """
         terms = self.parameters.terms(z)
-        rows = self._with_flux_errors(self.integral_rows(terms), z, rng)
+        rows, known = self._with_flux_errors(self.integral_rows(terms), z, rng)
         out, unfinished = np.empty((2, len(z), self.data.blocks))
         uniforms = rng.random((*out.shape, 2))
         for k, each, data in pieces(self, terms, rows):
             fill_range_draws(out[k], unfinished[k], uniforms[k], each, data, self.instrument)
-        return out, unfinished
+        return out, unfinished, known
 
     def best_ranges(self, z: Array) -> Array:
         """Find each frame's best range for given parameters.

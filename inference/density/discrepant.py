@@ -55,7 +55,7 @@ class DiscrepantDensity(CollapsedDensity):
         integrate_flux_error(out, *work, rows, data, self.instrument, self.functions)
         return out
 
-    def expansions(self, z: Array) -> tuple[Array, Array]:
+    def expansions(self, z: Array) -> tuple[Array, Array, Array]:
         """Return the error's coefficients given each z: what of them is known.
 
         Parameters
@@ -65,9 +65,9 @@ class DiscrepantDensity(CollapsedDensity):
 
         Returns
         -------
-        (ndarray, ndarray)
-            Means, shape (n, functions), and upper triangular factors R of the precisions R^T R,
-            shape (n, functions, functions).
+        (ndarray, ndarray, ndarray)
+            Means, shape (n, functions), upper triangular factors R of the precisions R^T R, shape
+            (n, functions, functions), and `frame_log_likelihoods`, found on the way.
         """
         n, size = len(z), self.basis.size
         # a single row would be taken as work space by all vectors
@@ -78,17 +78,20 @@ class DiscrepantDensity(CollapsedDensity):
             integrate_flux_error(
                 out[k], centres[k], factors[k], rows, data, self.instrument, self.functions
             )
-        return centres[:n], factors[:n]
+        return centres[:n], factors[:n], out
 
-    def _with_flux_errors(self, rows: Rows, z: Array, rng: np.random.Generator) -> Rows:
+    def _with_flux_errors(
+        self, rows: Rows, z: Array, rng: np.random.Generator
+    ) -> tuple[Rows, Array | None]:
         """Draw the error's curve given each z."""
-        centres, factors = self.expansions(z)
+        centres, factors, values = self.expansions(z)
         noise = rng.standard_normal(centres.shape)
         coefficients = centres + np.linalg.solve(factors, noise[:, :, None])[:, :, 0]
-        return rows._replace(
+        erring = rows._replace(
             flux_errors=np.ascontiguousarray(np.einsum("gpk,nk->ngp", self.knots, coefficients)),
             flux_grid=(self.basis.first, 1.0 / self.basis.spacing),
         )
+        return erring, values
 
     def flux_errors(self, log_r: Array, rng: np.random.Generator) -> Array:
         """Draw errors of the log flux at given log ranges from their prior; nan at nan."""

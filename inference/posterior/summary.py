@@ -101,7 +101,8 @@ def _judged(drawn: "_Drawn", whole: Whole) -> tuple[Identifiability, ...]:
     )
     shares = dict(zip(density.parameters.names, whole.budget.of_z.model.tolist(), strict=True))
     scale = whole.scale_error, whole.spread.scale
-    rows = with_model_part(rows, *scale, whole.budget.curvature, shares)
+    budget = whole.budget
+    rows = with_model_part(rows, *scale, budget.curvature, shares, by_flux=budget.by_flux)
     rows = mark_sensitive(density.parameters.names, rows, whole.sensitivity)
     rows = mark_dark(density, rows, chosen, log_r)
     optima = optima_of(drawn.stage)

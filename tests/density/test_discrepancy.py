@@ -61,6 +61,19 @@ def test_likelihood_and_ranges_agree_with_a_sum_over_paths(kind: str, snr: float
     )
 
 
+def test_likelihoods_found_while_drawing_are_those_of_the_density(kind: str) -> None:
+    """To the last bit; and the draws are the same as without them."""
+    frames = data(sensor_of(kind, 100.0), {"discrepancy": 0.05}, 5, seed=1).frames
+    scene = parse_scene({"object": {**OBJECT, "c2": {"prior": "normal", "mean": 1e4, "sd": 1e3}}})
+    plain = collapsed_density(sensor_of(kind, 100.0), scene, frames)
+    z = np.random.default_rng(1).standard_normal((20, len(plain.parameters)))
+    for density in (plain, with_discrepancy(plain, 0.05)):
+        log_r, values = density.draw_with_likelihoods(z, np.random.default_rng(2))
+        np.testing.assert_array_equal(values, density.frame_log_likelihoods(z))
+        again = density.draw_log_ranges(z, np.random.default_rng(2))
+        np.testing.assert_array_equal(log_r, again)
+
+
 def test_with_little_noise_the_process_is_seen_directly() -> None:
     """Readings are then range and flux, and p(y) the density of a path times a Jacobian."""
     sensor = sensor_of("pulsed", 1e4)

@@ -105,9 +105,8 @@ def draws_of(
     each = min(max(math.ceil(count / (ensembles * walkers)), 1), steps)
     thinned = np.linspace(0, steps - 1, each).astype(np.intp)
     z = sample.z[:, :, thinned].reshape(ensembles * walkers * each, d)
-    log_r = density.draw_log_ranges(z, rng)
+    log_r, likelihood = density.draw_with_likelihoods(z, rng)
     readings = replicate(density, z, log_r, rng)
-    likelihood = density.frame_log_likelihoods(z)
     usable = job.usable
 
     def of_all_frames(values: Array) -> Array:

@@ -25,11 +25,11 @@ from inference.identifiability.model_response import ModelResponse
 from inference.posterior.answer.error_parts import ErrorParts
 from inference.posterior.answer.error_shares import error_shares
 from inference.posterior.answer.moves import Moves
-from inference.posterior.answer.responses import chosen_draws, responses_at
+from inference.posterior.answer.responses import chosen_draws, flux_leads, responses_at
 from inference.posterior.answer.shadow_beside import shadow_beside, with_shadow
 from inference.posterior.answer.where_bent import best_ends, where_bent
 from inference.posterior.answer.where_known import where_known
-from inference.posterior.criticism.discrepancy_check import LargerDiscrepancy
+from inference.posterior.criticism.discrepancy_check import BENT, LargerDiscrepancy
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
 from inference.posterior.criticism.size_prior import WiderPrior
 from inference.posterior.job import Job
@@ -53,12 +53,16 @@ class ErrorBudget(Moves):
         of it, root mean square over ranges and draws; 0 where the flux's was integrated out.
     of_scene : int
         How many of the errors, the last, are what rests on priors of the scene.
+    by_flux : bool
+        Whether most of what errors of flux and shadow move the scale by is the flux's, which can be
+        integrated out; looked at only where the response bends.
     """
 
     of_z: ErrorParts
     of_log_r: ErrorParts
     curvature: float
     of_scene: int
+    by_flux: bool
 
     @property
     def model(self) -> slice:
@@ -96,6 +100,9 @@ def error_budget(
     shadow = error.shadow if density.parameters.has_background else 0.0
     chosen = chosen_draws(len(z), log_r.shape[1])
     found = responses_at(job, density, z[chosen], log_r[chosen], rng)
+    by_flux = not found.curvature > BENT or flux_leads(
+        job, density, z[chosen], log_r[chosen], found, rng
+    )
     experiments, responses, readings = found.experiments, found.each, found.readings
     at, ranges = found.z, found.log_r
     by_z, by_log_r = ([by[:, :, :1], by[:, :, 1:]] for by in (found.by_z, found.by_log_r))
@@ -148,6 +155,7 @@ def error_budget(
         ),
         found.curvature,
         of_scene,
+        by_flux,
     )
 
 

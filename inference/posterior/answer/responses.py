@@ -24,7 +24,7 @@ from inference.identifiability.model_response import (
 )
 from inference.posterior.job import Job
 
-__all__ = ["Responses", "chosen_draws", "responses_at"]
+__all__ = ["Responses", "chosen_draws", "flux_leads", "responses_at"]
 
 Array = NDArray[np.float64]
 
@@ -36,6 +36,7 @@ _THINNED = 4  # of them one is followed further
 # errors that are followed beyond the first order at draws: to tell whether that is of any size, and
 # of what size, which few far draws decide
 _TRIED, _MEASURED = 24, 200
+_OF_FLUX = 0.6  # of what all errors move the scale by, that those of the flux move it by alone
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -78,6 +79,13 @@ class Responses:
         """Change of log r likewise, shape (m, frames, 1 + k)."""
         shift = np.array([of.shift[1] for of in self.each])[:, :, None]
         return self._beside(shift, np.array([of.log_r for of in self.each]))
+
+    @property
+    def of_scale(self) -> float:
+        """Standard deviation of the mean of log r over the frames from the errors."""
+        present = np.isfinite(self.log_r[0])
+        moved = self.by_log_r[:, present, 1:].mean(axis=1)
+        return float(np.sqrt(np.square(moved).sum(axis=1).mean()))
 
     def _beside(self, shift: Array, moved: Array) -> Array:
         stretch = np.hypot(1.0, min(self.curvature, 1.0))  # the next order makes nothing narrower
@@ -149,6 +157,29 @@ def responses_at(
         measured = int(np.clip(_FRAMES // max(log_r.shape[1], 1), len(experiments), _MEASURED))
         curvature = _curvature(experiments, each, measured, rng)
     return Responses(z, log_r, tuple(experiments), tuple(each), readings, curvature, repeated)
+
+
+def flux_leads(
+    job: Job,
+    density: CollapsedDensity,
+    z: Array,
+    log_r: Array,
+    found: Responses,
+    rng: np.random.Generator,
+) -> bool:
+    """Tell whether most of what errors move the scale by is the flux's, not a shadow's.
+
+    Parameters
+    ----------
+    density, z, log_r : CollapsedDensity, ndarray, ndarray
+        As of `responses_at`.
+    found : Responses
+        What that returned for errors of both.
+    """
+    if not found.experiments[0].shadow > 0:
+        return True
+    alone = responses_at(job, density, z, log_r, rng, shadow=False)
+    return alone.of_scale >= _OF_FLUX * found.of_scale
 
 
 def _curvature(

@@ -28,7 +28,7 @@ def with_shadow(
     size : float
         Standard deviation of the shadow's error.
     """
-    centres, _ = density.expansions(np.array([each.z for each in experiments]))
+    centres, _, _ = density.expansions(np.array([each.z for each in experiments]))
     none = np.zeros(2 * shadow_basis(*density.parameters.reach_m).size)
     return [
         dataclasses.replace(

@@ -51,7 +51,7 @@ def where_known(
     z, log_r = (np.array([getattr(each, name) for each in experiments]) for name in ("z", "log_r"))
     square, told = 0.0, 0.0
     if isinstance(density, DiscrepantDensity):
-        centres, factors = density.expansions(z)
+        centres, factors, _ = density.expansions(z)
         experiments = [
             dataclasses.replace(each, discrepancy=density.discrepancy, error=of, shadow=0.0)
             for each, of in zip(experiments, centres, strict=True)

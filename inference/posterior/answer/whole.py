@@ -99,7 +99,8 @@ def with_model_error(
     log_r = np.log(draws.range_m[..., usable]).reshape(m, int(usable.sum()))
     larger = None
     if isinstance(density, DiscrepantDensity):
-        larger = larger_discrepancy(density, chosen, log_r)
+        stated = density.total(draws.log_likelihood[..., usable].reshape(m, -1))
+        larger = larger_discrepancy(density, chosen, log_r, stated)
     sensitivity = prior_sensitivity(sampled, chosen, log_r)
     if bias is not None and leaning(sensitivity) is None:
         sensitivity = following(bias, chosen, log_r)

@@ -29,6 +29,7 @@ from inference.posterior.criticism.best_point import BestPoint
 from inference.posterior.criticism.flattened import flattened
 
 __all__ = [
+    "BENT",
     "MISFIT",
     "LargerDiscrepancy",
     "beside_shadow",
@@ -42,7 +43,7 @@ Array = NDArray[np.float64]
 
 _FACTOR = 2.0
 MISFIT = 1e3  # Bayes factor: a false-alarm rate of at most 1e-3
-_BENT = 0.3  # share of a linear response that the next order adds, above which it is no guide
+BENT = 0.3  # share of a linear response that the next order adds, above which it is no guide
 _MOST = 0.5  # of the uncertainty, above which that matters
 
 
@@ -65,7 +66,9 @@ class LargerDiscrepancy:
     of_log_r: Array
 
 
-def larger_discrepancy(density: DiscrepantDensity, z: Array, log_r: Array) -> LargerDiscrepancy:
+def larger_discrepancy(
+    density: DiscrepantDensity, z: Array, log_r: Array, stated: Array
+) -> LargerDiscrepancy:
     """Weight draws to a discrepancy twice as large.
 
     Parameters
@@ -76,6 +79,8 @@ def larger_discrepancy(density: DiscrepantDensity, z: Array, log_r: Array) -> La
         Draws of its posterior.
     log_r : ndarray, shape (m, frames)
         Draws of log r given them; nan for a frame without object.
+    stated : ndarray, shape (m,)
+        Log likelihood of z under that density.
 
     Returns
     -------
@@ -83,7 +88,7 @@ def larger_discrepancy(density: DiscrepantDensity, z: Array, log_r: Array) -> La
         Where the larger size would put the parameters beyond the draws, its figures are too small.
     """
     larger = dataclasses.replace(density, discrepancy=_FACTOR * density.discrepancy)
-    gain = larger.log_likelihood(z) - density.log_likelihood(z)
+    gain = larger.log_likelihood(z) - stated
     gain = np.where(np.isfinite(gain), gain, -np.inf)
     factor = float(np.exp(min(scipy.special.logsumexp(gain) - np.log(len(z)), 700.0)))
     if not np.isfinite(gain).any():
@@ -140,7 +145,7 @@ def is_bent(model: float, whole: float, curvature: float) -> bool:
     curvature : float
         What the next order would add to the response to them, as a share of it.
     """
-    return curvature > _BENT and model > _MOST * whole
+    return curvature > BENT and model > _MOST * whole
 
 
 def with_model_part(
@@ -149,6 +154,8 @@ def with_model_part(
     whole: float,
     curvature: float,
     shares: Mapping[str, float],
+    *,
+    by_flux: bool,
 ) -> tuple[Identifiability, ...]:
     """Say how much of the common scale's uncertainty is the model's, and whether it is known.
 
@@ -162,6 +169,8 @@ def with_model_part(
         What the next order would add to the response to them, as a share of it.
     shares : mapping of str to float
         The model's part of the standard deviation of each unknown.
+    by_flux : bool
+        Whether most of it is the flux's, which can be integrated out, not a shadow's.
 
     Returns
     -------
@@ -173,9 +182,15 @@ def with_model_part(
     if not model > 0:
         return rows
     text, bent = f"; model error: +-{100 * model:.2g} %", is_bent(model, whole, curvature)
+    remedy = (
+        "state `discrepancy` as a number, and the error is integrated out in full"
+        if by_flux
+        else "most of it is the error of the object's shadow on the background, which is not "
+        "integrated out: the interval is a guide"
+    )
     further = (
         f"by a linear response that the next order changes by {100 * curvature:.0f} % of itself: "
-        "state `discrepancy` as a number, and the error is integrated out in full"
+        + remedy
     )
     found = []
     for row in rows:

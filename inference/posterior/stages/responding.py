@@ -14,7 +14,12 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.answer.moves import Moves
-from inference.posterior.answer.responses import Responses, chosen_draws, responses_at
+from inference.posterior.answer.responses import (
+    Responses,
+    chosen_draws,
+    flux_leads,
+    responses_at,
+)
 from inference.posterior.criticism.discrepancy_check import is_bent
 from inference.posterior.job import Job
 from inference.posterior.sample import Sample, sample_of
@@ -41,7 +46,6 @@ __all__ = ["RespondTask", "decided", "tasks"]
 Array = NDArray[np.float64]
 
 _MEMBERS = 400  # draws that are moved
-_OF_FLUX = 0.6  # of what all errors move the scale by, that those of the flux move it by alone
 _CLIMBS = 2  # from the best of them
 
 
@@ -71,13 +75,12 @@ class RespondTask:
         if not np.isfinite(log_r[0]).any():
             return stands
         found = responses_at(job, density, chosen, log_r, rng)
-        model, whole = _scale(found, log_r)
-        if not is_bent(model, whole, found.curvature):
+        by_noise = log_r[:, np.isfinite(log_r[0])].mean(axis=1).std()
+        whole = float(np.hypot(found.of_scale, by_noise))
+        if not is_bent(found.of_scale, whole, found.curvature):
             return stands
-        if found.experiments[0].shadow > 0:  # which is not integrated out
-            alone = responses_at(job, density, chosen, log_r, rng, shadow=False)
-            if _scale(alone, log_r)[0] < _OF_FLUX * model:
-                return stands
+        if not flux_leads(job, density, chosen, log_r, found, rng):  # a shadow's is not integrated
+            return stands
         if isinstance(self.stage, Settled):
             return Checkpoint(Starting(), 0, integrated=True)
         erring = job.with_error_integrated().density()
@@ -116,14 +119,6 @@ def decided(after: Checkpoint) -> Checkpoint:
     if isinstance(stage, Weighted):
         return dataclasses.replace(after, exact=None)
     return dataclasses.replace(after, stage=exact, exact=None, integrated=False, linear=True)
-
-
-def _scale(found: Responses, log_r: Array) -> tuple[float, float]:
-    """Return by how much errors move the mean of log r, and its standard deviation by all."""
-    present = np.isfinite(log_r[0])
-    moved = found.by_log_r[:, present, 1:].mean(axis=1)
-    model = float(np.sqrt(np.square(moved).sum(axis=1).mean()))
-    return model, float(np.hypot(model, log_r[:, present].mean(axis=1).std()))
 
 
 def _moved(sample: Sample, found: Responses, rng: np.random.Generator) -> Array:

@@ -54,6 +54,13 @@ def draws_of(density: DiscrepantDensity, seed: int) -> np.ndarray[Any, np.dtype[
     return np.asarray(np.interp(uniform, total / total[-1], grid))[:, None]
 
 
+def larger_of(
+    density: DiscrepantDensity, z: np.ndarray[Any, np.dtype[np.float64]]
+) -> LargerDiscrepancy:
+    log_r, stated = density.draw_with_likelihoods(z, np.random.default_rng(1))
+    return larger_discrepancy(density, z, log_r, density.total(stated))
+
+
 def test_the_bayes_factor_is_the_ratio_of_both_integrals() -> None:
     density = amplitude_density(stated=0.05, true=0.05, seed=1)
     larger = with_discrepancy(density, 0.1)
@@ -61,7 +68,7 @@ def test_the_bayes_factor_is_the_ratio_of_both_integrals() -> None:
     wanted = np.exp(larger(grid) - density(grid).max()).sum()
     wanted /= np.exp(density(grid) - density(grid).max()).sum()
     z = draws_of(density, 1)
-    found = larger_discrepancy(density, z, density.draw_log_ranges(z, np.random.default_rng(1)))
+    found = larger_of(density, z)
     gain = np.exp(larger.log_likelihood(z) - density.log_likelihood(z))
     error = gain.std() / math.sqrt(len(z))
     assert found.bayes_factor == pytest.approx(wanted, abs=5 * error + 0.02 * wanted)
@@ -72,14 +79,14 @@ def test_an_error_of_the_stated_size_is_no_misfit() -> None:
     for seed in range(10):
         density = amplitude_density(stated=0.05, true=0.05, seed=seed)
         z = draws_of(density, seed)
-        found = larger_discrepancy(density, z, density.draw_log_ranges(z, np.random.default_rng(1)))
+        found = larger_of(density, z)
         assert not judge_fit(GOOD, found).misfit
 
 
 def test_an_error_far_above_the_stated_size_is_a_misfit() -> None:
     density = amplitude_density(stated=0.01, true=0.3, seed=3)
     z = draws_of(density, 3)
-    found = larger_discrepancy(density, z, density.draw_log_ranges(z, np.random.default_rng(1)))
+    found = larger_of(density, z)
     assert judge_fit(GOOD, found).misfit
 
 
@@ -87,13 +94,12 @@ def test_means_move_as_by_the_density_of_the_larger_size() -> None:
     """Plain weights of these draws would do; flattened ones lose a part of what they say."""
     density = amplitude_density(stated=0.05, true=0.05, seed=1)
     z = draws_of(density, 1)
-    log_r = density.draw_log_ranges(z, np.random.default_rng(1))
     grid = np.linspace(-6, 6, 601)[:, None]
     means = []
     for one in (density, with_discrepancy(density, 0.1)):
         weights = scipy.special.softmax(one(grid))
         means.append(float(weights @ grid[:, 0]))
-    found = larger_discrepancy(density, z, log_r)
+    found = larger_of(density, z)
     assert found.of_z[0] == pytest.approx(means[1] - means[0], abs=5 * z.std() / math.sqrt(len(z)))
 
 
@@ -114,7 +120,7 @@ def test_a_few_draws_in_the_tail_do_not_decide(unit: float) -> None:
     moved = []
     for seed in range(200):
         z = np.random.default_rng(seed).standard_normal((1000, 1))
-        found = larger_discrepancy(planted, math.sqrt(unit) * z, z)
+        found = larger_discrepancy(planted, math.sqrt(unit) * z, z, np.zeros(1000))
         assert found.of_z[0] == pytest.approx(math.sqrt(unit) * found.of_log_r[0])
         moved.append(found.of_log_r[0])
     assert np.sqrt(np.mean(np.square(moved))) < 0.37
@@ -122,25 +128,30 @@ def test_a_few_draws_in_the_tail_do_not_decide(unit: float) -> None:
 
 def test_the_model_error_is_a_number_and_small_ones_take_no_status_away() -> None:
     """Issue 12.7: a scale known to 0.03 % that the model's error moves by as much."""
-    small = with_model_part(ROWS, 3e-4, 4e-4, 0.0, {"object.c2": 0.9})
+    small = with_model_part(ROWS, 3e-4, 4e-4, 0.0, {"object.c2": 0.9}, by_flux=True)
     assert small[0] == ROWS[0]
     assert small[1].status == "identified"
     assert small[1].reason.endswith("model error: +-0.03 %")
-    assert with_model_part(ROWS, 0.0, 0.04, 0.0, {}) == ROWS
+    assert with_model_part(ROWS, 0.0, 0.04, 0.0, {}, by_flux=True) == ROWS
 
 
 def test_what_is_mostly_told_by_a_bent_response_is_weak() -> None:
     """The scale, and such unknowns as owe most of their uncertainty to it."""
     rows = tuple(dataclasses.replace(row, status="identified") for row in ROWS)
-    bent = with_model_part(rows, 0.03, 0.04, 0.4, {"object.c2": 0.6})
+    bent = with_model_part(rows, 0.03, 0.04, 0.4, {"object.c2": 0.6}, by_flux=True)
     assert [row.status for row in bent] == ["weak", "weak"]
     assert all("changes by 40 % of itself: state `discrepancy`" in row.reason for row in bent)
-    own = with_model_part(rows, 0.03, 0.04, 0.4, {"object.c2": 0.4})
+    shadow = with_model_part(rows, 0.03, 0.04, 0.4, {"object.c2": 0.6}, by_flux=False)
+    assert [row.status for row in shadow] == ["weak", "weak"]
+    for row in shadow:
+        assert "40 % of itself: most of it is the error of the object's shadow" in row.reason
+        assert "`discrepancy`" not in row.reason
+    own = with_model_part(rows, 0.03, 0.04, 0.4, {"object.c2": 0.4}, by_flux=True)
     assert own[0] == rows[0]
     # it matters only where the model's part does, and nothing becomes better by it
-    assert with_model_part(rows, 0.01, 0.04, 0.7, {"object.c2": 0.6})[0] == rows[0]
+    assert with_model_part(rows, 0.01, 0.04, 0.7, {"object.c2": 0.6}, by_flux=True)[0] == rows[0]
     lost = tuple(dataclasses.replace(row, status="not_identified") for row in ROWS)
-    still = with_model_part(lost, 0.03, 0.04, 0.4, {"object.c2": 0.6})
+    still = with_model_part(lost, 0.03, 0.04, 0.4, {"object.c2": 0.6}, by_flux=True)
     assert [row.status for row in still] == ["not_identified"] * 2
 
 

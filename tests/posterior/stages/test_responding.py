@@ -14,9 +14,9 @@ import pytest
 from benchmarks.coverage.paths import PathSet
 from benchmarks.random_sets.sets import random_set
 from inference.posterior import fold
+from inference.posterior.answer import responses
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages import responding
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.responding import RespondTask, decided, tasks
 from inference.posterior.stages.setting_out import SetOutTask
@@ -165,11 +165,13 @@ def test_errors_of_a_shadow_are_no_reason(monkeypatch: pytest.MonkeyPatch) -> No
     """What is integrated out is the flux's error: it has to be what the scale owes most to."""
     exact = next(c for c in _steps(SHEET) if isinstance(c.stage, Weighted))
     (task,) = fold.tasks(_job(SHEET), exact)
-    monkeypatch.setattr(responding, "_OF_FLUX", 1.1)
+    monkeypatch.setattr(responses, "_OF_FLUX", 1.1)
     stands = fold.run(task)
     assert isinstance(stands, Checkpoint)
     assert stands.linear
     assert stands.stage is exact.stage
+    answer = fold.summarise(_job(SHEET), stands, 1.0, 1.0)
+    assert "the error of the object's shadow" in " ".join(r.reason for r in answer.identifiability)
 
 
 def test_a_thin_sheet_is_answered_right() -> None:
