@@ -19,7 +19,8 @@ from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.proposal import Local, Mixture, Proposal
 from inference.posterior.sampling.reparametrisation import Reparametrisation
 from inference.posterior.sampling.rounds_so_far import LastDraws, RoundsSoFar, Wanted
-from inference.posterior.sampling.start import Ends, Optimum
+from inference.posterior.sampling.scouts import Scouts
+from inference.posterior.sampling.start import Optimum
 from inference.posterior.sampling.transport import TriangularMap
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.selection.consequence import Reported
@@ -129,7 +130,6 @@ _PARTS = {
     for part in (
         Candidate,
         Decision,
-        Ends,
         Ensemble,
         FluxCoordinate,
         Frames,
@@ -146,6 +146,7 @@ _PARTS = {
         Reparametrisation,
         Representatives,
         RoundsSoFar,
+        Scouts,
         Settled,
         Starting,
         Tempering,

@@ -32,8 +32,9 @@ from inference.posterior.progress import Progress
 from inference.posterior.sampling.ensemble import Ensemble
 from inference.posterior.sampling.population import Population
 from inference.posterior.selection.models import Candidate
-from inference.posterior.stages import responding, selecting, tempering, walking
+from inference.posterior.stages import responding, selecting, starting, tempering, walking
 from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.looking import Looked, LookTask, taken_in
 from inference.posterior.stages.responding import RespondTask
 from inference.posterior.stages.selecting import AssessTask, sampled
 from inference.posterior.stages.setting_out import SetOutTask
@@ -69,8 +70,8 @@ __all__ = [
     "tasks",
 ]
 
-Task = AssessTask | StartTask | TemperTask | SetOutTask | WalkTask | RespondTask
-Piece = Candidate | Checkpoint | Population | Ensemble
+Task = AssessTask | LookTask | StartTask | TemperTask | SetOutTask | WalkTask | RespondTask
+Piece = Candidate | Looked | Checkpoint | Population | Ensemble
 P = TypeVar("P")
 
 
@@ -106,7 +107,7 @@ def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float = 0.0) -> tuple[Task, .
         case Selecting() as stage:
             return selecting.tasks(job, stage)
         case Starting() as stage:
-            return (StartTask(sampled(job, checkpoint), stage),)
+            return starting.tasks(sampled(job, checkpoint), stage)
         case Tempering() as stage:
             return tempering.tasks(sampled(job, checkpoint), stage)
         case Walking() as stage if not stage.finished:
@@ -146,11 +147,14 @@ def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoi
     calls = checkpoint.calls
     match checkpoint.stage:
         case Selecting() as stage if stage.looking:
-            found, used = selecting.looked(stage, _all(Checkpoint, pieces))
+            found, used = selecting.looked(stage, _all(Looked, pieces))
             return Checkpoint(found, calls + used)
         case Selecting() as stage:
             selection, start, used = selecting.decided(job, stage, _all(Candidate, pieces))
             return Checkpoint(start, calls + used, selection)
+        case Starting() as stage if any(isinstance(piece, Looked) for piece in pieces):
+            start, used = taken_in(stage, _all(Looked, pieces))
+            return dataclasses.replace(checkpoint, stage=start, calls=calls + used)
         case Starting():
             return _after(checkpoint, pieces)
         case Tempering() as stage if stage.arrived:

@@ -93,9 +93,8 @@ def _posterior(sensor: Body, scene: Body, whole_start: bool, **data: bool) -> No
     while whole_start and isinstance(checkpoint.stage, Selecting | Starting):
         pieces = [fold.run(task) for task in fold.tasks(job, checkpoint)]
         checkpoint = fold.merge(job, checkpoint, pieces)
-    ahead = fold.tasks(job, checkpoint)
-    if ahead:
-        fold.run(ahead[0])
+    for task in fold.tasks(job, checkpoint)[: 1 if whole_start else None]:
+        fold.run(task)
 
 
 def _lines() -> object:

@@ -6,6 +6,7 @@ biased (incidental parameters); each optimum is then refined on the collapsed de
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import scipy
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.density.profile import linearise
 
-__all__ = ["Ends", "Optimum", "climb", "climbed", "find_optima", "optima_of", "refine"]
+__all__ = ["Optimum", "added", "climb", "find_optima", "refine"]
 
 Array = NDArray[np.float64]
 
@@ -57,20 +58,11 @@ class Optimum:
         return bool(np.linalg.norm(step) < _NEAR)
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Ends:
-    """Where climbs ended.
-
-    Attributes
-    ----------
-    z : ndarray, shape (n, d)
-        Points, the best first.
-    values : ndarray, shape (n,)
-        Their joint log densities.
-    """
-
-    z: Array
-    values: Array
+def added(optima: Sequence[Optimum], found: Optimum | None) -> list[Optimum]:
+    """Return optima, the best first, with one more if it is not among those found before."""
+    if found is None or any(other.is_near(found.z) for other in optima):
+        return list(optima)
+    return sorted([*optima, found], key=lambda optimum: -optimum.log_density)
 
 
 def _profile(density: CollapsedDensity, z: Array) -> tuple[Array, Array]:
@@ -244,39 +236,11 @@ def find_optima(density: CollapsedDensity, rng: np.random.Generator) -> list[Opt
     list of Optimum
         Distinct maxima within 20 nats of the best; empty where the density is nowhere finite.
     """
-    return optima_of(density, climbed(density, rng))
-
-
-def climbed(density: CollapsedDensity, rng: np.random.Generator) -> Ends:
-    """Climb the joint density from the best points of the prior, as `find_optima` begins."""
-    screen = density.parameters.sample(rng, _SCREEN)
-    screen[0] = 0.0
-    starts = _spread_out(screen, _profile(density, screen)[0], _CLIMBS)
-    ends = sorted((climb(density, start) for start in starts), key=lambda end: -end[1])
-    best, others = ends[:_FOLLOWED], ends[_FOLLOWED:]
-    best = [climb(density, z, _MORE_ITERATIONS) for z, value in best if np.isfinite(value)]
-    ends = sorted([*best, *others], key=lambda end: -end[1])
-    points = np.array([z for z, _ in ends]).reshape(len(ends), screen.shape[1])
-    return Ends(points, np.array([value for _, value in ends]))
-
-
-def optima_of(density: CollapsedDensity, ends: Ends) -> list[Optimum]:
-    """Refine the ends of climbs on the collapsed density.
-
-    Parameters
-    ----------
-    ends : Ends
-        From `climbed`.
-
-    Returns
-    -------
-    list of Optimum
-        As of `find_optima`.
-    """
     optima: list[Optimum] = []
     visited: list[Optimum] = []
-    for z, value in zip(ends.z, ends.values, strict=True):
-        if not np.isfinite(value) or value < ends.values[0] - 60.0:
+    ends = _climbed(density, rng)
+    for z, value in ends:
+        if not np.isfinite(value) or value < ends[0][1] - 60.0:
             continue
         if any(one.is_near(z) for one in visited):
             continue
@@ -288,3 +252,14 @@ def optima_of(density: CollapsedDensity, ends: Ends) -> list[Optimum]:
             optima.append(optimum)
     optima.sort(key=lambda optimum: -optimum.log_density)
     return [o for o in optima if o.log_density > optima[0].log_density - 20.0]
+
+
+def _climbed(density: CollapsedDensity, rng: np.random.Generator) -> list[tuple[Array, float]]:
+    """Climb the joint density from the best points of the prior; the best ends first."""
+    screen = density.parameters.sample(rng, _SCREEN)
+    screen[0] = 0.0
+    starts = _spread_out(screen, _profile(density, screen)[0], _CLIMBS)
+    ends = sorted((climb(density, start) for start in starts), key=lambda end: -end[1])
+    best, others = ends[:_FOLLOWED], ends[_FOLLOWED:]
+    best = [climb(density, z, _MORE_ITERATIONS) for z, value in best if np.isfinite(value)]
+    return sorted([*best, *others], key=lambda end: -end[1])

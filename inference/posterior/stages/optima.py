@@ -14,19 +14,12 @@ from inference.density.discrepant import with_discrepancy
 from inference.posterior.job import Job
 from inference.posterior.sampling.start import Optimum, refine
 
-__all__ = ["added", "depend_on_errors", "that_matter"]
+__all__ = ["depend_on_errors", "that_matter"]
 
 _MATTERS = 20.0  # nats below the best: what is there holds some billionths
 _AHEAD = 10.0  # nats of mass, where errors are integrated out: along a sheet it differs by as many
 _WITHIN_REACH = 100.0  # nats below the best there, of what is as yet not refined
 _MOST = 2  # optima of either kind that are compared, the best first
-
-
-def added(optima: Sequence[Optimum], found: Optimum | None) -> list[Optimum]:
-    """Return optima, the best first, with one more if it is not among those found before."""
-    if found is None or any(other.is_near(found.z) for other in optima):
-        return list(optima)
-    return sorted([*optima, found], key=lambda optimum: -optimum.log_density)
 
 
 def that_matter(optima: Sequence[Optimum]) -> list[Optimum]:

@@ -25,11 +25,11 @@ from inference.posterior.job import Job
 from inference.posterior.sample import Sample, sample_of
 from inference.posterior.sampling.population import arrived_at
 from inference.posterior.sampling.proposal import Proposal, mixture_of
-from inference.posterior.sampling.start import Optimum, climb, refine
+from inference.posterior.sampling.start import Optimum, added, climb, refine
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.sampling.warm import MAP_SHARE
 from inference.posterior.stages.checkpoint import Checkpoint
-from inference.posterior.stages.optima import added, that_matter
+from inference.posterior.stages.optima import that_matter
 from inference.posterior.stages.selecting import sampled
 from inference.posterior.stages.stage import (
     Drawing,

@@ -8,9 +8,9 @@ from inference.posterior.sampling.start import Optimum, refine
 from inference.posterior.selection.models import Candidate, assess, candidate_terms, reduced
 from inference.posterior.selection.selection import Selection, decide
 from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.looking import Looked, LookTask, looking, taken_in
 from inference.posterior.stages.optima import that_matter
 from inference.posterior.stages.stage import Selecting, Starting
-from inference.posterior.stages.starting import StartTask
 from inference.posterior.streams import Stream
 
 __all__ = ["AssessTask", "begun", "decided", "looked", "sampled", "tasks"]
@@ -49,7 +49,7 @@ class AssessTask:
 def begun(job: Job) -> Selecting:
     """Return the stage before its first step: no optima to be looked for where all is known."""
     jobs = [_candidate(job, terms) for terms in candidate_terms(job.scene)]
-    done = Starting(optima=(), fitted=True)
+    done = Starting(fitted=(), climbed=())
     return Selecting(tuple(Starting() if len(each.density().parameters) else done for each in jobs))
 
 
@@ -58,8 +58,8 @@ def _candidate(job: Job, terms: Sequence[str]) -> Job:
     return dataclasses.replace(job, scene=reduced(job.scene, terms))
 
 
-def tasks(job: Job, stage: Selecting) -> tuple[StartTask, ...] | tuple[AssessTask, ...]:
-    """Return the candidates whose optima are looked for, in the next way; then all, to be assessed.
+def tasks(job: Job, stage: Selecting) -> tuple[LookTask, ...] | tuple[AssessTask, ...]:
+    """Return the ways to look for the optima of all candidates; then these, to be assessed.
 
     Parameters
     ----------
@@ -70,34 +70,36 @@ def tasks(job: Job, stage: Selecting) -> tuple[StartTask, ...] | tuple[AssessTas
     """
     every = candidate_terms(job.scene)
     jobs = [_candidate(job, terms) for terms in every]
-    looking = [StartTask(j, s) for j, s in zip(jobs, stage.starts, strict=True) if not s.fitted]
-    if looking:
-        return tuple(looking)
-    return tuple(
-        AssessTask(jobs[k], terms, k, tuple(that_matter(stage.starts[k].optima or ())))
+    each = (looking(j, s, scouts=False) for j, s in zip(jobs, stage.starts, strict=True))
+    left = tuple(task for some in each for task in some)
+    return left or tuple(
+        AssessTask(jobs[k], terms, k, tuple(that_matter(stage.starts[k].optima)))
         for k, terms in enumerate(every)
     )
 
 
-def looked(stage: Selecting, reached: Sequence[Checkpoint]) -> tuple[Selecting, int]:
+def looked(stage: Selecting, found: Sequence[Looked]) -> tuple[Selecting, int]:
     """Take in the optima that candidates were found to have.
 
     Parameters
     ----------
     stage : Selecting
         Before.
-    reached : sequence of Checkpoint
-        Of the candidates that were looked at, in their order.
+    found : sequence of Looked
+        What every way led to, in the order of `tasks`.
 
     Returns
     -------
     (Selecting, int)
         And the density evaluations on the way to it.
     """
-    rest = iter(reached)
-    starts = [start if start.fitted else next(rest).stage for start in stage.starts]
-    found = tuple(start for start in starts if isinstance(start, Starting))
-    return Selecting(found), sum(each.calls for each in reached)
+    rest, starts, calls = list(found), [], 0
+    for start in stage.starts:
+        left = 0 if start.looked else 2
+        new, used = taken_in(start, rest[:left])
+        rest, calls = rest[left:], calls + used
+        starts.append(new)
+    return Selecting(tuple(starts)), calls
 
 
 def decided(

@@ -22,7 +22,8 @@ from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.proposal import Mixture, Proposal
 from inference.posterior.sampling.rounds_so_far import RoundsSoFar
-from inference.posterior.sampling.start import Ends, Optimum
+from inference.posterior.sampling.scouts import Scouts
+from inference.posterior.sampling.start import Optimum, added
 from inference.posterior.sampling.verdict import Chains, Verdict, chains_of
 
 __all__ = [
@@ -54,21 +55,34 @@ class _NotBegun:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Starting(_NotBegun):
-    """It is decided which optional terms stay; optima are looked for, in one way after the other.
+    """It is decided which optional terms stay; optima are looked for, in ways of their own.
 
     Attributes
     ----------
-    ends : Ends or None
-        Where climbs from the prior ended; None before the first.
-    optima : tuple of Optimum or None
-        What was found so far, the best first; None before any climb's end was refined.
-    fitted : bool
-        Whether those of the fit over all frames are among them.
+    fitted : tuple of Optimum or None
+        Optima near those of the fit over all frames; None before that was made.
+    climbed : tuple of Optimum or None
+        Those that climbs from the prior led to, the best first; None before these.
+    scouts : Scouts or None
+        Points that came from the prior alone; None before they are sent out.
     """
 
-    ends: Ends | None = None
-    optima: tuple[Optimum, ...] | None = None
-    fitted: bool = False
+    fitted: tuple[Optimum, ...] | None = None
+    climbed: tuple[Optimum, ...] | None = None
+    scouts: Scouts | None = None
+
+    @property
+    def looked(self) -> bool:
+        """Whether optima were looked for in both ways that know of the readings."""
+        return self.fitted is not None and self.climbed is not None
+
+    @property
+    def optima(self) -> list[Optimum]:
+        """All that were found so far, the best first."""
+        found = list(self.climbed or ())
+        for one in self.fitted or ():
+            found = added(found, one)
+        return found
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -87,7 +101,7 @@ class Selecting(_NotBegun):
     @property
     def looking(self) -> bool:
         """Whether optima are still looked for."""
-        return not all(start.fitted for start in self.starts)
+        return not all(start.looked for start in self.starts)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

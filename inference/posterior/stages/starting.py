@@ -1,4 +1,4 @@
-"""How sampling starts: optima, a first trial of their shape, and ensembles around them."""
+"""How sampling starts: the optima that matter, a first trial of their shape, what that leads to."""
 
 import dataclasses
 
@@ -7,20 +7,27 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.checks import check_best_fit, check_ranges
-from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
 from inference.posterior.sampling.aliases import aliases_of, with_aliases
 from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.represent import represent
-from inference.posterior.sampling.start import Optimum, climb, climbed, optima_of, refine
+from inference.posterior.sampling.scouts import Scouts
+from inference.posterior.sampling.start import Optimum, added, climb, refine
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.sampling.warm import beyond, warm_start
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.chunk import evaluations
 from inference.posterior.stages.ensembles import POPULATIONS, from_weighted
-from inference.posterior.stages.optima import added, depend_on_errors, that_matter
-from inference.posterior.stages.scouting import Scouts, from_scouts, send_scouts, thinned
+from inference.posterior.stages.looking import (
+    Looked,
+    LookTask,
+    looking,
+    of_some_frames,
+    taken_in,
+)
+from inference.posterior.stages.optima import depend_on_errors, that_matter
+from inference.posterior.stages.scouting import from_scouts
 from inference.posterior.stages.setting_out import TOLERATED
 from inference.posterior.stages.stage import (
     Drawing,
@@ -33,7 +40,7 @@ from inference.posterior.stages.stage import (
 from inference.posterior.streams import Stream
 from simulator.errors import RefusedError
 
-__all__ = ["StartTask", "begin"]
+__all__ = ["StartTask", "begin", "tasks"]
 
 Array = NDArray[np.float64]
 
@@ -46,38 +53,48 @@ _SHARE = 0.5  # of an ensemble's steps that are independent jumps
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StartTask:
-    """One way of looking for optima in the scene that was chosen; behind the last, the start.
+    """The start of sampling, behind the search for optima.
 
     Attributes
     ----------
     job : Job
         Without optional terms.
     stage : Starting
-        What was found before.
+        What was found; nothing where nothing is unknown.
     """
 
     job: Job
     stage: Starting
 
     def run(self) -> Checkpoint:
-        """Return what is known then, and the density evaluations that were counted."""
+        """Return the first stage of sampling, and the density evaluations that it took.
+
+        Raises
+        ------
+        RefusedError
+            Where no parameters explain the frames at all, or importance sampling alone was asked
+            for and cannot be trusted.
+        """
         job, stage = self.job, self.stage
-        if len(job.density().parameters) == 0:
+        if stage.scouts is None:
             return _settled(job)
-        some = _of_some_frames(job) if job.is_large else job
-        density = some.density()
-        if stage.ends is None:
-            ends = climbed(density, job.stream(Stream.SCREEN))
-            return Checkpoint(dataclasses.replace(stage, ends=ends), 0)
-        if stage.optima is None:
-            optima = optima_of(density, stage.ends)
-            return Checkpoint(dataclasses.replace(stage, optima=tuple(optima)), 0)
-        optima = list(stage.optima)
-        if not stage.fitted:
-            for fitted in fitted_optima(some, density):
-                optima = added(optima, fitted)
-            return Checkpoint(dataclasses.replace(stage, optima=tuple(optima), fitted=True), 0)
-        return _set_out(job, density, optima)
+        some = of_some_frames(job) if job.is_large else job
+        return _set_out(job, some.density(), stage.optima, stage.scouts)
+
+
+def tasks(job: Job, stage: Starting) -> tuple[LookTask, ...] | tuple[StartTask, ...]:
+    """Return the ways in which optima are still looked for; then the start.
+
+    Parameters
+    ----------
+    job : Job
+        Without optional terms.
+    stage : Starting
+        What was found before.
+    """
+    unknown = len(job.density().parameters) > 0
+    left = looking(job, stage, scouts=True) if unknown else ()
+    return left or (StartTask(job, stage),)
 
 
 def begin(job: Job, stage: Starting) -> Checkpoint:
@@ -98,15 +115,21 @@ def begin(job: Job, stage: Starting) -> Checkpoint:
     Raises
     ------
     RefusedError
-        Where no parameters explain the frames at all, or importance sampling alone was asked for
-        and cannot be trusted.
+        As of `StartTask`.
     """
-    reached, integrated = StartTask(job, stage).run(), False
-    while isinstance(reached.stage, Starting):
-        if reached.integrated:
-            job, integrated = job.with_error_integrated(), True
-        reached = StartTask(job, reached.stage).run()
-    return dataclasses.replace(reached, integrated=integrated)
+    calls, integrated = 0, False
+    while True:
+        found = [task.run() for task in tasks(job, stage)]
+        looked = [one for one in found if isinstance(one, Looked)]
+        if looked:
+            stage, used = taken_in(stage, looked)
+            calls += used
+            continue
+        (reached,) = (one for one in found if isinstance(one, Checkpoint))
+        calls += reached.calls
+        if not isinstance(reached.stage, Starting):
+            return dataclasses.replace(reached, calls=calls, integrated=integrated)
+        job, stage, integrated = job.with_error_integrated(), reached.stage, True
 
 
 def _settled(job: Job) -> Checkpoint:
@@ -118,8 +141,8 @@ def _settled(job: Job) -> Checkpoint:
     return Checkpoint(Settled(), 1)
 
 
-def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum]) -> Checkpoint:
-    """Look for the last optima, and set up what comes behind them.
+def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum], scouts: Scouts) -> Checkpoint:
+    """Climb to the last optima, and set up what comes behind them.
 
     Parameters
     ----------
@@ -129,9 +152,11 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum]) -> Checkpo
         Of all frames, or of so few that optima are looked for in.
     optima : list of Optimum
         Found so far.
+    scouts : Scouts
+        Told of none of them.
     """
-    whole = density = job.density()
-    optima, scouts, calls = _with_scouts(job, some, optima)
+    whole, calls = job.density(), 0
+    density, optima = whole, _with_scouts(some, optima, scouts)
     if optima and depend_on_errors(job, some, optima):
         return Checkpoint(Starting(), calls, None, integrated=True)
     optima = that_matter(optima)
@@ -151,15 +176,6 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum]) -> Checkpo
     check_best_fit(whole, optima[0].z)
     stage, used = _first_stage(job, density, optima, scouts)
     return Checkpoint(stage, calls + used, None, job.representatives)
-
-
-def _of_some_frames(job: Job) -> Job:
-    """Return the job of so few frames that every branch is seen, with and without object."""
-    rng, usable = job.stream(Stream.REPRESENTATIVES, 0), np.flatnonzero(job.usable)
-    present = job.frames.object_present
-    holds = np.ones(len(usable), dtype=bool) if present is None else present[usable]
-    some = [rng.permutation(usable[flag])[:most] for flag, most in ((holds, 250), (~holds, 50))]
-    return job.part(np.sort(np.concatenate(some)))
 
 
 def _first_stage(
@@ -192,15 +208,12 @@ def _first_stage(
     return walking, calls + ensembles[0].walkers * len(ensembles)
 
 
-def _with_scouts(
-    job: Job, density: CollapsedDensity, optima: list[Optimum]
-) -> tuple[list[Optimum], Scouts, int]:
-    """Add optima that scouts find, and return these, told to none; with the evaluations."""
-    found, calls = send_scouts(thinned(density), job.stream(Stream.SCOUTS))
-    if len(found.z):
-        optima = added(optima, refine(density, climb(density, found.z[0])[0]))
-        optima = added(optima, refine(density, found.z[0]))
-    return optima, found, calls
+def _with_scouts(density: CollapsedDensity, optima: list[Optimum], scouts: Scouts) -> list[Optimum]:
+    """Add optima that the best scout leads to."""
+    if len(scouts.z):
+        optima = added(optima, refine(density, climb(density, scouts.z[0])[0]))
+        optima = added(optima, refine(density, scouts.z[0]))
+    return optima
 
 
 def _has_too_many(density: CollapsedDensity) -> bool:

@@ -1,5 +1,7 @@
 """How optional terms are decided, chunk by chunk."""
 
+import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -10,9 +12,9 @@ from inference.posterior import job as jobs
 from inference.posterior.selection.evidence import weigh
 from inference.posterior.selection.models import Candidate
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages.looking import LookTask, looking, taken_in
 from inference.posterior.stages.selecting import AssessTask
 from inference.posterior.stages.stage import Starting
-from inference.posterior.stages.starting import StartTask
 from simulator.scene import parse_scene
 from tests.posterior.scenes import OBJECT, UNKNOWN_CROSSTALK, data, sensor_of
 from tests.posterior.test_archive import same
@@ -42,21 +44,45 @@ def assessed(job: fold.Job) -> tuple[list[type], fold.Checkpoint, list[Candidate
 
 
 def test_a_posterior_with_optional_terms_starts_in_chunks_and_none_twice() -> None:
-    kinds, reached, _ = assessed(of_scene({"crosstalk": OPTIONAL}))
-    assert kinds == [StartTask] * 3 + [AssessTask]
+    job = of_scene({"crosstalk": OPTIONAL})
+    kinds, reached, _ = assessed(job)
+    assert kinds == [LookTask, AssessTask]
     stated = of_scene({"crosstalk": UNKNOWN_CROSSTALK})
     start = fold.start(stated)
-    for _ in range(3):
-        (task,) = fold.tasks(stated, start)
-        start = fold.merge(stated, start, [fold.run(task)])
+    pieces = [fold.run(task) for task in fold.tasks(stated, start)]
+    begun = fold.merge(stated, start, pieces).stage
     assert isinstance(reached.stage, Starting)
-    assert reached.stage.fitted
-    assert same(reached.stage, start.stage)  # not looked for again
+    assert isinstance(begun, Starting)
+    assert same(reached.stage, dataclasses.replace(begun, scouts=None))
+    (task,) = fold.tasks(job, reached)  # optima are not looked for again
+    assert isinstance(task, LookTask)
+    assert task.way == "scouts"
+
+
+def test_ways_that_look_at_once_know_nothing_of_one_another() -> None:
+    """In whatever order, and in however many chunks, they lead to the same start."""
+    job = of_scene({"crosstalk": UNKNOWN_CROSSTALK})
+    tasks = looking(job, Starting(), scouts=True)
+    assert [task.way for task in tasks] == ["fitted", "climbed", "scouts"]
+    found = [task.run() for task in tasks]
+    start, calls = taken_in(Starting(), found)
+    assert start.scouts is not None
+    assert calls == found[2].calls > len(start.scouts.z)
+    assert looking(job, start, scouts=True) == ()
+    by_turns = Starting()
+    for each in reversed(found):
+        by_turns, _ = taken_in(by_turns, [each])
+    assert same(by_turns, start)
+    assert start.climbed is not None
+    assert start.fitted is not None
+    best = max((*start.climbed, *start.fitted), key=lambda one: one.log_density)
+    assert start.optima[0] is best
+    assert all(a.is_near(a.z) and not a.is_near(b.z) for a, b in itertools.pairwise(start.optima))
 
 
 def test_a_choice_that_leaves_nothing_unknown_has_nothing_to_be_looked_for() -> None:
     job = of_scene({"object": OBJECT, "crosstalk": OPTIONAL})
-    assert len(fold.tasks(job, fold.start(job))) == 1
+    assert len(fold.tasks(job, fold.start(job))) == 2  # of the other choice
     _, reached, (without, with_it) = assessed(job)
     assert without.terms == ()
     assert without.log_evidence < with_it.log_evidence - 100

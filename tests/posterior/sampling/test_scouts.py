@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.posterior.sampling import scouts
 from inference.posterior.sampling.importance import MAX_K_HAT, draw_weighted
 from inference.posterior.sampling.proposal import mixture_of
+from inference.posterior.sampling.scouts import send_scouts, thinned
 from inference.posterior.sampling.start import find_optima
-from inference.posterior.stages import scouting
-from inference.posterior.stages.scouting import send_scouts, thinned
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import parse_scene
 from tests.posterior.scenes import KINDS, example, sensor_of
@@ -22,8 +22,8 @@ WALKERS = 256
 
 @pytest.fixture
 def many(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(scouting, "WALKERS", WALKERS)
-    monkeypatch.setattr(scouting, "_SCOUTS", 2 * WALKERS)
+    monkeypatch.setattr(scouts, "WALKERS", WALKERS)
+    monkeypatch.setattr(scouts, "_SCOUTS", 2 * WALKERS)
 
 
 @pytest.mark.usefixtures("many")
@@ -39,7 +39,8 @@ def test_the_same_mean_as_importance_sampling(kind: str, crosstalk: bool) -> Non
     assert weighted.k_hat < MAX_K_HAT
     mean = weighted.weights @ weighted.z
     sd = np.sqrt(weighted.weights @ (weighted.z - mean) ** 2)
-    (walkers, _), calls = send_scouts(density, np.random.default_rng(112))
+    found, calls = send_scouts(density, np.random.default_rng(112))
+    walkers = found.z
     assert walkers.shape == (WALKERS, len(mean))
     assert calls > WALKERS
     off = np.abs(walkers.mean(axis=0) - mean) / sd
@@ -52,7 +53,8 @@ def test_the_same_mean_as_importance_sampling(kind: str, crosstalk: bool) -> Non
 
 def test_walkers_are_distinct_and_stand_where_the_density_is_positive() -> None:
     density = collapsed_density(*example("pulsed", crosstalk=True))
-    (walkers, _), _ = send_scouts(density, np.random.default_rng(113))
+    found, _ = send_scouts(density, np.random.default_rng(113))
+    walkers = found.z
     assert len(np.unique(walkers, axis=0)) == len(walkers)
     assert np.isfinite(density(walkers)).all()
 
@@ -75,7 +77,8 @@ def test_both_of_two_modes_are_kept() -> None:
     draws: five standard errors are 0.3, and none may be lost."""
     scene = parse_scene({"object": {"c0": 0.08, "c1": 0.1}})
     bumps = Bumps(parameters_of(sensor_of("pulsed"), scene))
-    (walkers, _), _ = send_scouts(cast("CollapsedDensity", bumps), np.random.default_rng(114))
+    found, _ = send_scouts(cast("CollapsedDensity", bumps), np.random.default_rng(114))
+    walkers = found.z
     assert walkers.shape[1] == 1
     share = float((walkers[:, 0] > 0).mean())
     assert 0.45 < share < 1.0
@@ -89,7 +92,8 @@ def test_an_impossible_density_has_no_walkers() -> None:
 
     scene = parse_scene({"object": {"c0": 0.08, "c1": 0.1}})
     nowhere = Nowhere(parameters_of(sensor_of("pulsed"), scene))
-    (walkers, _), calls = send_scouts(cast("CollapsedDensity", nowhere), np.random.default_rng(115))
+    found, calls = send_scouts(cast("CollapsedDensity", nowhere), np.random.default_rng(115))
+    walkers = found.z
     assert walkers.shape == (0, 1)
     assert calls > 0
 
