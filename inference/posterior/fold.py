@@ -37,7 +37,12 @@ from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.looking import Looked, LookTask, taken_in
 from inference.posterior.stages.responding import RespondTask
 from inference.posterior.stages.selecting import AssessTask, sampled
-from inference.posterior.stages.setting_out import SetOutTask
+from inference.posterior.stages.setting_out import (
+    Evaluated,
+    EvaluateTask,
+    SetOutTask,
+    put_together,
+)
 from inference.posterior.stages.stage import (
     Selecting,
     Settled,
@@ -70,8 +75,17 @@ __all__ = [
     "tasks",
 ]
 
-Task = AssessTask | LookTask | StartTask | TemperTask | SetOutTask | WalkTask | RespondTask
-Piece = Candidate | Looked | Checkpoint | Population | Ensemble
+Task = (
+    AssessTask
+    | LookTask
+    | StartTask
+    | TemperTask
+    | SetOutTask
+    | EvaluateTask
+    | WalkTask
+    | RespondTask
+)
+Piece = Candidate | Looked | Evaluated | Checkpoint | Population | Ensemble
 P = TypeVar("P")
 
 
@@ -157,6 +171,9 @@ def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoi
             return dataclasses.replace(checkpoint, stage=start, calls=calls + used)
         case Starting():
             return _after(checkpoint, pieces)
+        case Tempering() as stage if any(isinstance(piece, Evaluated) for piece in pieces):
+            evaluated = _all(Evaluated, pieces)
+            return _after(checkpoint, (put_together(sampled(job, checkpoint), stage, evaluated),))
         case Tempering() as stage if stage.arrived:
             return _after(checkpoint, pieces)
         case Tempering() as stage:

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.importance import Law
 from inference.posterior.sampling.proposal import Proposal
 
@@ -34,8 +33,8 @@ class Pool:
     ----------
     z : ndarray, shape (n, d)
         Draws; members of the populations come first.
-    target : ndarray, shape (n,)
-        Their log density.
+    target : ndarray, shape (m,)
+        Log density of the first m; of the others it is still to be evaluated.
     laws : tuple of Law
         What they were drawn from, the members apart.
     counts : tuple of int
@@ -53,6 +52,15 @@ class Pool:
     each: tuple[Array, ...]
     laplace: Array
 
+    @property
+    def open(self) -> Array:
+        """Draws whose log density is still to be evaluated, shape (n - m, d)."""
+        return self.z[len(self.target) :]
+
+    def evaluated(self, values: Array) -> "Pool":
+        """Return the pool with the log density of what was open."""
+        return dataclasses.replace(self, target=np.concatenate([self.target, values]))
+
     @functools.cached_property
     def log_mixture(self) -> Array:
         """Log density of the law of them all, shape (n,)."""
@@ -68,10 +76,9 @@ def with_laws(
     pool: Pool,
     laws: tuple[Law, ...],
     counts: tuple[int, ...],
-    density: CollapsedDensity,
     rng: np.random.Generator,
 ) -> Pool:
-    """Return a pool with draws from more laws.
+    """Return a pool with draws from more laws, which are open.
 
     Parameters
     ----------
@@ -86,8 +93,8 @@ def with_laws(
     laws = pool.laws + laws
     old = [_log_density(law, new, there) for law in pool.laws]
     more = tuple(_log_density(law, z, laplace) for law in laws[len(pool.laws) :])
-    target = np.concatenate([pool.target, density(new)])
-    return Pool(z, target, laws, pool.counts + counts, _appended(pool.each, old) + more, laplace)
+    each = _appended(pool.each, old) + more
+    return Pool(z, pool.target, laws, pool.counts + counts, each, laplace)
 
 
 def _appended(each: Sequence[Array], more: Sequence[Array]) -> tuple[Array, ...]:
@@ -105,10 +112,8 @@ def _log_density(law: Law, z: Array, laplace: Array) -> Array:
     return law.log_density(z, laplace) if isinstance(law, Proposal) else law.log_density(z)
 
 
-def drawn_by(
-    pool: Pool, shares: Array, n: int, density: CollapsedDensity, rng: np.random.Generator
-) -> Pool:
-    """Return n draws from all laws of a pool in these shares, as a pool of their own.
+def drawn_by(pool: Pool, shares: Array, n: int, rng: np.random.Generator) -> Pool:
+    """Return n draws from all laws of a pool in these shares, as a pool of their own; all are open.
 
     A law gives its share of n, to within one draw, and in the mean its share exactly (systematic
     sampling, Madow 1949): draws that are made in parts are of the same mixture.
@@ -120,7 +125,7 @@ def drawn_by(
     z = np.concatenate([law.draw(rng, count) for law, count in parts if count])
     laplace = _laplace(pool.laws, z)
     each = tuple(_log_density(law, z, laplace) for law in pool.laws)
-    return Pool(z, density(z), pool.laws, counts, each, laplace)
+    return Pool(z, np.empty(0), pool.laws, counts, each, laplace)
 
 
 def shares_that_suit(pool: Pool, members: int) -> tuple[Array, float]:

@@ -4,7 +4,8 @@ Adaptive multiple importance sampling (Cornuet et al. 2012): a draw of any round
 mixture of all proposals (Owen and Zhou 2000), so that what one of them leaves out another holds.
 Members of populations that came from the prior begin it, and are what it is held to. The draws that
 count are made at the end, from proposals that are fitted no more. Rounds are made step by step, and
-may be put aside between two of them.
+may be put aside between two of them. Draws of a step are made first and evaluated then, by whoever
+has the time: that is most of what it takes.
 """
 
 import dataclasses
@@ -37,7 +38,7 @@ from inference.posterior.sampling.rounds_so_far import (
     worst,
 )
 
-__all__ = ["STEP", "begun", "in_rounds", "step"]
+__all__ = ["STEP", "first_draws", "in_rounds", "next_draws", "taken_in"]
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ def in_rounds(
     Parameters
     ----------
     density, proposal, populations, wanted : CollapsedDensity, Proposal, tuple of ndarray, Wanted
-        As of `begun`.
+        As of `first_draws`.
     rng : numpy.random.Generator
         Source of randomness of all steps.
 
@@ -70,13 +71,15 @@ def in_rounds(
     Rounds
         The last that were made where none are trusted before the draws are spent.
     """
-    reached: RoundsSoFar | Rounds = begun(density, proposal, populations, rng, wanted)
+    drawn = first_draws(density, proposal, populations, rng, wanted)
+    reached = taken_in(drawn, density(drawn.open))
     while isinstance(reached, RoundsSoFar):
-        reached = step(density, reached, rng)
+        drawn = next_draws(density, reached, rng)
+        reached = taken_in(drawn, density(drawn.open))
     return reached
 
 
-def begun(
+def first_draws(
     density: CollapsedDensity,
     proposal: Proposal,
     populations: tuple[Array, ...],
@@ -101,43 +104,68 @@ def begun(
     Returns
     -------
     RoundsSoFar
+        Whose ``open`` draws, the members among them, are to be evaluated.
     """
     members = np.concatenate(populations)
     ends = np.cumsum([len(one) for one in populations]).tolist()
     proposal = fitted(proposal, members, density)
-    laplace = proposal.optima.log_density(members)
-    pool = Pool(members, density(members), (), (), (), laplace)
-    pool = with_laws(pool, (proposal,), (STEP,), density, rng)
-    return _judged(RoundsSoFar(wanted, proposal, pool, tuple(ends), len(members) + STEP))
+    pool = Pool(members, np.empty(0), (), (), (), proposal.optima.log_density(members))
+    pool = with_laws(pool, (proposal,), (STEP,), rng)
+    return RoundsSoFar(wanted, proposal, pool, tuple(ends), 0)
 
 
-def step(
+def next_draws(
     density: CollapsedDensity, so_far: RoundsSoFar, rng: np.random.Generator
-) -> RoundsSoFar | Rounds:
-    """Make one round, or some of the draws that count: `STEP` evaluations, or fewer.
+) -> RoundsSoFar:
+    """Make the draws of one round, or some of those that count: `STEP`, or fewer.
 
     Parameters
     ----------
     density : CollapsedDensity
         Target.
     so_far : RoundsSoFar
-        From `begun`, or the step before.
+        From `taken_in`.
     rng : numpy.random.Generator
         Source of randomness of this step.
+
+    Returns
+    -------
+    RoundsSoFar
+        Whose ``open`` draws are to be evaluated.
+    """
+    so_far = dataclasses.replace(so_far, steps=so_far.steps + 1)
+    last = so_far.last
+    if last is not None:
+        made = 0 if last.drawn is None else len(last.drawn.z)
+        drawn = drawn_by(so_far.pool, last.shares, min(last.count - made, STEP), rng)
+        drawn = drawn if last.drawn is None else joined(last.drawn, drawn)
+        return dataclasses.replace(so_far, last=dataclasses.replace(last, drawn=drawn))
+    laws = next_laws(density, so_far.proposal, so_far.pool, so_far.beyond, rng)
+    local, far = int(_LOCAL_SHARE * STEP), int(_WIDE_SHARE * STEP)
+    pool = with_laws(so_far.pool, laws, (STEP - local - far, far, local), rng)
+    return dataclasses.replace(so_far, proposal=laws[0], pool=pool)
+
+
+def taken_in(so_far: RoundsSoFar, values: Array) -> RoundsSoFar | Rounds:
+    """Take in the log density of the draws that were open, and judge all.
+
+    Parameters
+    ----------
+    so_far : RoundsSoFar
+        From `first_draws` or `next_draws`.
+    values : ndarray, shape (n,)
+        Of its ``open`` draws.
 
     Returns
     -------
     RoundsSoFar or Rounds
         Rounds where no step is left.
     """
-    so_far = dataclasses.replace(so_far, steps=so_far.steps + 1)
-    if so_far.last is not None:
-        return _counted(density, so_far, so_far.last, rng)
-    laws = next_laws(density, so_far.proposal, so_far.pool, so_far.beyond, rng)
-    local, far = int(_LOCAL_SHARE * STEP), int(_WIDE_SHARE * STEP)
-    pool = with_laws(so_far.pool, laws, (STEP - local - far, far, local), density, rng)
-    calls = so_far.calls + STEP
-    return _judged(dataclasses.replace(so_far, proposal=laws[0], pool=pool, calls=calls))
+    so_far = dataclasses.replace(so_far, calls=so_far.calls + len(values))
+    last = so_far.last
+    if last is None or last.drawn is None:
+        return _judged(dataclasses.replace(so_far, pool=so_far.pool.evaluated(values)))
+    return _counted(so_far, dataclasses.replace(last, drawn=last.drawn.evaluated(values)))
 
 
 def _judged(so_far: RoundsSoFar) -> RoundsSoFar:
@@ -158,26 +186,22 @@ def _judged(so_far: RoundsSoFar) -> RoundsSoFar:
     return dataclasses.replace(so_far, last=LastDraws(shares, min(count, room), room, over))
 
 
-def _counted(
-    density: CollapsedDensity, so_far: RoundsSoFar, last: LastDraws, rng: np.random.Generator
-) -> RoundsSoFar | Rounds:
-    """Make some of the draws that count, and judge them where these are all."""
-    wanted, made = so_far.wanted, 0 if last.drawn is None else len(last.drawn.z)
-    drawn = drawn_by(so_far.pool, last.shares, min(last.count - made, STEP), density, rng)
-    calls = so_far.calls + len(drawn.z)
-    drawn = drawn if last.drawn is None else joined(last.drawn, drawn)
-    last = dataclasses.replace(last, drawn=drawn)
-    if len(drawn.z) == last.count:
+def _counted(so_far: RoundsSoFar, last: LastDraws) -> RoundsSoFar | Rounds:
+    """Judge the draws that count, where these are all."""
+    wanted, drawn = so_far.wanted, last.drawn
+    if drawn is not None and len(drawn.z) == last.count:
         log_mixture = mixed(drawn.each, last.shares)
         draws = weighted_by(drawn.z, drawn.target, log_mixture, smooth=True)
         enough = int(last.count * min(_SPARE * wanted.target_ess / draws.worth, 2.0))
         hopeless = draws.k_hat >= MAX_SMOOTHED_K_HAT or enough > last.most
         if hopeless or draws.worth >= wanted.target_ess:
             dissent = _dissent(so_far, drawn.target - log_mixture, last.shares)
-            found = Rounds(so_far.proposal, draws.that_count, dissent, calls, wanted.tolerated)
-            return _ended(dataclasses.replace(so_far, calls=calls), last, drawn, found)
+            found = Rounds(
+                so_far.proposal, draws.that_count, dissent, so_far.calls, wanted.tolerated
+            )
+            return _ended(so_far, last, drawn, found)
         last = dataclasses.replace(last, count=enough)
-    return dataclasses.replace(so_far, calls=calls, last=last)
+    return dataclasses.replace(so_far, last=last)
 
 
 def _ended(

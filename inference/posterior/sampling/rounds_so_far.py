@@ -142,6 +142,13 @@ class RoundsSoFar:
         return self.ends[-1]
 
     @property
+    def open(self) -> Array:
+        """Draws of the step that is being made, to be evaluated, shape (n, d)."""
+        if self.last is None:
+            return self.pool.open
+        return self.pool.z[:0] if self.last.drawn is None else self.last.drawn.open
+
+    @property
     def beyond(self) -> NDArray[np.bool_]:
         """Which members lie beyond the heaviest draws, shape (members,)."""
         heaviest = heaviest_of(self.pool.log_ratios[self.members :], self.wanted.tail)

@@ -10,13 +10,14 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.job import Job
 from inference.posterior.sampling.ensemble import WALKERS, warm_walkers
 from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.population import Population
-from inference.posterior.sampling.rounds import begun, step
+from inference.posterior.sampling.rounds import first_draws, next_draws, taken_in
 from inference.posterior.sampling.rounds_so_far import Rounds, RoundsSoFar, Wanted
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.sampling.verdict import Verdict
@@ -31,10 +32,15 @@ __all__ = [
     "HALFWAY_DRAWS",
     "SCOUTED_DRAWS",
     "TOLERATED",
+    "EvaluateTask",
+    "Evaluated",
     "SetOutTask",
     "all_the_way",
+    "put_together",
     "walking_from",
 ]
+
+Array = NDArray[np.float64]
 
 _SHARE = 0.5  # of what the populations took, that importance sampling behind them may take
 _MOST_DRAWS = (12_000, 40_000)  # but so many at least, and at most
@@ -64,39 +70,106 @@ class SetOutTask:
     def run(self) -> Checkpoint:
         """Return where rounds stand; at their end the answer, or ensembles that set out."""
         job, stage, density = self.job, self.stage, self.job.density()
-        members = [each for each in stage.populations if each is not None and len(each.z)]
         before = 0 if stage.rounds is None else stage.rounds.calls
-        reached = self._next(density, members, stage.rounds)
+        reached = self._next(density, stage.rounds)
         while isinstance(reached, RoundsSoFar) and reached.calls - before < self.calls:
-            reached = self._next(density, members, reached)
-        after: Tempering | Weighted | Walking
-        if isinstance(reached, RoundsSoFar):
-            after, calls = dataclasses.replace(stage, rounds=reached), reached.calls
-        else:
-            after, calls = _set_out(job, dataclasses.replace(stage, rounds=None), members, reached)
-        return Checkpoint(after, calls - before, None, job.representatives)
+            reached = self._next(density, reached)
+        return _led_to(job, stage, reached)
 
-    def _next(
-        self, density: CollapsedDensity, members: Sequence[Population], so_far: RoundsSoFar | None
-    ) -> RoundsSoFar | Rounds:
-        """Make the next step of rounds; the first begins them at what was drawn before."""
-        job, stage = self.job, self.stage
-        if so_far is not None:
-            return step(density, so_far, self._stream(so_far.steps))
-        rng, populations = self._stream(0), tuple(each.z for each in members)
-        if stage.tried and stage.early and stage.weighted is not None:
-            drawn = stage.weighted
-            some = rng.choice(len(drawn.z), size=len(populations[0]), p=drawn.weights)
-            populations = (*populations, drawn.z[some])
-        proposal = dataclasses.replace(stage.proposal, share=MAP_SHARE)
-        return begun(density, proposal, populations, rng, _wanted(job, stage, members))
+    def _next(self, density: CollapsedDensity, so_far: RoundsSoFar | None) -> RoundsSoFar | Rounds:
+        drawn = _drawn(self.job, self.stage, density, so_far)
+        return taken_in(drawn, density(drawn.open))
 
-    def _stream(self, steps: int) -> np.random.Generator:
-        """Return the stream of a step: rounds that a job begins in turn have their own."""
-        stage, erring = self.stage, self.job.scene.model_error.integrated
-        which = 0 if stage.scouted else 1 + stage.tried if stage.early else 3
-        which += _ERRING if erring else 0  # they may follow those of an exact model
-        return self.job.stream(Stream.ROUNDS, which, steps)
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Evaluated:
+    """Some of the draws of a step, evaluated.
+
+    Attributes
+    ----------
+    drawn : RoundsSoFar or None
+        With all draws of the step, of the first part alone.
+    values : ndarray, shape (m,)
+        Log density of the part's.
+    """
+
+    drawn: RoundsSoFar | None
+    values: Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class EvaluateTask:
+    """A part of the draws of one step to be evaluated, where that takes long.
+
+    Every part makes all draws, which takes little, and evaluates its own.
+
+    Attributes
+    ----------
+    job, stage : Job, Tempering
+        As of `SetOutTask`.
+    part, parts : int
+        Which of how many.
+    """
+
+    job: Job
+    stage: Tempering
+    part: int
+    parts: int
+
+    def run(self) -> Evaluated:
+        """Evaluate them."""
+        density = self.job.density()
+        drawn = _drawn(self.job, self.stage, density, self.stage.rounds)
+        own = np.array_split(drawn.open, self.parts)[self.part]
+        return Evaluated(drawn if self.part == 0 else None, density(own))
+
+
+def put_together(job: Job, stage: Tempering, parts: Sequence[Evaluated]) -> Checkpoint:
+    """Return what a step led to, as `SetOutTask`, from its parts in their order."""
+    drawn = parts[0].drawn
+    if drawn is None:
+        raise ValueError("the first part of a step comes first")
+    return _led_to(job, stage, taken_in(drawn, np.concatenate([each.values for each in parts])))
+
+
+def _members(stage: Tempering) -> list[Population]:
+    return [each for each in stage.populations if each is not None and len(each.z)]
+
+
+def _drawn(
+    job: Job, stage: Tempering, density: CollapsedDensity, so_far: RoundsSoFar | None
+) -> RoundsSoFar:
+    """Make the draws of the next step; the first begins rounds at what was drawn before."""
+    if so_far is not None:
+        return next_draws(density, so_far, _stream(job, stage, so_far.steps))
+    members, rng = _members(stage), _stream(job, stage, 0)
+    populations = tuple(each.z for each in members)
+    if stage.tried and stage.early and stage.weighted is not None:
+        drawn = stage.weighted
+        some = rng.choice(len(drawn.z), size=len(populations[0]), p=drawn.weights)
+        populations = (*populations, drawn.z[some])
+    proposal = dataclasses.replace(stage.proposal, share=MAP_SHARE)
+    return first_draws(density, proposal, populations, rng, _wanted(job, stage, members))
+
+
+def _stream(job: Job, stage: Tempering, steps: int) -> np.random.Generator:
+    """Return the stream of a step: rounds that a job begins in turn have their own."""
+    which = 0 if stage.scouted else 1 + stage.tried if stage.early else 3
+    # they may follow those of an exact model
+    which += _ERRING if job.scene.model_error.integrated else 0
+    return job.stream(Stream.ROUNDS, which, steps)
+
+
+def _led_to(job: Job, stage: Tempering, reached: RoundsSoFar | Rounds) -> Checkpoint:
+    """Return where rounds stand; at their end the answer, or ensembles that set out."""
+    before = 0 if stage.rounds is None else stage.rounds.calls
+    after: Tempering | Weighted | Walking
+    if isinstance(reached, RoundsSoFar):
+        after, calls = dataclasses.replace(stage, rounds=reached), reached.calls
+    else:
+        begun = dataclasses.replace(stage, rounds=None)
+        after, calls = _set_out(job, begun, _members(stage), reached)
+    return Checkpoint(after, calls - before, None, job.representatives)
 
 
 def _wanted(job: Job, stage: Tempering, members: Sequence[Population]) -> Wanted:

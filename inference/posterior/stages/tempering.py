@@ -15,9 +15,14 @@ from inference.posterior.job import Job
 from inference.posterior.sampling.effort import effort_of, halfway
 from inference.posterior.sampling.ensemble import WALKERS
 from inference.posterior.sampling.population import Population, first_population, temper
-from inference.posterior.stages.chunk import draws_of_rounds, evaluations
+from inference.posterior.stages.chunk import draws_of_rounds, evaluations, parts_of_a_step
 from inference.posterior.stages.ensembles import POPULATIONS
-from inference.posterior.stages.setting_out import SetOutTask, all_the_way, walking_from
+from inference.posterior.stages.setting_out import (
+    EvaluateTask,
+    SetOutTask,
+    all_the_way,
+    walking_from,
+)
 from inference.posterior.stages.stage import Tempering, Walking
 from inference.posterior.streams import Stream
 
@@ -65,8 +70,11 @@ class TemperTask:
         return self.job.stream(Stream.POPULATIONS, index, temperature)
 
 
-def tasks(job: Job, stage: Tempering) -> tuple[TemperTask | SetOutTask, ...]:
+def tasks(job: Job, stage: Tempering) -> tuple[TemperTask | SetOutTask | EvaluateTask, ...]:
     """Return the populations that are still on their way; behind them what comes of them."""
+    parts = parts_of_a_step(job)
+    if stage.arrived and parts > 1:
+        return tuple(EvaluateTask(job, stage, k, parts) for k in range(parts))
     if stage.arrived:
         return (SetOutTask(job, stage, draws_of_rounds(job)),)
     return tuple(

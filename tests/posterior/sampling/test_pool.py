@@ -1,7 +1,6 @@
 """Draws of many laws at once: their shares, and what suits a target best."""
 
 import dataclasses
-from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -87,10 +86,14 @@ def test_draws_without_a_weight_and_members_change_nothing() -> None:
 
 def test_draws_come_from_each_law_by_its_share() -> None:
     shares = np.array([0.7, 0.0, 0.3])
-    drawn = drawn_by(_pool(), shares, 1001, cast(Any, _target), np.random.default_rng(2))
+    drawn = drawn_by(_pool(), shares, 1001, np.random.default_rng(2))
     assert drawn.counts in ((701, 0, 300), (700, 0, 301))
     assert drawn.z.shape == (1001, 1)
-    assert np.array_equal(drawn.target, _target(drawn.z))
+    assert np.array_equal(drawn.open, drawn.z)
+    values = _target(drawn.z)
+    part = drawn.evaluated(values[:7])
+    assert np.array_equal(part.open, drawn.z[7:])
+    assert np.array_equal(part.evaluated(values[7:]).target, values)
     near = np.abs(drawn.z[:, 0] - CENTRES[2]) < np.abs(drawn.z[:, 0] - CENTRES[0])
     # 2 % of a Student-t law of five degrees lie beyond the middle, 4.5 away: five sd of the counts
     assert abs(np.count_nonzero(near) - 300) < 5 * np.sqrt(0.02 * 1001)
@@ -99,7 +102,7 @@ def test_draws_come_from_each_law_by_its_share() -> None:
 def test_draws_in_many_parts_come_from_each_law_by_its_share() -> None:
     """Planted fault: rounded the same way in every part, a law never gave its half of a draw."""
     shares, rng = np.array([0.81, 0.14, 0.05]), np.random.default_rng(2)
-    parts = [drawn_by(_pool(), shares, 10, cast(Any, _target), rng).counts for _ in range(400)]
+    parts = [drawn_by(_pool(), shares, 10, rng).counts for _ in range(400)]
     assert np.abs(np.array(parts) - 10 * shares).max() < 1.0
     assert {sum(counts) for counts in parts} == {10}
     # a count above or below has a standard deviation of at most a half: five of the mean's

@@ -9,7 +9,13 @@ import pytest
 from inference.posterior import archive
 from inference.posterior.sampling import next_laws
 from inference.posterior.sampling.proposal import Mixture, Proposal
-from inference.posterior.sampling.rounds import STEP, begun, in_rounds, step
+from inference.posterior.sampling.rounds import (
+    STEP,
+    first_draws,
+    in_rounds,
+    next_draws,
+    taken_in,
+)
 from inference.posterior.sampling.rounds_so_far import Rounds, RoundsSoFar, Wanted
 from tests.posterior.test_archive import same
 
@@ -54,12 +60,16 @@ def _rng(steps: int) -> np.random.Generator:
     return np.random.default_rng([4, steps])
 
 
-def _begun(target: Any = _target, wanted: Wanted = WANTED) -> RoundsSoFar:
-    return begun(target, START, POPULATIONS, _rng(0), wanted)
+def _begun(target: Any = _target) -> RoundsSoFar:
+    drawn = first_draws(target, START, POPULATIONS, _rng(0), WANTED)
+    found = taken_in(drawn, target(drawn.open))
+    assert isinstance(found, RoundsSoFar)
+    return found
 
 
 def _next(so_far: RoundsSoFar, target: Any = _target) -> RoundsSoFar | Rounds:
-    return step(target, so_far, _rng(so_far.steps))
+    drawn = next_draws(target, so_far, _rng(so_far.steps))
+    return taken_in(drawn, target(drawn.open))
 
 
 def _packed(so_far: RoundsSoFar) -> tuple[Any, archive.Arrays]:
@@ -119,12 +129,16 @@ def test_a_step_takes_few_evaluations_and_all_are_counted() -> None:
 
 def test_in_one_go_rounds_make_the_same_steps() -> None:
     """With one source of randomness for all steps."""
-    rng = np.random.default_rng(4)
-    reached: RoundsSoFar | Rounds = begun(cast(Any, _target), START, POPULATIONS, rng, WANTED)
+    rng, target = np.random.default_rng(4), cast(Any, _target)
+    drawn = first_draws(target, START, POPULATIONS, rng, WANTED)
+    reached = taken_in(drawn, _target(drawn.open))
     while isinstance(reached, RoundsSoFar):
-        reached = step(cast(Any, _target), reached, rng)
+        assert reached.open.size == 0
+        drawn = next_draws(target, reached, rng)
+        assert 0 < len(drawn.open) <= STEP
+        reached = taken_in(drawn, _target(drawn.open))
     rng = np.random.default_rng(4)
-    found = in_rounds(cast(Any, _target), START, POPULATIONS, rng, WANTED)
+    found = in_rounds(target, START, POPULATIONS, rng, WANTED)
     assert np.array_equal(found.draws.z, reached.draws.z)
     assert np.array_equal(found.draws.weights, reached.draws.weights)
 

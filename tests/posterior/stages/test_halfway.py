@@ -21,6 +21,7 @@ from inference.posterior.stages.stage import Starting, Tempering, Walking, Weigh
 from inference.posterior.stages.standing import best_known
 from inference.posterior.stages.starting import begin
 from simulator.scene import parse_scene
+from tests.posterior.stages.planted_rounds import plant_rounds
 
 SEED = 1
 
@@ -100,7 +101,7 @@ def test_where_rounds_fail_populations_are_carried_all_the_way(
         none: Any = (*arguments[:4], wanted)
         return dataclasses.replace(in_rounds(*none), dissent=1.0)
 
-    monkeypatch.setattr(setting_out, "begun", doubted)
+    plant_rounds(monkeypatch, doubted)
     stage = _after("auto").stage
     assert isinstance(stage, Tempering)
     assert not stage.early
@@ -141,7 +142,7 @@ def test_rounds_that_came_far_begin_again_where_they_are(monkeypatch: pytest.Mon
         given.append(arguments[2])
         return doubtful
 
-    monkeypatch.setattr(setting_out, "begun", doubted)
+    plant_rounds(monkeypatch, doubted)
     job, first = _job("auto"), _after("auto")
     assert isinstance(first.stage, Tempering)
     assert first.stage.early
@@ -168,7 +169,7 @@ def test_rounds_that_came_nowhere_are_not_tried_again(monkeypatch: pytest.Monkey
     one[0] = 1.0
     poor = dataclasses.replace(draws, weights=one, k_hat=math.inf)
     found = dataclasses.replace(_drawn(), draws=poor, dissent=0.0)
-    monkeypatch.setattr(setting_out, "begun", lambda *_: found)
+    plant_rounds(monkeypatch, lambda *_: found)
     stage = _after("auto").stage
     assert isinstance(stage, Tempering)
     assert not stage.early
@@ -185,7 +186,7 @@ def test_trusted_draws_that_are_too_few_are_drawn_on_only_where_they_answer(
     draws = dataclasses.replace(draws, weights=some, k_hat=0.1)
     few = dataclasses.replace(_drawn(), draws=draws, dissent=0.0)
     monkeypatch.setattr(Rounds, "trusted", property(lambda _: True))
-    monkeypatch.setattr(setting_out, "begun", lambda *_: few)
+    plant_rounds(monkeypatch, lambda *_: few)
     assert few.draws.ess < _job("auto").settings.target_ess
     again = _after("auto")
     assert isinstance(again.stage, Tempering)

@@ -19,7 +19,7 @@ from inference.posterior.answer.posterior import Posterior
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.responding import RespondTask, decided, tasks
-from inference.posterior.stages.setting_out import SetOutTask
+from inference.posterior.stages.setting_out import EvaluateTask, SetOutTask
 from inference.posterior.stages.stage import Settled, Starting, Tempering, Weighted
 from simulator.scene import parse_scene
 from tests.posterior.test_archive import same
@@ -77,7 +77,7 @@ def test_a_bent_response_is_followed_by_rounds_from_the_moved_draws() -> None:
     spread = exact.draws.weights @ (exact.draws.z - exact.draws.weights @ exact.draws.z) ** 2
     assert np.max(members.z.var(axis=0) / spread) > 2  # the errors are most of what is not known
     (task, *_) = fold.tasks(_job(), begun)
-    assert isinstance(task, SetOutTask)
+    assert isinstance(task, SetOutTask | EvaluateTask)
     assert task.job.scene.model_error.integrated
     last = _steps()[-1]
     assert last.integrated

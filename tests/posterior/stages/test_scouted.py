@@ -16,6 +16,7 @@ from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.ensembles import POPULATIONS
 from inference.posterior.stages.stage import Starting, Tempering, Walking, Weighted
 from inference.posterior.stages.starting import begin
+from tests.posterior.stages.planted_rounds import plant_rounds
 
 SEED = 0
 # of standard coordinates, by two runs of 4 ensembles that made 531 and 663 steps (seeds 11 and 12)
@@ -47,7 +48,7 @@ def _rounds(*_: Any) -> Rounds:
 
 
 def _after(method: str, monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.setattr(setting_out, "begun", lambda *_: _rounds())
+    plant_rounds(monkeypatch, lambda *_: _rounds())
     job = _job(method)
     (task,) = fold.tasks(job, _started())
     return fold.merge(job, _started(), [fold.run(task)]).stage

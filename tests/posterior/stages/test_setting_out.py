@@ -9,12 +9,13 @@ import pytest
 
 from benchmarks.answer_times import _case
 from inference.posterior import fold
-from inference.posterior.sampling.rounds import STEP, step
-from inference.posterior.sampling.rounds_so_far import Rounds, RoundsSoFar
+from inference.posterior.sampling.rounds import STEP, next_draws
+from inference.posterior.sampling.rounds_so_far import RoundsSoFar
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages import setting_out, tempering
 from inference.posterior.stages.checkpoint import Checkpoint
-from inference.posterior.stages.chunk import draws_of_rounds, evaluations
+from inference.posterior.stages.chunk import draws_of_rounds, evaluations, parts_of_a_step
+from inference.posterior.stages.setting_out import Evaluated
 from inference.posterior.stages.stage import Starting, Tempering, Weighted
 from inference.posterior.stages.standing import standing
 from inference.posterior.stages.starting import begin
@@ -83,11 +84,11 @@ def test_every_step_has_a_stream_of_its_own(monkeypatch: pytest.MonkeyPatch) -> 
     """Planted fault: of one stream for all steps, every round drew the same normal numbers."""
     states: list[str] = []
 
-    def noted(*arguments: Any) -> RoundsSoFar | Rounds:
+    def noted(*arguments: Any) -> RoundsSoFar:
         states.append(str(arguments[2].bit_generator.state))
-        return step(*arguments)
+        return next_draws(*arguments)
 
-    monkeypatch.setattr(setting_out, "step", noted)
+    monkeypatch.setattr(setting_out, "next_draws", noted)
     stage = _merged(_merged(_started())).stage
     assert isinstance(stage, Tempering)
     begun_again = dataclasses.replace(_started(), stage=dataclasses.replace(stage, rounds=None))
@@ -141,3 +142,33 @@ def test_after_few_rounds_their_draws_do_not_answer(monkeypatch: pytest.MonkeyPa
     assert stage.rounds.draws is None
     reasons = standing(stage).verdict.reasons
     assert not any("rounds" in reason for reason in reasons)
+
+
+def test_draws_of_costly_steps_are_evaluated_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same rounds to the last bit, whoever evaluates which part; and all are counted."""
+    monkeypatch.setattr(tempering, "draws_of_rounds", lambda _: 1)
+    whole = _chunks(stored=False)
+    monkeypatch.setattr(tempering, "parts_of_a_step", lambda _: 3)
+    reached, before = [_started()], 0
+    while _in_rounds(reached[-1]):
+        tasks = fold.tasks(_job(), reached[-1])
+        assert len(tasks) == 3
+        pieces = [fold.run(task) for task in tasks]
+        values = [piece.values for piece in pieces if isinstance(piece, Evaluated)]
+        reached.append(fold.merge(_job(), Checkpoint.from_bytes(reached[-1].to_bytes()), pieces))
+        assert max(map(len, values)) - min(map(len, values)) <= 1
+        calls, before = reached[-1].calls - before, reached[-1].calls
+        if len(reached) > 2:
+            assert calls == sum(map(len, values)) <= STEP
+    assert same(tuple(reached), tuple(whole))
+    with pytest.raises(ValueError, match="first part"):
+        fold.merge(_job(), _started(), pieces[1:])
+
+
+def test_steps_are_dealt_out_where_their_evaluation_is_most_of_them() -> None:
+    integrated = _job().with_error_integrated()
+    assert parts_of_a_step(_job()) == 1
+    assert parts_of_a_step(integrated) == 2
+    stage = _started().stage
+    assert isinstance(stage, Tempering)
+    assert len(tempering.tasks(integrated, stage)) == 2
