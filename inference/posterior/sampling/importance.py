@@ -17,6 +17,7 @@ __all__ = [
     "WeightedDraws",
     "draw_weighted",
     "generalised_pareto",
+    "log_ratio",
     "pareto_k_hat",
     "smoothed",
     "weighted_by",
@@ -230,6 +231,23 @@ def _log_pareto_quantiles(shape: float, scale: float, p: Array) -> Array:
     return np.asarray(x + np.log(-np.expm1(-x)) + math.log(scale) - math.log(shape))
 
 
+def log_ratio(log_density: Array, log_law: Array) -> Array:
+    """Return the log of a target over a law.
+
+    Parameters
+    ----------
+    log_density, log_law : ndarray, shape (n,)
+        Log densities of the target and of the law, at the same points.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        -inf where the target is zero, also so far out that the law is no number there.
+    """
+    ratio = np.full(log_density.shape, -np.inf)
+    return np.subtract(log_density, log_law, out=ratio, where=log_density > -np.inf)
+
+
 def draw_weighted(
     density: CollapsedDensity, proposal: Law, rng: np.random.Generator, n: int
 ) -> WeightedDraws:
@@ -268,7 +286,7 @@ def weighted_by(
     WeightedDraws
         With k_hat inf where no draw has a positive density.
     """
-    n, log_weights = len(z), log_density - log_proposal
+    n, log_weights = len(z), log_ratio(log_density, log_proposal)
     if smooth:
         log_weights, k_hat = smoothed(log_weights)
     else:

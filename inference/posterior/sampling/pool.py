@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from inference.posterior.sampling.importance import Law
+from inference.posterior.sampling.importance import Law, log_ratio
 from inference.posterior.sampling.proposal import Proposal
 
 __all__ = ["Pool", "drawn_by", "joined", "mixed", "shares_that_suit", "with_laws"]
@@ -69,7 +69,7 @@ class Pool:
     @functools.cached_property
     def log_ratios(self) -> Array:
         """Log of the target over that law, shape (n,)."""
-        return np.asarray(self.target - self.log_mixture)
+        return log_ratio(self.target, self.log_mixture)
 
 
 def with_laws(

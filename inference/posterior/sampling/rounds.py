@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.importance import (
     MAX_SMOOTHED_K_HAT,
+    log_ratio,
     pareto_k_hat,
     weighted_by,
 )
@@ -195,7 +196,7 @@ def _counted(so_far: RoundsSoFar, last: LastDraws) -> RoundsSoFar | Rounds:
         enough = int(last.count * min(_SPARE * wanted.target_ess / draws.worth, 2.0))
         hopeless = draws.k_hat >= MAX_SMOOTHED_K_HAT or enough > last.most
         if hopeless or draws.worth >= wanted.target_ess:
-            dissent = _dissent(so_far, drawn.target - log_mixture, last.shares)
+            dissent = _dissent(so_far, log_ratio(drawn.target, log_mixture), last.shares)
             found = Rounds(
                 so_far.proposal, draws.that_count, dissent, so_far.calls, wanted.tolerated
             )

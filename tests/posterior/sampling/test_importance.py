@@ -5,7 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from inference.posterior.sampling.importance import pareto_k_hat, weighted_by, weighted_sizes
+from inference.posterior.sampling.importance import (
+    log_ratio,
+    pareto_k_hat,
+    weighted_by,
+    weighted_sizes,
+)
 from inference.posterior.selection.leave_one_out import leave_one_out
 
 
@@ -89,3 +94,21 @@ def test_smoothing_leaves_all_but_the_tail_and_its_order() -> None:
     assert np.ptp(kept) < 1e-9
     assert (np.diff(smooth.weights[order]) >= 0).all()
     assert smooth.weights.max() <= np.exp(kept[0]) * plain.weights.max() * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("far", [-np.inf, np.nan])
+@pytest.mark.parametrize("smooth", [False, True])
+def test_draws_so_far_out_that_no_law_is_a_number_have_no_weight(far: float, smooth: bool) -> None:
+    """Planted fault: one of them in a run of rounds made all weights none."""
+    rng = np.random.default_rng(3)
+    z = rng.standard_normal((2000, 1))
+    density, law = -0.6 * z[:, 0] ** 2, -0.5 * z[:, 0] ** 2
+    density[:40] = -np.inf
+    beyond = np.where(np.arange(2000) < 20, far, law)
+    assert (log_ratio(density, beyond) == log_ratio(density, law)).all()
+    found, wanted = (weighted_by(z, density, each, smooth=smooth) for each in (beyond, law))
+    assert math.isfinite(wanted.k_hat)
+    assert found.k_hat == wanted.k_hat
+    assert np.array_equal(found.weights, wanted.weights)
+    assert found.weights[:40].sum() == 0.0
+    assert found.log_evidence == wanted.log_evidence
