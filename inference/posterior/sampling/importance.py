@@ -245,7 +245,7 @@ def log_ratio(log_density: Array, log_law: Array) -> Array:
         -inf where the target is zero, also so far out that the law is no number there.
     """
     ratio = np.full(log_density.shape, -np.inf)
-    return np.subtract(log_density, log_law, out=ratio, where=log_density > -np.inf)
+    return np.asarray(np.subtract(log_density, log_law, out=ratio, where=log_density > -np.inf))
 
 
 def draw_weighted(
