@@ -22,6 +22,8 @@ Way = Literal["fitted", "climbed", "scouts"]
 
 _WAYS: tuple[Way, ...] = ("fitted", "climbed", "scouts")  # the longest first
 
+_SOME = (250, 50)  # frames at most that may hold the object, and that do not
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Looked:
@@ -87,5 +89,6 @@ def of_some_frames(job: Job) -> Job:
     rng, usable = job.stream(Stream.REPRESENTATIVES, 0), np.flatnonzero(job.usable)
     present = job.frames.object_present
     holds = np.ones(len(usable), dtype=bool) if present is None else present[usable]
-    some = [rng.permutation(usable[flag])[:most] for flag, most in ((holds, 250), (~holds, 50))]
+    kinds = zip((holds, ~holds), _SOME, strict=True)
+    some = [rng.permutation(usable[flag])[:most] for flag, most in kinds]
     return job.part(np.sort(np.concatenate(some)))

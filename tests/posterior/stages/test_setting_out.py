@@ -55,6 +55,14 @@ def _chunks(stored: bool) -> list[Checkpoint]:
     return found
 
 
+@functools.cache
+def _steps() -> tuple[Checkpoint, ...]:
+    """The same with a step a chunk."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tempering, "draws_of_rounds", lambda _: 1)
+        return tuple(_chunks(stored=False))
+
+
 def test_in_one_chunk_or_in_many_that_are_stored_rounds_come_to_the_same(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -112,11 +120,10 @@ def test_one_step_is_made_however_short_a_chunk_is(monkeypatch: pytest.MonkeyPat
     assert stage.rounds.steps == 2
 
 
-def test_out_of_time_draws_of_rounds_answer_and_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tempering, "draws_of_rounds", lambda _: 1)
+def test_out_of_time_draws_of_rounds_answer_and_say_so() -> None:
     checkpoint = next(
         each
-        for each in _chunks(stored=False)
+        for each in _steps()
         if isinstance(each.stage, Tempering) and each.stage.rounds and each.stage.rounds.telling
     )
     assert fold.tasks(_job(), checkpoint, LIMIT) == ()
@@ -132,11 +139,10 @@ def test_out_of_time_draws_of_rounds_answer_and_say_so(monkeypatch: pytest.Monke
     assert not fold.summarise(_job(), checkpoint, 0.0, 0.0).verdict.converged
 
 
-def test_after_few_rounds_their_draws_do_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_after_few_rounds_their_draws_do_not_answer() -> None:
     """Planted fault: after two rounds even weights (k-hat 0.3, an effective size of 260) held a
     tenth of an unknown's standard deviation, in a random set."""
-    monkeypatch.setattr(tempering, "draws_of_rounds", lambda _: 1)
-    stage = _merged(_merged(_merged(_started()))).stage
+    stage = _steps()[3].stage
     assert isinstance(stage, Tempering)
     assert stage.rounds is not None
     assert stage.rounds.draws is None
@@ -146,8 +152,6 @@ def test_after_few_rounds_their_draws_do_not_answer(monkeypatch: pytest.MonkeyPa
 
 def test_draws_of_costly_steps_are_evaluated_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same rounds to the last bit, whoever evaluates which part; and all are counted."""
-    monkeypatch.setattr(tempering, "draws_of_rounds", lambda _: 1)
-    whole = _chunks(stored=False)
     monkeypatch.setattr(tempering, "parts_of_a_step", lambda _: 3)
     reached, before = [_started()], 0
     while _in_rounds(reached[-1]):
@@ -160,7 +164,7 @@ def test_draws_of_costly_steps_are_evaluated_in_parts(monkeypatch: pytest.Monkey
         calls, before = reached[-1].calls - before, reached[-1].calls
         if len(reached) > 2:
             assert calls == sum(map(len, values)) <= STEP
-    assert same(tuple(reached), tuple(whole))
+    assert same(tuple(reached), _steps())
     with pytest.raises(ValueError, match="first part"):
         fold.merge(_job(), _started(), pieces[1:])
 
