@@ -78,6 +78,11 @@ def test_ways_that_look_at_once_know_nothing_of_one_another() -> None:
     best = max((*start.climbed, *start.fitted), key=lambda one: one.log_density)
     assert start.optima[0] is best
     assert all(a.is_near(a.z) and not a.is_near(b.z) for a, b in itertools.pairwise(start.optima))
+    # whichever way met it, and the best first
+    far = dataclasses.replace(best, z=best.z + 30.0 * best.factor.sum(axis=1), log_density=1e6)
+    both = dataclasses.replace(start, climbed=(best,), fitted=(far, best)).optima
+    assert both == [far, best]
+    assert dataclasses.replace(start, climbed=(far, best), fitted=(best,)).optima == both
 
 
 def test_a_choice_that_leaves_nothing_unknown_has_nothing_to_be_looked_for() -> None:
