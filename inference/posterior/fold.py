@@ -173,7 +173,9 @@ def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoi
             return _after(checkpoint, pieces)
         case Tempering() as stage if any(isinstance(piece, Evaluated) for piece in pieces):
             evaluated = _all(Evaluated, pieces)
-            return _after(checkpoint, (put_together(sampled(job, checkpoint), stage, evaluated),))
+            with at_once(*KERNELS):  # ensembles may set out from there
+                reached = put_together(sampled(job, checkpoint), stage, evaluated)
+            return _after(checkpoint, (reached,))
         case Tempering() as stage if stage.arrived:
             return _after(checkpoint, pieces)
         case Tempering() as stage:

@@ -16,7 +16,7 @@ from inference.posterior.sampling.start import find_optima
 from inference.posterior.stages.stage import Starting
 from inference.posterior.streams import Stream
 
-__all__ = ["LookTask", "Looked", "looking", "of_some_frames", "taken_in"]
+__all__ = ["LookTask", "Looked", "looking", "of_some_frames", "taken_in", "ways_left"]
 
 Way = Literal["fitted", "climbed", "scouts"]
 
@@ -69,10 +69,15 @@ class LookTask:
         return Looked(Starting(scouts=scouts), calls)
 
 
-def looking(job: Job, start: Starting, *, scouts: bool) -> tuple[LookTask, ...]:
+def ways_left(start: Starting, *, scouts: bool) -> tuple[Way, ...]:
     """Return the ways that are left; scouts are not sent out while terms are being decided."""
     ways = _WAYS if scouts else _WAYS[:2]
-    return tuple(LookTask(job, way) for way in ways if getattr(start, way) is None)
+    return tuple(way for way in ways if getattr(start, way) is None)
+
+
+def looking(job: Job, start: Starting, *, scouts: bool) -> tuple[LookTask, ...]:
+    """Return a task for each of the ways that are left."""
+    return tuple(LookTask(job, way) for way in ways_left(start, scouts=scouts))
 
 
 def taken_in(start: Starting, found: Sequence[Looked]) -> tuple[Starting, int]:

@@ -8,7 +8,7 @@ from inference.posterior.sampling.start import Optimum, refine
 from inference.posterior.selection.models import Candidate, assess, candidate_terms, reduced
 from inference.posterior.selection.selection import Selection, decide
 from inference.posterior.stages.checkpoint import Checkpoint
-from inference.posterior.stages.looking import Looked, LookTask, looking, taken_in
+from inference.posterior.stages.looking import Looked, LookTask, looking, taken_in, ways_left
 from inference.posterior.stages.optima import that_matter
 from inference.posterior.stages.stage import Selecting, Starting
 from inference.posterior.streams import Stream
@@ -95,7 +95,7 @@ def looked(stage: Selecting, found: Sequence[Looked]) -> tuple[Selecting, int]:
     """
     rest, starts, calls = list(found), [], 0
     for start in stage.starts:
-        left = 0 if start.looked else 2
+        left = len(ways_left(start, scouts=False))
         new, used = taken_in(start, rest[:left])
         rest, calls = rest[left:], calls + used
         starts.append(new)
