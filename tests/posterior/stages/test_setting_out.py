@@ -60,6 +60,7 @@ def _steps() -> tuple[Checkpoint, ...]:
     """The same with a step a chunk."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tempering, "draws_of_rounds", lambda _: 1)
+        patch.setattr(tempering, "parts_of_a_step", lambda _: 1)  # whichever test asks first
         return tuple(_chunks(stored=False))
 
 
