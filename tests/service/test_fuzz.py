@@ -202,7 +202,7 @@ def check(response: httpx.Response) -> None:
 
 
 relaxed = settings(
-    deadline=None, max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 

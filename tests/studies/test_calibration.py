@@ -1,4 +1,4 @@
-"""Simulation-based calibration, small: eight data sets a scene; and that it can fail."""
+"""Simulation-based calibration, small: twelve data sets a scene; and that it can fail."""
 
 import dataclasses
 
@@ -13,7 +13,7 @@ from benchmarks.calibration.truth import draw_truth, with_known
 from benchmarks.calibration.uniformity import chi_square_p, ecdf_difference, simultaneous_band
 from simulator.parameters import parameters_of
 
-SETS = 8  # `make calibrate` runs 200
+SETS = 12  # `make calibrate` runs 200
 ALARM = 1e-3  # of each scene, shared among its quantities
 
 
