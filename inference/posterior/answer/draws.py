@@ -53,9 +53,9 @@ class Draws:
     log_likelihood : ndarray, shape (ensembles, walkers, t, frames)
         log p(readings of the frame | parameters), its range integrated out; nan likewise.
     widened : bool
-        Whether parameters and ranges are moved by a random part of what the law of the ranges, the
-        number of frames or a wider default prior would move them: they are then wider than the
-        posterior whose `log_density` this is.
+        Whether parameters and ranges are moved by a random part of what the law of the ranges or
+        the number of frames would move them, or mixed with those of a glossy object: they are then
+        not those of the posterior whose `log_density` this is.
     """
 
     names: tuple[str, ...]

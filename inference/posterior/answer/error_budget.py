@@ -30,8 +30,8 @@ from inference.posterior.answer.shadow_beside import shadow_beside, with_shadow
 from inference.posterior.answer.where_bent import best_ends, where_bent
 from inference.posterior.answer.where_known import where_known
 from inference.posterior.criticism.discrepancy_check import BENT, LargerDiscrepancy
+from inference.posterior.criticism.glossy_object import GlossyObject
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
-from inference.posterior.criticism.size_prior import WiderPrior
 from inference.posterior.job import Job
 from simulator.discrepancy import discrepancy_basis
 
@@ -77,7 +77,7 @@ def error_budget(
     log_r: Array,
     larger: LargerDiscrepancy | None,
     sensitivity: PriorSensitivity | None,
-    wider: WiderPrior | None,
+    glossy: GlossyObject | None,
     rng: np.random.Generator,
 ) -> ErrorBudget:
     """Compute the response to the model's errors at draws, and the parts of their spread.
@@ -93,8 +93,8 @@ def error_budget(
     sensitivity : PriorSensitivity or None
         Where the answer rests on the law of the ranges: what the reference prior would change, as
         the last of the errors.
-    wider : WiderPrior or None
-        Where nothing is said of the object's size: what a wider prior of it would change.
+    glossy : GlossyObject or None
+        Where nothing is said of the object: what changes as it may be glossy.
     """
     error, rates = job.scene.model_error, rates_of(density.frames)
     shadow = error.shadow if density.parameters.has_background else 0.0
@@ -131,14 +131,15 @@ def error_budget(
         for by, moved in zip((by_z, by_log_r), follow, strict=True):
             by[0] = by[0] + moved[:, :, :1]
             by.append(moved[:, :, 1:])
-    if wider is not None:
-        by_z.append(np.broadcast_to(wider.of_z, (*at.shape, 2)))
-        by_log_r.append(np.broadcast_to(wider.of_log_r, (*ranges.shape, 2)))
+    if glossy is not None:
+        for by, moved in zip((by_z, by_log_r), (glossy.of_z, glossy.of_log_r), strict=True):
+            by[0] = by[0] + moved[:, :1]
+            by.append(np.broadcast_to(moved[:, 1:], (len(at), *moved[:, 1:].shape)))
     if sensitivity is not None:
         by_z.append(np.broadcast_to(sensitivity.of_z[:, None], (*at.shape, 1)))
         moved = np.broadcast_to(sensitivity.of_log_r[:, None], (*ranges.shape, 1))
         by_log_r.append(moved)
-    of_scene = (0 if wider is None else 2) + (0 if sensitivity is None else 1)
+    of_scene = (0 if glossy is None else 1) + (0 if sensitivity is None else 1)
     of_z, of_log_r = np.concatenate(by_z, axis=2), np.concatenate(by_log_r, axis=2)
     return ErrorBudget(
         at,

@@ -12,13 +12,13 @@ from inference.identifiability.statuses import Spread
 from inference.posterior.answer.draws import Draws
 from inference.posterior.answer.error_budget import ErrorBudget, error_budget
 from inference.posterior.criticism.discrepancy_check import LargerDiscrepancy, larger_discrepancy
+from inference.posterior.criticism.glossy_object import glossy_object
 from inference.posterior.criticism.many_frames import following
 from inference.posterior.criticism.prior_sensitivity import (
     PriorSensitivity,
     leaning,
     prior_sensitivity,
 )
-from inference.posterior.criticism.size_prior import wider_prior
 from inference.posterior.job import Job
 from inference.posterior.sample import Sample
 from inference.posterior.streams import Stream
@@ -105,8 +105,8 @@ def with_model_error(
     if bias is not None and leaning(sensitivity) is None:
         sensitivity = following(bias, chosen, log_r)
     owed = leaning(sensitivity)
-    wider = wider_prior(job.scene, density.parameters.names, chosen, log_r)
-    budget = error_budget(job, density, chosen, log_r, larger, owed, wider, rng)
+    glossy = glossy_object(job.scene, density.parameters.names, chosen, log_r)
+    budget = error_budget(job, density, chosen, log_r, larger, owed, glossy, rng)
     errors = budget.errors(m, rng)
     z = budget.moved(sample.flat, budget.errors(len(sample.flat), rng)).reshape(sample.z.shape)
     z[:, :, draws.thinned] = budget.moved(chosen, errors).reshape(thinned.shape)
@@ -123,7 +123,7 @@ def with_model_error(
         reported = density.parameters.natural(budget.moved(each, budget.errors(len(each), rng)))
     present = np.isfinite(moved[0])
     scale = float(moved[:, present].mean(axis=1).std()) if present.any() else math.nan
-    widened = owed is not None or wider is not None
+    widened = owed is not None or glossy is not None
     return Whole(
         chosen,
         log_r,

@@ -1,0 +1,88 @@
+"""What an answer owes to the default priors of the object: they are those of a diffuse one.
+
+A glossy surface mirrors the emitter: its light falls off as from an object of many times the size,
+and is weaker. Where a scene says nothing of the object it may as well be glossy: what is told is a
+mixture of the draws and of what they would be then. What the readings tell by themselves stays
+where it is.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from simulator.scene import Scene
+
+__all__ = ["GlossyObject", "glossy_object"]
+
+Array = NDArray[np.float64]
+
+_SIZE, _REFLECTANCE = "object.c0", "object.c2"
+# glossy plates of Appendix B against diffuse ones of the same size, over the sigmas of the default
+# priors: c0 is exp(4) times as large in the median, c2 a quarter
+_MOVES = {_SIZE: 4.0 / 2.0, _REFLECTANCE: math.log(0.25) / 1.0}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class GlossyObject:
+    """How an answer changes where the object may be glossy.
+
+    Attributes
+    ----------
+    of_z : ndarray, shape (d, 2)
+        By what means move, and by a standard normal error: whether it is glossy.
+    of_log_r : ndarray, shape (frames, 2)
+        Of log r; zero for a frame without object.
+    probability : float
+        Of a glossy object, given the readings.
+    """
+
+    of_z: Array
+    of_log_r: Array
+    probability: float
+
+
+def glossy_object(
+    scene: Scene, names: tuple[str, ...], z: Array, log_r: Array
+) -> GlossyObject | None:
+    """Mix draws with what they would be if the object were glossy, at even odds.
+
+    The priors of both differ by their middles alone, and so densities by the factor
+    ``exp(a z - a² / 2)``, a the difference [standard deviations]. Draws follow it as those of a
+    normal law do: means by their covariance with a z (exponential tilting). Weights would be those
+    of a few draws in the tail.
+
+    Parameters
+    ----------
+    scene : Scene
+        As sampled.
+    names : tuple of str
+        Of the unknowns.
+    z : ndarray, shape (n, d)
+        Draws of equal weight, in the coordinates whose prior is standard normal.
+    log_r : ndarray, shape (n, frames)
+        Their ranges; nan for a frame without object.
+
+    Returns
+    -------
+    GlossyObject or None
+        None where c0 is known, or its prior is stated or learnt, or the scene says that its model
+        is exact: priors then mean what they say. A prior of c2 that is stated stands in any case.
+    """
+    error, present = scene.model_error, np.isfinite(log_r[0])
+    learnt = () if scene.joint is None else scene.joint.unknowns
+    said = {_SIZE: scene.object.c0, _REFLECTANCE: scene.object.c2}
+    left = {name for name, value in said.items() if value is None and name not in learnt}
+    if _SIZE not in left or not (error.flux or error.range_m) or not present.any():
+        return None
+    move = np.array([_MOVES[name] if name in left else 0.0 for name in names])
+    gain = z @ move
+    columns = np.concatenate([z, np.where(present, log_r, 0.0)], axis=1)
+    moved = (gain - gain.mean()) @ (columns - columns.mean(axis=0)) / len(z)
+    odds = gain.mean() + 0.5 * gain.var() - 0.5 * float(move @ move)
+    probability = float(scipy.special.expit(odds))
+    spread = math.sqrt(probability * (1.0 - probability))
+    both, d = np.outer(moved, [probability, spread]), z.shape[1]
+    return GlossyObject(both[:d], both[d:], probability)
