@@ -12,7 +12,7 @@ from inference.identifiability.statuses import Spread
 from inference.posterior.answer.draws import Draws
 from inference.posterior.answer.error_budget import ErrorBudget, error_budget
 from inference.posterior.criticism.discrepancy_check import LargerDiscrepancy, larger_discrepancy
-from inference.posterior.criticism.glossy_object import glossy_object
+from inference.posterior.criticism.glossy_object import GlossyObject, glossy_object
 from inference.posterior.criticism.many_frames import following
 from inference.posterior.criticism.prior_sensitivity import (
     PriorSensitivity,
@@ -52,6 +52,8 @@ class Whole:
         Where the flux's error was integrated out: what one twice as large would change.
     sensitivity : PriorSensitivity or None
         What the answer owes to the law of the ranges.
+    glossy : GlossyObject or None
+        Where nothing is said of the object: what changes as it may be glossy.
     """
 
     chosen: Array
@@ -62,6 +64,7 @@ class Whole:
     budget: ErrorBudget
     larger: LargerDiscrepancy | None
     sensitivity: PriorSensitivity | None
+    glossy: GlossyObject | None
 
     @property
     def scale_error(self) -> float:
@@ -133,4 +136,5 @@ def with_model_error(
         budget,
         larger,
         sensitivity,
+        glossy,
     )

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from benchmarks.coverage.classes import CLASSES, DataSet, draw
 from inference.density.collapsed import CollapsedDensity
+from inference.identifiability.status import Identifiability
 from inference.posterior import fold
 from inference.posterior.answer.posterior import Posterior
-from inference.posterior.criticism.glossy_object import GlossyObject, glossy_object
+from inference.posterior.criticism.glossy_object import GlossyObject, glossy_object, mark_glossy
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages.stage import Weighted
 from simulator.catalogue import plate_scene
@@ -82,6 +83,33 @@ def test_a_normal_posterior_is_mixed_with_that_of_the_other_prior(
     apart = found.of_z[:, 0] / found.probability
     between = found.probability * (1 - found.probability) * apart**2
     assert found.of_z[:, 1] ** 2 == pytest.approx(between)
+
+
+def _rows(found: GlossyObject) -> dict[str, Identifiability]:
+    rows = tuple(Identifiability(n, "identified", 0.9, "why") for n in (*NAMES, "range_m"))
+    return {row.parameter: row for row in mark_glossy(NAMES, rows, found)}
+
+
+def test_what_hangs_on_whether_it_is_glossy_says_so_and_is_weak_at_best() -> None:
+    """c0 moves by twice its standard deviation of 0.9, and the scale with it; c2 by 0.3 of 0.2."""
+    found = _found(np.array([0.9, 0.0, -0.5]), np.array([0.9, 0.9, 0.2]), {})
+    assert found.parameters == pytest.approx([1.8, 0.0, -0.28], abs=0.05)
+    assert found.scale == pytest.approx(found.parameters @ (SLOPE * [0.9, 0.9, 0.2]) / 0.4528, 0.02)
+    rows = _rows(found)
+    assert [rows[name].status for name in NAMES] == ["weak", "identified", "identified"]
+    assert rows["range_m"].status == "weak"
+    assert f"glossy object (probability {found.probability:.0%})" in rows["range_m"].reason
+    assert "1.8 standard deviations of what was drawn larger" in rows["object.c0"].reason
+    assert rows["object.c1"].reason == "why"
+
+
+def test_nothing_hangs_on_what_is_all_but_certain() -> None:
+    found = _found(np.array([-2.5, 0.0, 1.0]), np.array([0.6, 0.9, 0.9]), {})
+    assert found.probability < 0.05
+    assert abs(found.parameters[0]) > 1.0
+    assert {row.status for row in _rows(found).values()} == {"identified"}
+    rows = tuple(_rows(found).values())
+    assert mark_glossy(NAMES, rows, None) == rows
 
 
 def test_what_the_readings_tell_stays_where_it_is() -> None:
