@@ -155,15 +155,15 @@ def test_glossy_plates_are_so_much_larger_and_weaker() -> None:
 
 
 @functools.cache
-def _glossy_disk() -> DataSet:
-    """80 cm of radius, behind unknown crosstalk: its c0 is told by its prior alone."""
-    return draw(CLASSES["crosstalk"], 28)
+def _glossy_plate() -> DataSet:
+    """Of 20 by 80 cm, behind unknown crosstalk: its c0 is told by its prior alone."""
+    return draw(CLASSES["crosstalk"], 22)
 
 
 @functools.cache
 def _answer(told: str) -> tuple[Posterior, float]:
     """By importance draws of the exact model: the answer, and the log evidence."""
-    data, settings = _glossy_disk(), SamplerSettings(method="auto", seed=1)
+    data, settings = _glossy_plate(), SamplerSettings(method="auto", seed=1)
     thing = {"default": {}, "diffuse": {"object": DIFFUSE}, "glossy": {"object": GLOSSY}}[told]
     job = fold.prepare(data.sensor, parse_scene({**data.terms, **thing}), data.frames, settings)
     checkpoint = fold.start(job)
@@ -177,7 +177,7 @@ def _answer(told: str) -> tuple[Posterior, float]:
 
 def test_an_answer_is_near_the_mixture_of_both_priors_asked_apart() -> None:
     """To first order: laws are not normal, and draws in the tail tell how probable the other one
-    is; of what is between the two answers, 1.2 standard deviations, four tenths are allowed."""
+    is; of what is between the two answers, 1.6 standard deviations, four tenths are allowed."""
     answers = [_answer(told) for told in ("diffuse", "glossy", "default")]
     logs = [np.log(each[0].draws.range_m).mean(axis=-1) for each in answers]
     first, second, found = (each.mean() for each in logs)
@@ -190,10 +190,13 @@ def test_an_answer_is_near_the_mixture_of_both_priors_asked_apart() -> None:
     assert np.median(of / (wide.sd**2 - narrow.sd**2)) > 0.5
     assert answers[2][0].draws.widened
     assert not answers[0][0].draws.widened
+    said = ["glossy object" in row.reason for row in answers[2][0].identifiability]
+    assert any(said)
+    assert not any("glossy object" in row.reason for row in answers[0][0].identifiability)
 
 
-def test_a_glossy_disk_is_held_that_the_priors_of_a_diffuse_one_lose() -> None:
-    true = _glossy_disk().range_m
+def test_a_glossy_plate_is_held_that_the_priors_of_a_diffuse_one_lose() -> None:
+    true = _glossy_plate().range_m
     default, diffuse = (_answer(told)[0].range_m for told in ("default", "diffuse"))
     assert np.mean((default.q05 <= true) & (true <= default.q95)) > 0.85
-    assert np.mean((diffuse.q05 <= true) & (true <= diffuse.q95)) < 0.85
+    assert np.mean((diffuse.q05 <= true) & (true <= diffuse.q95)) < 0.5
