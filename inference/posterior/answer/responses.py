@@ -24,7 +24,7 @@ from inference.identifiability.model_response import (
 )
 from inference.posterior.job import Job
 
-__all__ = ["Responses", "chosen_draws", "flux_leads", "responses_at"]
+__all__ = ["Responses", "chosen_draws", "first_responses", "flux_leads", "repeated", "responses_at"]
 
 Array = NDArray[np.float64]
 
@@ -107,7 +107,7 @@ def responses_at(
     *,
     shadow: bool = True,
 ) -> Responses:
-    """Follow draws.
+    """Follow draws, and where that bends until steps settle.
 
     Parameters
     ----------
@@ -125,11 +125,24 @@ def responses_at(
     Responses
         Of all of these draws, or of every fourth where they bend.
     """
+    return repeated(job, first_responses(job, density, z, log_r, rng, shadow=shadow), rng)
+
+
+def first_responses(
+    job: Job,
+    density: CollapsedDensity,
+    z: Array,
+    log_r: Array,
+    rng: np.random.Generator,
+    *,
+    shadow: bool = True,
+) -> Responses:
+    """Follow all of the draws by one step; parameters are those of `responses_at`."""
     error, rates = job.scene.model_error, rates_of(density.frames)
     flux = 0.0 if error.integrated else error.flux
     shadow = shadow and density.parameters.has_background
     shadow = shadow and not isinstance(density, DiscrepantDensity)
-    experiments = [
+    experiments = tuple(
         Experiment(
             density.sensor,
             density.parameters,
@@ -142,21 +155,40 @@ def responses_at(
             rates=rates,
         )
         for i in range(len(z))
-    ]
+    )
     readings = density.frames[:, [0, 1] if rates is None else [0, 1, RANGE, DISPLACEMENT]]
-    each = [model_response(one, readings) for one in experiments]
+    each = tuple(model_response(one, readings) for one in experiments)
     erring = each[0].parameters.shape[1] > 0
     curvature = _curvature(experiments, each, _TRIED, rng) if erring else 0.0
-    pull = common_pull(each)
+    return Responses(z, log_r, experiments, each, readings, curvature, repeated=False)
+
+
+def repeated(job: Job, first: Responses, rng: np.random.Generator) -> Responses:
+    """Return responses of every fourth of the draws, steps repeated until they settle.
+
+    Parameters
+    ----------
+    first : Responses
+        Of one step.
+
+    Returns
+    -------
+    Responses
+        ``first`` where that is straight.
+    """
+    pull = common_pull(first.each)
+    erring = first.each[0].parameters.shape[1] > 0
     further = erring and job.scene.motion != "static"
-    repeated = further and (curvature > _STRAIGHT or bool(pull.any()))
-    if repeated:
-        fewer = slice(None, None, _THINNED)
-        z, log_r, experiments = z[fewer], log_r[fewer], experiments[fewer]
-        each = [model_response(one, readings, pull) for one in experiments]
-        measured = int(np.clip(_FRAMES // max(log_r.shape[1], 1), len(experiments), _MEASURED))
-        curvature = _curvature(experiments, each, measured, rng)
-    return Responses(z, log_r, tuple(experiments), tuple(each), readings, curvature, repeated)
+    if not (further and (first.curvature > _STRAIGHT or bool(pull.any()))):
+        return first
+    fewer = slice(None, None, _THINNED)
+    log_r, experiments = first.log_r[fewer], first.experiments[fewer]
+    each = tuple(model_response(one, first.readings, pull) for one in experiments)
+    measured = int(np.clip(_FRAMES // max(log_r.shape[1], 1), len(experiments), _MEASURED))
+    curvature = _curvature(experiments, each, measured, rng)
+    return Responses(
+        first.z[fewer], log_r, experiments, each, first.readings, curvature, repeated=True
+    )
 
 
 def flux_leads(

@@ -36,6 +36,7 @@ __all__ = [
     "is_bent",
     "judge_fit",
     "larger_discrepancy",
+    "may_be_bent",
     "with_model_part",
 ]
 
@@ -146,6 +147,17 @@ def is_bent(model: float, whole: float, curvature: float) -> bool:
         What the next order would add to the response to them, as a share of it.
     """
     return curvature > BENT and model > _MOST * whole
+
+
+def may_be_bent(model: float, whole: float, curvature: float) -> bool:
+    """Tell whether `is_bent` has to be asked, of what one step at draws says.
+
+    Parameters
+    ----------
+    model, whole, curvature : float
+        As of `is_bent`, but by one step and a few errors: 24 scenes were off by a factor of 1.6.
+    """
+    return curvature > 0.5 * BENT and model > 0.6 * _MOST * whole
 
 
 def with_model_part(

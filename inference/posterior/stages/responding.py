@@ -8,6 +8,7 @@ to remains the answer, and says so.
 """
 
 import dataclasses
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,11 @@ from inference.posterior.answer.moves import Moves
 from inference.posterior.answer.responses import (
     Responses,
     chosen_draws,
+    first_responses,
     flux_leads,
-    responses_at,
+    repeated,
 )
-from inference.posterior.criticism.discrepancy_check import is_bent
+from inference.posterior.criticism.discrepancy_check import is_bent, may_be_bent
 from inference.posterior.job import Job
 from inference.posterior.sample import Sample, sample_of
 from inference.posterior.sampling.population import arrived_at
@@ -74,10 +76,12 @@ class RespondTask:
         stands = Checkpoint(self.stage, 0, linear=True)
         if not np.isfinite(log_r[0]).any():
             return stands
-        found = responses_at(job, density, chosen, log_r, rng)
-        by_noise = log_r[:, np.isfinite(log_r[0])].mean(axis=1).std()
-        whole = float(np.hypot(found.of_scale, by_noise))
-        if not is_bent(found.of_scale, whole, found.curvature):
+        by_noise = float(log_r[:, np.isfinite(log_r[0])].mean(axis=1).std())
+        found = first_responses(job, density, chosen, log_r, rng)
+        if not may_be_bent(found.of_scale, math.hypot(found.of_scale, by_noise), found.curvature):
+            return stands
+        found = repeated(job, found, rng)
+        if not is_bent(found.of_scale, math.hypot(found.of_scale, by_noise), found.curvature):
             return stands
         if not flux_leads(job, density, chosen, log_r, found, rng):  # a shadow's is not integrated
             return stands

@@ -7,6 +7,7 @@ standard deviations off and `identified`, and none of 21 ranges was held.
 
 import dataclasses
 import functools
+import math
 
 import numpy as np
 import pytest
@@ -16,7 +17,9 @@ from benchmarks.random_sets.sets import random_set
 from inference.posterior import fold
 from inference.posterior.answer import responses
 from inference.posterior.answer.posterior import Posterior
+from inference.posterior.criticism.discrepancy_check import is_bent, may_be_bent
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages import responding
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.responding import RespondTask, decided, tasks
 from inference.posterior.stages.setting_out import EvaluateTask, SetOutTask
@@ -145,8 +148,10 @@ def test_it_is_looked_at_once_and_where_it_can_be_followed() -> None:
         fold.merge(_job(), dataclasses.replace(exact, linear=True), [])
 
 
-def test_what_is_straight_stays_as_it_is() -> None:
-    """A bright object without anything else: its answer is that of the exact model's draws."""
+def test_what_is_straight_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bright object without anything else: its answer is that of the exact model's draws, and
+    one step at them says so."""
+    monkeypatch.setattr(responding, "repeated", None)
     data = _set(9)
     job = fold.prepare(
         data.sensor, parse_scene(data.scene), data.frames, SamplerSettings(method="auto", seed=1)
@@ -159,6 +164,17 @@ def test_what_is_straight_stays_as_it_is() -> None:
     assert after.linear
     assert after.stage is checkpoint.stage
     assert fold.tasks(job, after) == ()
+
+
+@pytest.mark.parametrize("off", [1.0, 1.6, 1 / 1.6])
+def test_a_first_step_overlooks_nothing_that_is_bent(off: float) -> None:
+    """Curvature, and the model's part, are off by the factor that scenes showed."""
+    for model, curvature in [(0.51, 0.31), (0.51, 10.0), (0.99, 0.31)]:
+        noise = math.sqrt(1.0 - model**2)
+        assert is_bent(model, 1.0, curvature)
+        assert may_be_bent(model / off, math.hypot(model / off, noise), curvature / off)
+    assert not may_be_bent(0.2, 1.0, 10.0)
+    assert not may_be_bent(1.0, 1.0, 0.1)
 
 
 def test_errors_of_a_shadow_are_no_reason(monkeypatch: pytest.MonkeyPatch) -> None:
