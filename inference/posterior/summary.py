@@ -34,7 +34,6 @@ from inference.posterior.criticism.discrepancy_check import (
     judge_fit,
     with_model_part,
 )
-from inference.posterior.criticism.glossy_object import mark_glossy
 from inference.posterior.criticism.many_frames import bias_of_many_frames
 from inference.posterior.criticism.other_optima import Stated, mark_other_optima
 from inference.posterior.criticism.predictive_check import predictive_check
@@ -105,7 +104,8 @@ def _judged(drawn: "_Drawn", whole: Whole) -> tuple[Identifiability, ...]:
     budget = whole.budget
     rows = with_model_part(rows, *scale, budget.curvature, shares, by_flux=budget.by_flux)
     rows = mark_sensitive(density.parameters.names, rows, whole.sensitivity)
-    rows = mark_glossy(density.parameters.names, rows, whole.glossy)
+    if whole.glossy is not None:
+        rows = mark_sensitive(density.parameters.names, rows, whole.glossy.open)
     rows = mark_dark(density, rows, chosen, log_r)
     optima = optima_of(drawn.stage)
     if optima is None or drawn.every is not None:  # draws are of other frames then

@@ -155,7 +155,7 @@ def may_be_bent(model: float, whole: float, curvature: float) -> bool:
     Parameters
     ----------
     model, whole, curvature : float
-        As of `is_bent`, but by one step and a few errors: 24 scenes were off by a factor of 1.6.
+        As of `is_bent`, but by one step and a few errors: off by factors of up to 1.6 in 13 scenes.
     """
     return curvature > 0.5 * BENT and model > 0.6 * _MOST * whole
 

@@ -13,10 +13,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inference.identifiability.status import Identifiability
+from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
 from simulator.scene import Scene
 
-__all__ = ["GlossyObject", "glossy_object", "mark_glossy"]
+__all__ = ["GlossyObject", "glossy_object"]
 
 Array = NDArray[np.float64]
 
@@ -24,8 +24,11 @@ _SIZE, _REFLECTANCE = "object.c0", "object.c2"
 # glossy plates of Appendix B against diffuse ones of the same size, over the sigmas of the default
 # priors: c0 is exp(4) times as large in the median, c2 a quarter
 _MOVES = {_SIZE: 4.0 / 2.0, _REFLECTANCE: math.log(0.25) / 1.0}
-_FAR = 1.0  # standard deviations of what was drawn
 _OPEN = 0.05  # of a probability, and of one less it
+_WORDS = (
+    "were the object glossy (probability {:.0%}) it would move by {{:.1f}} standard deviations of "
+    "what was drawn: a stated prior of object.c0 decides"
+)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -34,24 +37,33 @@ class GlossyObject:
 
     Attributes
     ----------
-    of_z : ndarray, shape (d, 2)
-        By what means move, and by a standard normal error: whether it is glossy.
-    of_log_r : ndarray, shape (frames, 2)
-        Of log r; zero for a frame without object.
     probability : float
         Of a glossy object, given the readings.
-    parameters : ndarray, shape (d,)
-        By what the mean of each unknown moves where the object is glossy, in standard deviations of
-        the draws.
-    scale : float
-        The mean of log r likewise.
+    moves : PriorSensitivity
+        By what means move where it is.
     """
 
-    of_z: Array
-    of_log_r: Array
     probability: float
-    parameters: Array
-    scale: float
+    moves: PriorSensitivity
+
+    @property
+    def of_z(self) -> Array:
+        """By what means move, and by a standard normal error, whether it is: shape (d, 2)."""
+        return self._mixed(self.moves.of_z)
+
+    @property
+    def of_log_r(self) -> Array:
+        """Likewise of log r, shape (frames, 2); zero for a frame without object."""
+        return self._mixed(self.moves.of_log_r)
+
+    def _mixed(self, moved: Array) -> Array:
+        p = self.probability
+        return np.outer(moved, [p, math.sqrt(p * (1.0 - p))])
+
+    @property
+    def open(self) -> PriorSensitivity | None:
+        """What hangs on whether it is glossy; None where that is all but certain."""
+        return self.moves if _OPEN < self.probability < 1.0 - _OPEN else None
 
 
 def glossy_object(
@@ -93,43 +105,12 @@ def glossy_object(
     moved = (gain - gain.mean()) @ (columns - columns.mean(axis=0)) / len(z)
     odds = gain.mean() + 0.5 * gain.var() - 0.5 * float(move @ move)
     probability = float(scipy.special.expit(odds))
-    spread = math.sqrt(probability * (1.0 - probability))
-    both, d = np.outer(moved, [probability, spread]), z.shape[1]
-    sd, log_r = z.std(axis=0), log_r[:, present]
-    parameters = np.divide(moved[:d], sd, out=np.zeros(d), where=sd > 0)
-    of_scale, sd_of_scale = moved[d:][present].mean(), log_r.mean(axis=1).std()
-    scale = float(of_scale / sd_of_scale) if sd_of_scale > 0 else 0.0
-    return GlossyObject(both[:d], both[d:], probability, parameters, scale)
-
-
-def mark_glossy(
-    names: tuple[str, ...], rows: tuple[Identifiability, ...], glossy: GlossyObject | None
-) -> tuple[Identifiability, ...]:
-    """Say of what hangs on it that it is not known whether the object is glossy; `weak` at best.
-
-    Parameters
-    ----------
-    names : tuple of str
-        The unknowns.
-    rows : tuple of Identifiability
-        As judged by the spread of the draws.
-    glossy : GlossyObject or None
-        From `glossy_object`.
-    """
-    if glossy is None or not _OPEN < glossy.probability < 1.0 - _OPEN:
-        return rows
-    moved = dict(zip(names, glossy.parameters.tolist(), strict=True)) | {"range_m": glossy.scale}
-    return tuple(_said(row, moved.get(row.parameter, 0.0), glossy.probability) for row in rows)
-
-
-def _said(row: Identifiability, moved: float, probability: float) -> Identifiability:
-    if not abs(moved) > _FAR:
-        return row
-    where = "larger" if moved > 0 else "smaller"
-    reason = (
-        f"{row.reason}; of a glossy object (probability {probability:.0%}) it would be "
-        f"{abs(moved):.1f} standard deviations of what was drawn {where} than of a diffuse one: a "
-        "stated prior of object.c0 decides"
+    sd, sd_of_scale, d = z.std(axis=0), log_r[:, present].mean(axis=1).std(), z.shape[1]
+    moves = PriorSensitivity(
+        np.divide(moved[:d], sd, out=np.zeros(d), where=sd > 0),
+        float(moved[d:][present].mean() / sd_of_scale) if sd_of_scale > 0 else 0.0,
+        moved[:d],
+        moved[d:],
+        _WORDS.format(probability),
     )
-    status = "weak" if row.status == "identified" else row.status
-    return dataclasses.replace(row, status=status, reason=reason)
+    return GlossyObject(probability, moves)

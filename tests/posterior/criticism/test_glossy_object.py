@@ -14,7 +14,8 @@ from inference.density.collapsed import CollapsedDensity
 from inference.identifiability.status import Identifiability
 from inference.posterior import fold
 from inference.posterior.answer.posterior import Posterior
-from inference.posterior.criticism.glossy_object import GlossyObject, glossy_object, mark_glossy
+from inference.posterior.criticism.glossy_object import GlossyObject, glossy_object
+from inference.posterior.criticism.prior_sensitivity import mark_sensitive
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages.stage import Weighted
 from simulator.catalogue import plate_scene
@@ -87,29 +88,29 @@ def test_a_normal_posterior_is_mixed_with_that_of_the_other_prior(
 
 def _rows(found: GlossyObject) -> dict[str, Identifiability]:
     rows = tuple(Identifiability(n, "identified", 0.9, "why") for n in (*NAMES, "range_m"))
-    return {row.parameter: row for row in mark_glossy(NAMES, rows, found)}
+    return {row.parameter: row for row in mark_sensitive(NAMES, rows, found.open)}
 
 
 def test_what_hangs_on_whether_it_is_glossy_says_so_and_is_weak_at_best() -> None:
     """c0 moves by twice its standard deviation of 0.9, and the scale with it; c2 by 0.3 of 0.2."""
     found = _found(np.array([0.9, 0.0, -0.5]), np.array([0.9, 0.9, 0.2]), {})
-    assert found.parameters == pytest.approx([1.8, 0.0, -0.28], abs=0.05)
-    assert found.scale == pytest.approx(found.parameters @ (SLOPE * [0.9, 0.9, 0.2]) / 0.4528, 0.02)
+    assert found.moves.parameters == pytest.approx([1.8, 0.0, -0.28], abs=0.05)
+    by_z = found.moves.parameters
+    assert found.moves.scale == pytest.approx(by_z @ (SLOPE * [0.9, 0.9, 0.2]) / 0.4528, 0.02)
     rows = _rows(found)
     assert [rows[name].status for name in NAMES] == ["weak", "identified", "identified"]
     assert rows["range_m"].status == "weak"
-    assert f"glossy object (probability {found.probability:.0%})" in rows["range_m"].reason
-    assert "1.8 standard deviations of what was drawn larger" in rows["object.c0"].reason
+    assert f"object glossy (probability {found.probability:.0%})" in rows["range_m"].reason
+    assert "move by 1.8 standard deviations of what was drawn" in rows["object.c0"].reason
     assert rows["object.c1"].reason == "why"
 
 
 def test_nothing_hangs_on_what_is_all_but_certain() -> None:
     found = _found(np.array([-2.5, 0.0, 1.0]), np.array([0.6, 0.9, 0.9]), {})
     assert found.probability < 0.05
-    assert abs(found.parameters[0]) > 1.0
+    assert abs(found.moves.parameters[0]) > 1.0
+    assert found.open is None
     assert {row.status for row in _rows(found).values()} == {"identified"}
-    rows = tuple(_rows(found).values())
-    assert mark_glossy(NAMES, rows, None) == rows
 
 
 def test_what_the_readings_tell_stays_where_it_is() -> None:
@@ -190,9 +191,9 @@ def test_an_answer_is_near_the_mixture_of_both_priors_asked_apart() -> None:
     assert np.median(of / (wide.sd**2 - narrow.sd**2)) > 0.5
     assert answers[2][0].draws.widened
     assert not answers[0][0].draws.widened
-    said = ["glossy object" in row.reason for row in answers[2][0].identifiability]
+    said = ["object glossy" in row.reason for row in answers[2][0].identifiability]
     assert any(said)
-    assert not any("glossy object" in row.reason for row in answers[0][0].identifiability)
+    assert not any("object glossy" in row.reason for row in answers[0][0].identifiability)
 
 
 def test_a_glossy_plate_is_held_that_the_priors_of_a_diffuse_one_lose() -> None:
