@@ -59,10 +59,15 @@ class _ClosedLibrary(_Library):  # type: ignore[misc]
     """Code of a kernel, and of all that it calls, which is its own (`simulator.closed`)."""
 
     def _optimize_final_module(self) -> None:
-        for function in self._final_module.functions:
+        functions = list(self._final_module.functions)
+        ours = [each for each in functions if each.linkage.name == "external"]
+        whose = next(each.name for each in ours if not each.is_declaration)
+        for function in functions:
             # numba gives functions such names; others are of its runtime, and known by theirs
             if function.linkage.name == "linkonce_odr" and function.name.startswith("_ZN"):
                 function.linkage = "internal"
+                # the linker would give others of that name this one, which is called in another way
+                function.name = f"{whose}.{function.name}"
         super()._optimize_final_module()
 
 

@@ -31,6 +31,7 @@ from inference.frame.modes import LOG_MASS, find_modes, room_for_modes
 from inference.frame.range_prior import integration_bounds
 from inference.frame.table import tabulate
 from simulator.assign import assign
+from simulator.closed import closed
 from simulator.compiled import compiled
 
 __all__ = ["integrate_flux_error"]
@@ -224,6 +225,7 @@ def _without_reference(scene: FrameScene) -> FrameScene:
     )
 
 
+@closed
 @compiled
 def integrate_flux_error(
     out: Array,

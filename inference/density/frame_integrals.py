@@ -21,6 +21,7 @@ from inference.frame.log_density import empty_log_likelihood
 from inference.frame.modes import find_modes, room_for_modes
 from inference.frame.range_prior import integration_bounds
 from inference.frame.table import tabulate
+from simulator.closed import closed
 from simulator.compiled import compiled, hot
 
 __all__ = ["fill_log_likelihoods"]
@@ -29,6 +30,7 @@ Array = NDArray[np.float64]
 
 
 @hot
+@closed
 @compiled
 def fill_log_likelihoods(out: Array, rows: Rows, data: Data, instrument: Instrument) -> None:
     """Fill out[i, b] with the log likelihood of block b under parameter vector i."""

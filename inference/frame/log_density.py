@@ -84,16 +84,21 @@ def log_density(u: float, block: Block, scene: FrameScene) -> float:
     scene : FrameScene
         The parameters.
     """
-    r, prior, total = math.exp(u), scene.range_prior, 0.0
+    r, prior, total, told = math.exp(u), scene.range_prior, 0.0, 0.0
     for j in range(frame_count(block)):
         frame = frame_of(block, j)
-        signal, mean = readings_at(u, r, frame.gain, scene)
+        if prior.resolves:
+            signal, _, mean, slope = readings_along(u, r, frame.gain, scene)
+            told += precision_product(slope, slope, mean, signal, scene.instrument)
+            told += known_information(r, frame.known)
+        else:
+            signal, mean = readings_at(u, r, frame.gain, scene)
         residual = (frame.first - mean[0], frame.second - mean[1])
         total += gaussian(residual, mean, signal, scene.instrument)
         total += known_log_density(r, frame.known, scene.offset)
     total += log_range_density(r, u, prior)
     if prior.resolves:
-        total += log_resolution(u, block, scene)
+        total += log_resolved(max(told, 0.0) / LEAST_INFORMATION, prior.dark)
     return total
 
 

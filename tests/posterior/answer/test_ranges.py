@@ -1,7 +1,7 @@
 """Draws of ranges against the integrated density, and replicated readings against their law."""
 
 import math
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -72,6 +72,31 @@ def test_draws_have_the_law_of_the_range(name: str) -> None:
     assert low <= drawn.min() <= drawn.max() <= high
     result = stats.kstest(drawn, lambda u: np.interp(u, grid, mass / mass[-1]))
     assert result.pvalue > 1e-4
+
+
+class _Even:
+    """Uniforms of one frame that are evenly spaced, and lead to its only mode."""
+
+    @staticmethod
+    def random(shape: tuple[int, int, int]) -> np.ndarray[Any, np.dtype[np.float64]]:
+        uniforms = np.full(shape, 0.5)
+        uniforms[:, 0, 1] = (np.arange(shape[0]) + 0.5) / shape[0]
+        return uniforms
+
+
+@pytest.mark.parametrize("noise", [1e-4, 5e-3, 0.02, 0.05])
+@pytest.mark.parametrize("kind", KINDS)
+def test_draws_of_one_mode_are_its_quantiles(kind: str, noise: float) -> None:
+    """Linear in cells of its grid, whose widest that counts is a fifth of a standard deviation."""
+    case, many = case_of(kind, 0.7, (noise, noise)), 2001
+    density, even = collapsed_density(case.sensor, case.scene, case.frames), _Even()
+    drawn = density.draw_log_ranges(np.empty((many, 0)), cast("np.random.Generator", even))[:, 0]
+    reach = 9 * drawn.std()
+    grid = np.linspace(drawn.mean() - reach, drawn.mean() + reach, 100_001)
+    values = log_density(case, grid)
+    mass = integrate.cumulative_trapezoid(np.exp(values - values.max()), grid, initial=0)
+    share = np.interp(drawn, grid, mass / mass[-1])
+    assert share == pytest.approx((np.arange(many) + 0.5) / many, abs=1e-3)
 
 
 def test_the_hard_cases_are_what_they_say() -> None:
