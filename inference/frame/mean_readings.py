@@ -20,7 +20,16 @@ from simulator.readings import (
     object_slopes,
 )
 
-__all__ = ["Along", "Means", "light_at", "readings_along", "readings_at", "with_surroundings"]
+__all__ = [
+    "Along",
+    "Means",
+    "light_along",
+    "light_at",
+    "readings_along",
+    "readings_at",
+    "with_crosstalk",
+    "with_surroundings",
+]
 
 
 class Means(NamedTuple):
@@ -146,10 +155,23 @@ def _background_along(
 
 
 @compiled
-def readings_along(u: float, r: float, gain: float, scene: FrameScene) -> Along:
-    """Return mean readings and slopes at u = log r; ``gain`` is the frame's gain factor."""
+def light_along(u: float, r: float, gain: float, scene: FrameScene) -> Along:
+    """Return mean readings without crosstalk, and slopes, at u = log r."""
     instrument, background = scene.instrument, scene.background
     signal, signal_slope = _object_along(u, r, gain, scene.shape, instrument, scene.flux_error)
     mean = _with_background(signal, r, gain, background, instrument)
     slope = _background_along(signal_slope, r, gain, background, instrument)
+    return Along(signal, signal_slope, mean, slope)
+
+
+@compiled
+def with_crosstalk(mean: Pair, gain: float, scene: FrameScene) -> Pair:
+    """Return mean readings at a gain factor, crosstalk among them, from light at a factor of 1."""
+    return _with_crosstalk((gain * mean[0], gain * mean[1]), scene.crosstalk)
+
+
+@compiled
+def readings_along(u: float, r: float, gain: float, scene: FrameScene) -> Along:
+    """Return mean readings and slopes at u = log r; ``gain`` is the frame's gain factor."""
+    signal, signal_slope, mean, slope = light_along(u, r, gain, scene)
     return Along(signal, signal_slope, _with_crosstalk(mean, scene.crosstalk), slope)

@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.frame.arguments import FrameScene, Instrument, Pair
-from inference.frame.blocks import Block, Frame
-from inference.frame.log_density import log_resolution
-from inference.frame.mean_readings import light_at
-from inference.frame.range_prior import log_range_density
+from inference.frame.gaussian import precision_product
+from inference.frame.mean_readings import light_along, light_at, with_crosstalk
+from inference.frame.range_prior import LEAST_INFORMATION, log_range_density, log_resolved
 from simulator.compiled import compiled
 
 __all__ = [
@@ -39,14 +38,33 @@ _VISIBLE = 0.3  # standard deviations of a reading below which a turn of the cur
 
 
 @compiled
-def _fill(table: Array, k: int, u: float, scene: FrameScene) -> None:
+def _fill(table: Array, k: int, u: float, strongest: float, scene: FrameScene) -> None:
     """Fill one column of a table."""
     r, prior = math.exp(u), scene.range_prior
-    signal, mean = light_at(u, r, 1.0, scene)
-    table[LOG_RANGE, k] = u
-    table[LOG_PRIOR, k] = log_range_density(r, u, prior)
+    law = log_range_density(r, u, prior)
+    if prior.resolves:
+        signal, _, mean, slope = light_along(u, r, 1.0, scene)
+        law += _log_resolution(signal, mean, slope, strongest, scene)
+    else:
+        signal, mean = light_at(u, r, 1.0, scene)
+    table[LOG_RANGE, k], table[LOG_PRIOR, k] = u, law
     table[SIGNAL_1, k], table[SIGNAL_2, k] = signal
     table[MEAN_1, k], table[MEAN_2, k] = mean
+
+
+@compiled
+def _log_resolution(
+    signal: Pair, mean: Pair, slope: Pair, strongest: float, scene: FrameScene
+) -> float:
+    """Return the log of a reference prior, that of the strongest frame."""
+    r0, wave, read, shot, _ = scene.instrument
+    # noise that does not depend on the object's part of the readings
+    instrument = Instrument(r0, wave, read, shot, None)
+    signal = strongest * signal[0], strongest * signal[1]
+    slope = strongest * slope[0], strongest * slope[1]
+    mean = with_crosstalk(mean, strongest, scene)
+    told = precision_product(slope, slope, mean, signal, instrument)
+    return log_resolved(told / LEAST_INFORMATION, scene.range_prior.dark)
 
 
 @compiled
@@ -108,25 +126,6 @@ def _offset(crosstalk: Pair | None, strongest: float) -> Pair:
 
 
 @compiled
-def _add_resolution(table: Array, strongest: float, scene: FrameScene) -> None:
-    """Add the density of a reference prior, that of the strongest frame, at every knot."""
-    r0, wave, read, shot, _ = scene.instrument
-    # a frame at its gain, and noise that does not depend on the object's part of the readings
-    frame = Block(Frame(0.0, 0.0, strongest, None), None, None)
-    plain = FrameScene(
-        scene.shape,
-        scene.crosstalk,
-        scene.background,
-        scene.range_prior,
-        Instrument(r0, wave, read, shot, None),
-        scene.flux_error,
-        None,
-    )
-    for k in range(table.shape[1]):
-        table[LOG_PRIOR, k] += log_resolution(table[LOG_RANGE, k], frame, plain)
-
-
-@compiled
 def _knots(first: float, last: float) -> int:
     """Return how many knots a table begins with, evenly spaced."""
     return max(_FEWEST_KNOTS, math.ceil((last - first) / KNOT_SPACING) + 1)
@@ -171,7 +170,7 @@ def tabulate(bounds: Pair, scene: FrameScene, strongest: float) -> Array:
     table = np.empty((_ROWS, n))
     for k in range(n):
         u = bounds[0] + (bounds[1] - bounds[0]) * k / (n - 1)
-        _fill(table, k, u, scene)
+        _fill(table, k, u, strongest, scene)
     while True:
         split = np.empty(n - 1, dtype=np.bool_)
         more = _too_coarse(split, table, offset, unit, wave is None, shot)
@@ -185,9 +184,7 @@ def tabulate(bounds: Pair, scene: FrameScene, strongest: float) -> Array:
             k += 1
             if j < n - 1 and split[j]:
                 middle = 0.5 * (table[LOG_RANGE, j] + table[LOG_RANGE, j + 1])
-                _fill(finer, k, middle, scene)
+                _fill(finer, k, middle, strongest, scene)
                 k += 1
         table, n = finer, n + more
-    if scene.range_prior.resolves:
-        _add_resolution(table, strongest, scene)
     return table

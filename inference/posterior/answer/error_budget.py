@@ -100,9 +100,7 @@ def error_budget(
     shadow = error.shadow if density.parameters.has_background else 0.0
     chosen = chosen_draws(len(z), log_r.shape[1])
     found = responses_at(job, density, z[chosen], log_r[chosen], rng)
-    by_flux = not found.curvature > BENT or flux_leads(
-        job, density, z[chosen], log_r[chosen], found, rng
-    )
+    by_flux = not found.curvature > BENT or flux_leads(found)
     experiments, responses, readings = found.experiments, found.each, found.readings
     at, ranges = found.z, found.log_r
     by_z, by_log_r = ([by[:, :, :1], by[:, :, 1:]] for by in (found.by_z, found.by_log_r))

@@ -104,8 +104,6 @@ def responses_at(
     z: Array,
     log_r: Array,
     rng: np.random.Generator,
-    *,
-    shadow: bool = True,
 ) -> Responses:
     """Follow draws, and where that bends until steps settle.
 
@@ -117,15 +115,13 @@ def responses_at(
         Draws, as `chosen_draws` chooses them.
     log_r : ndarray, shape (m, frames)
         Their ranges; nan for a frame without object.
-    shadow : bool
-        Whether errors of a shadow are among them.
 
     Returns
     -------
     Responses
         Of all of these draws, or of every fourth where they bend.
     """
-    return repeated(job, first_responses(job, density, z, log_r, rng, shadow=shadow), rng)
+    return repeated(job, first_responses(job, density, z, log_r, rng), rng)
 
 
 def first_responses(
@@ -134,14 +130,11 @@ def first_responses(
     z: Array,
     log_r: Array,
     rng: np.random.Generator,
-    *,
-    shadow: bool = True,
 ) -> Responses:
     """Follow all of the draws by one step; parameters are those of `responses_at`."""
     error, rates = job.scene.model_error, rates_of(density.frames)
     flux = 0.0 if error.integrated else error.flux
-    shadow = shadow and density.parameters.has_background
-    shadow = shadow and not isinstance(density, DiscrepantDensity)
+    shadow = density.parameters.has_background and not isinstance(density, DiscrepantDensity)
     experiments = tuple(
         Experiment(
             density.sensor,
@@ -191,27 +184,26 @@ def repeated(job: Job, first: Responses, rng: np.random.Generator) -> Responses:
     )
 
 
-def flux_leads(
-    job: Job,
-    density: CollapsedDensity,
-    z: Array,
-    log_r: Array,
-    found: Responses,
-    rng: np.random.Generator,
-) -> bool:
+def flux_leads(found: Responses) -> bool:
     """Tell whether most of what errors move the scale by is the flux's, not a shadow's.
+
+    Both are told at the same draws, by as many steps, without what the next order adds.
 
     Parameters
     ----------
-    density, z, log_r : CollapsedDensity, ndarray, ndarray
-        As of `responses_at`.
     found : Responses
-        What that returned for errors of both.
+        To errors of both.
     """
     if not found.experiments[0].shadow > 0:
         return True
-    alone = responses_at(job, density, z, log_r, rng, shadow=False)
-    return alone.of_scale >= _OF_FLUX * found.of_scale
+    alone = tuple(dataclasses.replace(one, shadow=0.0) for one in found.experiments)
+    each = tuple(model_response(one, found.readings) for one in alone)
+    if found.repeated:
+        pull = common_pull(each)
+        each = tuple(model_response(one, found.readings, pull) for one in alone)
+    both = dataclasses.replace(found, curvature=0.0)
+    flux = dataclasses.replace(both, experiments=alone, each=each)
+    return flux.of_scale >= _OF_FLUX * both.of_scale
 
 
 def _curvature(

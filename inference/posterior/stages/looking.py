@@ -20,7 +20,7 @@ __all__ = ["LookTask", "Looked", "looking", "of_some_frames", "taken_in", "ways_
 
 Way = Literal["fitted", "climbed", "scouts"]
 
-_WAYS: tuple[Way, ...] = ("fitted", "climbed", "scouts")  # the longest first
+_WAYS: tuple[Way, ...] = ("scouts", "fitted", "climbed")  # the longest first
 
 _SOME = (250, 50)  # frames at most that may hold the object, and that do not
 
@@ -71,7 +71,7 @@ class LookTask:
 
 def ways_left(start: Starting, *, scouts: bool) -> tuple[Way, ...]:
     """Return the ways that are left; scouts are not sent out while terms are being decided."""
-    ways = _WAYS if scouts else _WAYS[:2]
+    ways = _WAYS if scouts else _WAYS[1:]
     return tuple(way for way in ways if getattr(start, way) is None)
 
 

@@ -83,7 +83,7 @@ class RespondTask:
         found = repeated(job, found, rng)
         if not is_bent(found.of_scale, math.hypot(found.of_scale, by_noise), found.curvature):
             return stands
-        if not flux_leads(job, density, chosen, log_r, found, rng):  # a shadow's is not integrated
+        if not flux_leads(found):  # a shadow's is not integrated
             return stands
         if isinstance(self.stage, Settled):
             return Checkpoint(Starting(), 0, integrated=True)
