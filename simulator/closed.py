@@ -3,8 +3,8 @@
 numba leaves what a kernel calls open to others. Every call then hands over each member of each
 named tuple, whether it is looked at or not, and may come from anywhere with anything: that was half
 of the time of a frame. What nobody else may call is made for the calls that there are, with the
-same arithmetic and the same bits. To make it takes half as long again, so that it is for kernels
-that run for hours.
+same arithmetic and the same bits. To make it takes up to half as long again, so that it is for
+kernels that run for long: the tracker's, and those that evaluate and draw what a posterior asks.
 """
 
 from collections.abc import Callable
