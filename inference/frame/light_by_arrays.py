@@ -124,7 +124,7 @@ def light(r: Array, scene: FrameScene) -> tuple[Pairs, Pairs]:
 
 
 def information(r: Array, gain: float, scene: FrameScene) -> Array:
-    """Return the Fisher information of a frame on its log r (`inference.frame.log_density`).
+    """Return the Fisher information of a frame on its log r, as `inference.frame.table` has it.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def information(r: Array, gain: float, scene: FrameScene) -> Array:
     shape, instrument = scene.shape, scene.instrument
     if scene.flux_error is not None or instrument.shot is not None:
         raise NotByArraysError
-    flux = twin(object_flux)(r, gain * shape.strength, shape.c0, shape.c1)
+    flux = twin(object_flux)(r, *shape)
     slope = twin(log_slope)(r, shape.c0, shape.c1)
     first, second = _shares(r, instrument)
     if instrument.wave is not None:
@@ -154,6 +154,7 @@ def information(r: Array, gain: float, scene: FrameScene) -> Array:
         strength, distance, c0, c1 = scene.background
         change = strength * r * twin(shadow_slope)(r, c0, c1)
         first, second = _shares(distance, instrument)
-        s1, s2 = s1 + gain * (change * first), s2 + gain * (change * second)
-    read = instrument.read
+        s1, s2 = s1 + change * first, s2 + change * second
+    # as the table of all frames, from light of a gain factor of 1
+    s1, s2, read = gain * s1, gain * s2, instrument.read
     return np.asarray(s1 * (s1 / read[0] / read[0]) + s2 * (s2 / read[1] / read[1]))

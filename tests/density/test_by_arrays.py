@@ -9,7 +9,9 @@ import pytest
 
 from inference.density.collapsed import CollapsedDensity
 from inference.frame import light_by_arrays, modes_by_arrays, table, table_by_arrays
+from inference.frame.arguments import scene_of
 from inference.frame.light_by_arrays import NotByArraysError
+from inference.frame.range_prior import integration_bounds
 from inference.posterior import fold
 from inference.posterior.settings import SamplerSettings
 from service.warm import questions
@@ -64,6 +66,25 @@ def test_by_arrays_are_the_loops(
     assert counted["table"] > 0
     _as_loops(monkeypatch)
     assert _answers(density, z) == quick
+
+
+@pytest.mark.parametrize("strongest", [0.3, 1.7, 30.0])
+@pytest.mark.parametrize("sensor", [questions._PULSED, questions._SINE])
+def test_tables_of_any_gain_are_those_of_the_loops(
+    sensor: dict[str, Any], strongest: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(questions, "_FRAMES", 3)
+    monkeypatch.setattr(Kernel, "__call__", _interpreted)
+    parsed, known, frames = questions._question(sensor, _WALL, True, True)
+    density = fold.prepare(parsed, known, frames, SamplerSettings(seed=1)).density()
+    terms = density.parameters.terms(np.full((1, 9), 0.1))
+    scene = scene_of(density.integral_rows(terms), density.instrument, 0)
+    bounds = integration_bounds(scene.range_prior)
+    counted = _counted(monkeypatch)
+    quick = uncompiled.twin(table.tabulate)(bounds, scene, strongest)
+    assert counted["table"] == 1
+    _as_loops(monkeypatch)
+    assert uncompiled.twin(table.tabulate)(bounds, scene, strongest).tobytes() == quick.tobytes()
 
 
 def _counted(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:

@@ -194,6 +194,24 @@ def test_units_do_not_matter(scale: float) -> None:
     assert found == pytest.approx(wanted - 12 * math.log(scale), abs=1e-5)
 
 
+def test_a_gain_of_every_frame_is_a_gain_of_the_sensor(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also of what ranges in the dark have together, which the table of the curve tells."""
+    monkeypatch.setenv("KERNELS_COMPILE", "always")
+    sensor, gain = sensor_of(kind, 10.0), 30.0
+    scene: dict[str, Any] = {"object": OBJECT, "crosstalk": list(CROSSTALK)}
+    path = SampledTrajectory(range_m=[0.3, 1.0, 3.0, 13.0, 13.5, 14.0])
+    other = sensor.model_copy(update={"gain": gain})
+    readings = simulate(other, parse_scene({**scene, "discrepancy": 0}), path, 6).frames.readings
+    scene["range_m"] = {"prior": "reference", "low": 0.02, "high": 14.0}
+    frames = Frames(readings, gain=np.full(len(readings), gain))
+    found = density_of(sensor, scene, frames).frame_log_likelihoods(NOTHING)[0]
+    wanted = density_of(other, scene, Frames(readings)).frame_log_likelihoods(NOTHING)[0]
+    # two tables of one curve that differ by rounding
+    np.testing.assert_allclose(found, wanted, atol=1e-6, rtol=1e-9)
+
+
 def test_with_a_flux_error_and_little_noise() -> None:
     """Readings are then range and flux; the law of the ranges cancels their Jacobian."""
     sensor = sensor_of("pulsed", 1e4)

@@ -1,5 +1,6 @@
 """What the kernels of a posterior say without a compiler: the same to the last bit."""
 
+import dataclasses
 import math
 from typing import Any
 
@@ -37,6 +38,7 @@ def test_densities_and_draws(
     monkeypatch.setattr(questions, "_FRAMES", 4)
     monkeypatch.setenv("KERNELS_COMPILE", "always")
     sensor, known, frames = questions._question(questions._PULSED, scene, **data)
+    frames = dataclasses.replace(frames, gain=np.array([1.0, 0.7, 1.7, 1.1]))
     density = fold.prepare(sensor, known, frames, SamplerSettings(seed=1)).density()
     z = np.random.default_rng(3).normal(size=(4, unknowns)) * 0.5
     asked: set[str] = set()
