@@ -35,7 +35,6 @@ from simulator.inlined import inlined
 __all__ = [
     "empty_log_likelihood",
     "log_density",
-    "log_resolution",
     "rounding",
     "slope_and_curvature",
 ]
@@ -52,7 +51,7 @@ def _information(u: float, gain: float, scene: FrameScene) -> float:
 
 
 @compiled
-def log_resolution(u: float, block: Block, scene: FrameScene) -> float:
+def _log_resolution(u: float, block: Block, scene: FrameScene) -> float:
     """Return the log of the reference prior of a block's log r, I its Fisher information.
 
     What is known of the range beside the readings is part of it: a range that is known exactly has
@@ -120,8 +119,8 @@ def slope_and_curvature(u: float, block: Block, scene: FrameScene) -> Pair:
         rise += known_slope(r, frame.known, scene.offset)
         bend += known_information(r, frame.known)
     if prior.resolves:
-        ahead = log_resolution(u + _DIFFERENCE, block, scene)
-        behind = log_resolution(u - _DIFFERENCE, block, scene)
+        ahead = _log_resolution(u + _DIFFERENCE, block, scene)
+        behind = _log_resolution(u - _DIFFERENCE, block, scene)
         rise += (ahead - behind) / (2 * _DIFFERENCE)
     of_logarithm, of_range = prior_curvature(r, prior)
     return rise, bend + of_logarithm + of_range
