@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo report readme api docs picture notebook notebook-data notebook-seeds calibrate coverage kills fuzz stress mutations test check lint format types fast lowest versions package container-test lock clean
+.PHONY: help setup demo report readme api docs picture notebook notebook-data notebook-seeds calibrate coverage kills fuzz stress mutations test thorough check lint format types fast lowest versions package container-test lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 16
@@ -80,6 +80,9 @@ notebook-seeds calibrate coverage stress test fast: export OPENBLAS_NUM_THREADS 
 
 test: $(READY) ## Run every test
 	$(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder
+
+thorough: $(READY) ## All tests, with those and all data sets that `make test` leaves out
+	HYBRIDTOF_THOROUGH=1 $(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder
 
 fast: $(READY) ## Run the tests that take seconds
 	$(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow"

@@ -6,6 +6,8 @@ import tempfile
 
 # before numpy is loaded: with threads of its own the last bits of a product differ from run to run
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# most kinds of calls come often in all tests together: what the interpreter answers is lost
+os.environ.setdefault("KERNELS_COMPILE", "soon")
 # servers of tests make the machine code that they need, and no other
 os.environ.setdefault("HYBRIDTOF_WARM", "off")
 # jobs and streams of the user are not the tests': a fixture that lives longer than a test has this
@@ -20,6 +22,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.chunk_clock import timed
+from tests.thorough import THOROUGH
 
 _STATE = os.environ["XDG_STATE_HOME"]
 
@@ -48,11 +51,16 @@ def anyio_backend() -> str:
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Let one process run what compiles the same kernels, and begin with what takes long.
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what `make thorough` runs, let one process run what compiles the same kernels, and
+    begin with what takes long.
 
     Without groups both of two processes compile nearly every kernel.
     """
+    if not THOROUGH:
+        left_out = [item for item in items if item.get_closest_marker("thorough")]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in set(left_out)]
     slow = set()
     for item in items:
         folder, *rest = item.path.relative_to(Path(__file__).parent).parts

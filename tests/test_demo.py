@@ -32,7 +32,7 @@ def test_demo(tmp_path: Path) -> None:
     assert (tmp_path / "new" / "out" / "demo.png").read_bytes().startswith(SIGNATURE)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.skipif(not RECORDINGS_HERE, reason="no recorded photons: the whole demo is without")
 def test_without_recordings_a_plate_is_simulated(tmp_path: Path) -> None:
     """The one scene of the demo that recordings change."""

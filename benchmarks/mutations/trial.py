@@ -70,7 +70,8 @@ def _failing(tree: Path, arguments: Sequence[str], cache: Path) -> str | None:
     RuntimeError
         Where pytest came to no verdict, as by a test that is not there.
     """
-    # machine code of faults is kept apart; bytecode would be taken for that of the last fault
+    # machine code of faults is kept apart; bytecode would be taken for that of the last fault; a
+    # test that is named runs, however thorough
     own = {
         "PYTHONPATH": str(tree),
         "PYTHONDONTWRITEBYTECODE": "1",
@@ -78,6 +79,7 @@ def _failing(tree: Path, arguments: Sequence[str], cache: Path) -> str | None:
         "XDG_CACHE_HOME": str(cache),
         "OPENBLAS_NUM_THREADS": "1",
         "OMP_NUM_THREADS": "1",
+        "HYBRIDTOF_THOROUGH": "1",
     }
     plugins = [part for name in (*_PLUGINS, "no:cacheprovider") for part in ("-p", name)]
     command = [sys.executable, "-m", "pytest", "-x", "-q", "--tb=line", *plugins, *arguments]

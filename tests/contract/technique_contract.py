@@ -21,6 +21,7 @@ from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.sensor import Sensor
 from tests.contract.scenes import MENU, TERMS, Setting, frames_of, light_of, sensor_of, span
+from tests.thorough import THOROUGH
 
 __all__ = [
     "answers_are_right",
@@ -43,7 +44,8 @@ _OFF = 20.0
 _QUIET = 1e-3  # of the noise
 _SINGLE, _MANY = 200, 12  # frames of a set
 _TRIALS, _SETS = 4000, 40  # frames, and sets of frames, whose scatter is compared with their sd
-_MONTE_CARLO = 2  # scenes of a fit over many frames in which this is done: a set is a whole fit
+# scenes of a fit over many frames in which this is done: a set is a whole fit
+_MONTE_CARLO = 2 if THOROUGH else 1
 _ERRORS = (1e-4, 1e-5)  # of flux and effective distance [m]: small enough to be linear
 _ERRING = 20  # sets of frames whose model errs
 _MISFITS = 3  # of 40 sets of a fit that is right
@@ -124,11 +126,11 @@ def errors_are_right(technique: Technique, kind: str) -> None:
     """Check standard deviations against the scatter of simulated readings.
 
     Of single frames: of 4000 each is within one sd of the truth with probability 0.683, and the
-    count lies in the binomial band of a false-alarm rate of 1e-6. Of many frames, in the first two
-    scenes: the mean square of the misses in sds, over 40 sets, in the band of a chi-square with 40
-    degrees of freedom (as if the frames of a set erred together, which is the widest case). Sets
-    that a fit calls a misfit have no ranges; at a rate of 1e-3 four of 40 are a false alarm of
-    1e-7.
+    count lies in the binomial band of a false-alarm rate of 1e-6. Of many frames, in the first
+    scene (two in `make thorough`): the mean square of the misses in sds, over 40 sets, in the band
+    of a chi-square with 40 degrees of freedom (as if the frames of a set erred together, which is
+    the widest case). Sets that a fit calls a misfit have no ranges; at a rate of 1e-3 four of 40
+    are a false alarm of 1e-7.
     """
     sensor = sensor_of(kind)
     settings = settings_of(technique, kind)

@@ -16,7 +16,9 @@ def integrated(case: Case) -> float:
     return float(density.log_likelihood(np.empty((1, 0)))[0])
 
 
-@pytest.mark.parametrize(("seed", "count"), [(3, 40), pytest.param(4, 300, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("seed", "count"), [(3, 40), pytest.param(4, 300, marks=pytest.mark.thorough)]
+)
 def test_random_frames(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     for k in range(count):

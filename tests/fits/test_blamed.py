@@ -48,7 +48,11 @@ def disturbed(frames: Frames, *places: int) -> Frames:
 
 @pytest.mark.parametrize(
     ("kind", "places"),
-    [("pulsed", (12,)), ("pulsed", (9, 17)), ("sine_wave", (26,))],
+    [
+        pytest.param("pulsed", (12,), marks=pytest.mark.thorough),
+        ("pulsed", (9, 17)),
+        ("sine_wave", (26,)),
+    ],
 )
 def test_frames_of_something_else_are_named(kind: str, places: tuple[int, ...]) -> None:
     sensor, frames = frames_of(kind)

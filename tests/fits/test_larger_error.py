@@ -18,7 +18,7 @@ from tests.recorded.experiment import GAIN, PATH, calibration_of, near_recording
 
 @pytest.mark.recorded
 @pytest.mark.skipif(not PATH.exists(), reason="../shared/data/tmf8820_plane.json is absent")
-@pytest.mark.parametrize("unit", [1.0, 1e-12])
+@pytest.mark.parametrize("unit", [pytest.param(1.0, marks=pytest.mark.thorough), 1e-12])
 def test_recorded_photons_without_empty_frames_are_refused(unit: float) -> None:
     """Flux that errs by three times the default, behind a tenth of crosstalk.
 

@@ -67,6 +67,7 @@ def test_stopped_before_any_draw_it_says_so(job: Job, begun: Checkpoint) -> None
     assert np.isnan(posterior.range_m.q50).all()
 
 
+@pytest.mark.thorough
 def test_it_converges_to_the_truth(job: Job, begun: Checkpoint, simulation: Simulation) -> None:
     """The truth lies within the posterior's central 1 - 1e-6 for every range: once in 1e5 not."""
     checkpoint = begun

@@ -61,7 +61,7 @@ def test_converges_at_n_40(kind: str, crosstalk: bool) -> None:
     assert not posterior.fit.misfit
 
 
-@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+@pytest.mark.parametrize("kind", [pytest.param("pulsed", marks=pytest.mark.thorough), "sine_wave"])
 def test_importance_agrees_with_ensembles(kind: str) -> None:
     request = example(kind, crosstalk=True, frames=40)
     weighted = infer(*request, SamplerSettings(method="importance", seed=3))

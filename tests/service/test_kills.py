@@ -1,4 +1,4 @@
-"""Services, workers and databases are killed while jobs run; the long version is `make kills`."""
+"""Services, workers and databases are killed while jobs run; a longer version is `make kills`."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -17,7 +17,7 @@ from tests.service.test_server import fake_server
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(params=["sqlite", "postgresql"])
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.thorough)])
 def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[str, int]]:
     """Address of a database, and how many services share it."""
     if request.param == "sqlite":

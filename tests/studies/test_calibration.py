@@ -18,7 +18,13 @@ ALARM = 1e-3  # of each scene, shared among its quantities
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("slug", ["pulsed-object-crosstalk-snr-1000", "sine-wave-object-snr-10"])
+@pytest.mark.parametrize(
+    "slug",
+    [
+        pytest.param("pulsed-object-crosstalk-snr-1000", marks=pytest.mark.thorough),
+        "sine-wave-object-snr-10",
+    ],
+)
 def test_truths_rank_evenly_among_the_draws(slug: str) -> None:
     """Kolmogorov-Smirnov on unknowns, log density and three ranges; false alarms 1e-3 a scene."""
     cell = dataclasses.replace(CELLS[slug], frames=12)

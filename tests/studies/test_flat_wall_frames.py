@@ -45,7 +45,7 @@ def test_a_posterior_before_a_flat_wall_holds_only_with_the_error_of_its_shadow(
     assert exact.flagged
 
 
-@pytest.mark.parametrize("number", [3, 5])
+@pytest.mark.parametrize("number", [pytest.param(3, marks=pytest.mark.thorough), 5])
 def test_bright_frames_before_a_flat_wall_are_no_misfit_where_the_answer_holds(
     number: int,
 ) -> None:

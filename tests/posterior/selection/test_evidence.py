@@ -90,7 +90,9 @@ def test_evidence_agrees_with_quadrature(name: str) -> None:
     assert found.error < 0.05
 
 
-@pytest.mark.parametrize("name", ["c0 and c1", "c2 and crosstalk"])
+@pytest.mark.parametrize(
+    "name", ["c0 and c1", pytest.param("c2 and crosstalk", marks=pytest.mark.thorough)]
+)
 def test_evidence_by_bridge_agrees_with_quadrature(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
