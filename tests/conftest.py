@@ -52,15 +52,15 @@ def anyio_backend() -> str:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what `make thorough` runs, let one process run what compiles the same kernels, and
-    begin with what takes long.
+    """Let one process run what compiles the same kernels, and begin with what takes long.
 
-    Without groups both of two processes compile nearly every kernel.
+    Without groups both of two processes compile nearly every kernel. What is thorough is left out
+    of all but `make thorough`.
     """
     if not THOROUGH:
         left_out = [item for item in items if item.get_closest_marker("thorough")]
         config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if item not in set(left_out)]
+        items[:] = [item for item in items if not item.get_closest_marker("thorough")]
     slow = set()
     for item in items:
         folder, *rest = item.path.relative_to(Path(__file__).parent).parts
