@@ -76,13 +76,13 @@ mutations: $(READY) ## Plant faults in a copy of the source, one at a time: whic
 unexport PYTHONDONTWRITEBYTECODE
 
 # two processes on two cores: a library that starts threads of its own only makes them wait
-notebook-seeds calibrate coverage stress test fast: export OPENBLAS_NUM_THREADS = 1
+notebook-seeds calibrate coverage stress test thorough fast: export OPENBLAS_NUM_THREADS = 1
 
-test: $(READY) ## Run every test
+test: $(READY) ## Run the tests
 	$(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder
 
-thorough: $(READY) ## All tests, with those and all data sets that `make test` leaves out
-	HYBRIDTOF_THOROUGH=1 $(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder
+thorough: $(READY) ## Run all tests, with those and all data sets that `make test` leaves out
+	TESTS_THOROUGH=1 $(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder
 
 fast: $(READY) ## Run the tests that take seconds
 	$(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow"

@@ -11,7 +11,7 @@ __all__ = ["THOROUGH", "first"]
 
 T = TypeVar("T")
 
-THOROUGH = os.environ.get("HYBRIDTOF_THOROUGH") == "1"
+THOROUGH = os.environ.get("TESTS_THOROUGH") == "1"
 """Whether all tests run, with all of their data sets."""
 
 

@@ -79,7 +79,7 @@ def _failing(tree: Path, arguments: Sequence[str], cache: Path) -> str | None:
         "XDG_CACHE_HOME": str(cache),
         "OPENBLAS_NUM_THREADS": "1",
         "OMP_NUM_THREADS": "1",
-        "HYBRIDTOF_THOROUGH": "1",
+        "TESTS_THOROUGH": "1",
     }
     plugins = [part for name in (*_PLUGINS, "no:cacheprovider") for part in ("-p", name)]
     command = [sys.executable, "-m", "pytest", "-x", "-q", "--tb=line", *plugins, *arguments]
