@@ -14,7 +14,7 @@ GLOSSARY = (Path(__file__).parents[1] / "docs" / "glossary.md").read_text(encodi
 @pytest.mark.parametrize(
     ("words", "limits"),
     [
-        (r"readings \(false-alarm rate at most ([\d.e-]+)\)", (predictive_check._MISFIT,)),
+        (r"readings \(false-alarm rate at most ([\d.e-]+)\)", (predictive_check.MISFIT_P,)),
         (r"trusted up to a Pareto k-hat of ([\d.]+\d)", (importance.MAX_K_HAT,)),
     ],
 )

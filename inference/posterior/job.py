@@ -20,7 +20,7 @@ from inference.posterior.streams import Stream
 from simulator.at_temperature import warmth
 from simulator.errors import RefusedError
 from simulator.frames import Frames, check_frames
-from simulator.model_error import ErrorSizes
+from simulator.model_error import ErrorSizes, ModelError
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor, parse_sensor
 from simulator.validated import parse
@@ -47,6 +47,9 @@ class Job:
         Usable frames that are sampled in the name of all; None where all are.
     numbers : ndarray of int, shape (n,), or None
         Of a part of a job: which of the frames that were sent these are.
+    flux_times : float
+        By what the error of the flux is larger than the scene allows, where its readings ask for
+        that.
     """
 
     sensor: Sensor
@@ -55,6 +58,7 @@ class Job:
     settings: SamplerSettings
     representatives: Representatives | None = None
     numbers: NDArray[np.intp] | None = None
+    flux_times: float = 1.0
 
     @property
     def seed(self) -> int:
@@ -63,6 +67,12 @@ class Job:
         if seed is None:
             raise ValueError("a job is made by `prepare`, which draws the seed")
         return seed
+
+    @property
+    def model_error(self) -> ModelError:
+        """Sizes of the model's errors: those that the scene allows, or the readings ask for."""
+        error = self.scene.model_error
+        return dataclasses.replace(error, flux=self.flux_times * error.flux)
 
     @property
     def usable(self) -> NDArray[np.bool_]:

@@ -25,18 +25,20 @@ from inference.posterior.answer.posterior import (
 )
 from inference.posterior.answer.range_summary import joined, range_summary
 from inference.posterior.answer.whole import Whole, with_model_error
-from inference.posterior.criticism.best_point import best_point
 from inference.posterior.criticism.cross_check import cross_check
 from inference.posterior.criticism.discrepancy_check import (
     MISFIT,
     LargerDiscrepancy,
-    beside_shadow,
     judge_fit,
     with_model_part,
 )
 from inference.posterior.criticism.many_frames import bias_of_many_frames
+from inference.posterior.criticism.model_check import (
+    flux_error_asked_for,
+    model_check,
+    with_larger_flux_error,
+)
 from inference.posterior.criticism.other_optima import Stated, mark_other_optima
-from inference.posterior.criticism.predictive_check import predictive_check
 from inference.posterior.criticism.prior_conflict import prior_conflicts
 from inference.posterior.criticism.prior_contradiction import contradicted
 from inference.posterior.criticism.prior_dark import mark_dark
@@ -95,14 +97,21 @@ def _judged(drawn: "_Drawn", whole: Whole) -> tuple[Identifiability, ...]:
         log_r,
         gains_of(density.frames),
         # at rest it is no different from another c2
-        discrepancy=None if static else job.scene.model_error.flux or None,
+        discrepancy=None if static else job.model_error.flux or None,
         common_range=static,
         rates=rates_of(density.frames),
     )
     shares = dict(zip(density.parameters.names, whole.budget.of_z.model.tolist(), strict=True))
     scale = whole.scale_error, whole.spread.scale
     budget = whole.budget
-    rows = with_model_part(rows, *scale, budget.curvature, shares, by_flux=budget.by_flux)
+    rows = with_model_part(
+        rows,
+        *scale,
+        budget.curvature,
+        shares,
+        by_flux=budget.by_flux,
+        asked_for=job.flux_times > 1,
+    )
     rows = mark_sensitive(density.parameters.names, rows, whole.sensitivity)
     if whole.glossy is not None:
         rows = mark_sensitive(density.parameters.names, rows, whole.glossy.open)
@@ -125,7 +134,7 @@ def _of_all_frames(job: Job, shares: ErrorParts) -> ErrorParts:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Drawn:
-    """What a job has drawn, and the stream that the rest of its answer goes on with."""
+    """What a job has drawn, and how well the model meets the readings there."""
 
     job: Job
     density: CollapsedDensity
@@ -137,13 +146,13 @@ class _Drawn:
     sample: Sample
     draws: Draws
     whole: Whole | None
+    checked: tuple[Fit, LargerDiscrepancy | None] | None
     bias: Array | None
-    rng: np.random.Generator
 
 
 def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
     """Draw what the answer of a job is made of: the one place where its stream is begun."""
-    checkpoint = checkpoint.answering
+    given, checkpoint = job, checkpoint.answering
     job, stage, calls = sampled(job, checkpoint), checkpoint.stage, checkpoint.calls
     if isinstance(stage, Selecting | Starting):  # there was no time for more
         # of the choices the last keeps all optional terms
@@ -157,14 +166,21 @@ def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
     sample, parts = sample_of(density, stage, rng), job.parts()
     own = density if job.representatives is None else parts[0].density()
     draws, whole = draws_of(own, parts[0], sample, rng, len(parts)), None
-    every, bias = None, None
+    every, bias, checked = None, None, None
     if sample.drawn and job.representatives is not None:
         every = dataclasses.replace(job, representatives=None).density()
         bias = bias_of_many_frames(every, sample.flat, job.stream(Stream.PARTS))
     if sample.drawn:
         whole = with_model_error(parts[0], own, sample, draws, density, bias)
+        checked = model_check(parts[0], own, whole, rng, parts[1:])
+        times = flux_error_asked_for(given, own, checked[0])
+        if times > 1:
+            parts = tuple(dataclasses.replace(part, flux_times=times) for part in parts)
+            whole = with_model_error(parts[0], own, sample, draws, density, bias)
         draws = whole.draws
-    return _Drawn(job, density, every, parts, own, stage, calls, sample, draws, whole, bias, rng)
+    return _Drawn(
+        job, density, every, parts, own, stage, calls, sample, draws, whole, checked, bias
+    )
 
 
 @one_thread()
@@ -268,23 +284,6 @@ def _ranges(drawn: _Drawn, whole: Whole) -> RangeSummary:
     return joined(found, numbers, len(drawn.job.frames))
 
 
-def _checked(drawn: _Drawn, whole: Whole) -> tuple[Fit, LargerDiscrepancy | None]:
-    """Check the model at draws, and where it fails before a background at the best point of all."""
-    job, larger = drawn.parts[0], whole.larger
-    fit = predictive_check(job, drawn.own, whole.chosen, drawn.rng, drawn.parts[1:])
-    demands = larger is not None and larger.bayes_factor > MISFIT
-    if drawn.parts[1:] or not (fit.misfit or demands):
-        return fit, larger
-    log_r, error = np.log(whole.draws.range_m[..., job.usable]), job.scene.model_error
-    answered = log_r.reshape(-1, log_r.shape[-1])
-    best = best_point(drawn.own, whole.chosen, whole.log_r, error, answered)
-    if best is None:
-        return fit, larger
-    if larger is not None:
-        larger = beside_shadow(larger, best)
-    return predictive_check(job, drawn.own, whole.chosen, drawn.rng, best=best), larger
-
-
 def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
     """Say what draws say: of every unknown and range, of themselves, and of the model."""
     job, stage, density, sample = drawn.parts[0], drawn.stage, drawn.density, drawn.sample
@@ -298,14 +297,16 @@ def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
         reasons = (*reasons, *found)
     if drawn.every is not None:
         reasons = (*reasons, *doubts(drawn.every, density, sample.flat))
-    fit, larger = _checked(drawn, whole)
+    assert drawn.checked is not None  # noqa: S101  # whatever was drawn was checked
+    fit, larger = drawn.checked
+    fit = with_larger_flux_error(fit, job.flux_times)
     judged = _judged(drawn, whole)
     if larger is not None:
         fit = judge_fit(fit, larger)
         if larger.bayes_factor > MISFIT and rates_of(drawn.own.frames) is not None:
             # known ranges and readings contradict each other: a widened answer is no certain one
             judged = weak_at_best(judged, "by errors of the model that are larger than stated")
-    found = prior_conflicts(drawn.own, sample.flat, log_r, density, job.scene.model_error)
+    found = prior_conflicts(drawn.own, sample.flat, log_r, density, job.model_error)
     fit, judged = contradicted(fit, judged, found)
     reasons = (*reasons, *_unfinished(drawn.own, chosen, job.stream(Stream.INTEGRALS)))
     return Findings(

@@ -29,6 +29,7 @@ from inference.posterior.answer.responses import chosen_draws, flux_leads, respo
 from inference.posterior.answer.shadow_beside import shadow_beside, with_shadow
 from inference.posterior.answer.where_bent import best_ends, where_bent
 from inference.posterior.answer.where_known import where_known
+from inference.posterior.answer.where_misfit import where_integrated, where_misfit
 from inference.posterior.criticism.discrepancy_check import BENT, LargerDiscrepancy
 from inference.posterior.criticism.glossy_object import GlossyObject
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
@@ -96,7 +97,7 @@ def error_budget(
     glossy : GlossyObject or None
         Where nothing is said of the object: what changes as it may be glossy.
     """
-    error, rates = job.scene.model_error, rates_of(density.frames)
+    error, rates = job.model_error, rates_of(density.frames)
     shadow = error.shadow if density.parameters.has_background else 0.0
     chosen = chosen_draws(len(z), log_r.shape[1])
     found = responses_at(job, density, z[chosen], log_r[chosen], rng)
@@ -104,12 +105,21 @@ def error_budget(
     experiments, responses, readings = found.experiments, found.each, found.readings
     at, ranges = found.z, found.log_r
     by_z, by_log_r = ([by[:, :, :1], by[:, :, 1:]] for by in (found.by_z, found.by_log_r))
-    if found.repeated and experiments[0].shadow > 0:
-        follow = where_bent(
-            best_ends(experiments, readings),
-            z + np.median(by_z[0][:, :, 0], axis=0),
-            log_r + np.median(by_log_r[0][:, :, 0], axis=0),
-        )
+    at_ends = (
+        z + np.median(by_z[0][:, :, 0], axis=0),
+        log_r + np.median(by_log_r[0][:, :, 0], axis=0),
+    )
+    follow: tuple[Array, Array]
+    if job.flux_times > 1:
+        if isinstance(density, DiscrepantDensity):
+            follow = where_integrated(density, experiments, readings, (z, log_r), job.flux_times)
+        else:
+            follow = where_misfit(experiments, readings, *at_ends)
+        for by, moved in zip((by_z, by_log_r), follow, strict=True):
+            by[0] = by[0] + moved[:, :1]
+            by.append(np.broadcast_to(moved[:, 1:], (len(at), *moved[:, 1:].shape)))
+    elif found.repeated and experiments[0].shadow > 0:
+        follow = where_bent(best_ends(experiments, readings), *at_ends)
         for by, moved in zip((by_z, by_log_r), follow, strict=True):
             by.append(np.broadcast_to(moved[:, None], (len(at), moved.size, 1)))
     if larger is not None:

@@ -132,7 +132,7 @@ def first_responses(
     rng: np.random.Generator,
 ) -> Responses:
     """Follow all of the draws by one step; parameters are those of `responses_at`."""
-    error, rates = job.scene.model_error, rates_of(density.frames)
+    error, rates = job.model_error, rates_of(density.frames)
     flux = 0.0 if error.integrated else error.flux
     shadow = density.parameters.has_background and not isinstance(density, DiscrepantDensity)
     experiments = tuple(

@@ -11,6 +11,7 @@ from inference.density.collapsed import CollapsedDensity
 from inference.density.discrepant import DiscrepantDensity
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.range_response import range_response
+from inference.posterior.answer.widened import widened
 from inference.posterior.criticism.discrepancy_check import MISFIT, LargerDiscrepancy
 
 __all__ = ["where_known"]
@@ -73,12 +74,8 @@ def _widened(
     z: Array, of_z: Array, log_r: Array, of_log_r: Array, factor: float
 ) -> tuple[Array, Array]:
     """Multiply the variance of draws, and of what errors move them by, by a factor above 1."""
-    d = z.shape[1]
-    draws = np.concatenate([z, np.where(np.isfinite(log_r), log_r, 0.0)], axis=1)
-    _, sizes, ways = np.linalg.svd(draws - draws.mean(axis=0), full_matrices=False)
-    more = (math.sqrt((factor - 1.0) / len(z)) * sizes[:, None] * ways).T
     found = []
-    for of, part in ((of_z, more[:d]), (of_log_r, more[d:])):
+    for of, part in zip((of_z, of_log_r), widened(z, log_r, factor), strict=True):
         moved = of.copy()
         moved[:, :, 1:] *= math.sqrt(factor)
         new = np.broadcast_to(part, (len(of), *part.shape))

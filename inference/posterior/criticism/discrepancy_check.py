@@ -168,6 +168,7 @@ def with_model_part(
     shares: Mapping[str, float],
     *,
     by_flux: bool,
+    asked_for: bool = False,
 ) -> tuple[Identifiability, ...]:
     """Say how much of the common scale's uncertainty is the model's, and whether it is known.
 
@@ -183,6 +184,8 @@ def with_model_part(
         The model's part of the standard deviation of each unknown.
     by_flux : bool
         Whether most of it is the flux's, which can be integrated out, not a shadow's.
+    asked_for : bool
+        Whether it is larger than the scene allows, as the readings ask for.
 
     Returns
     -------
@@ -195,7 +198,10 @@ def with_model_part(
         return rows
     text, bent = f"; model error: +-{100 * model:.2g} %", is_bent(model, whole, curvature)
     remedy = (
-        "state `discrepancy` as a number, and the error is integrated out in full"
+        "the readings ask for larger errors of the flux than `discrepancy` allows: frames without "
+        "the object, or known ranges, do not need it"
+        if asked_for
+        else "state `discrepancy` as a number, and the error is integrated out in full"
         if by_flux
         else "most of it is the error of the object's shadow on the background, which is not "
         "integrated out: the interval is a guide"

@@ -14,16 +14,17 @@ from inference.posterior.criticism.fit_residuals import FitResiduals, fit_residu
 from inference.posterior.job import Job
 from simulator.discrepancy import matern
 
-__all__ = ["predictive_check"]
+__all__ = ["FLUX_ERROR", "MISFIT_P", "predictive_check"]
 
 Array = NDArray[np.float64]
 
-_MISFIT = 1e-3
+MISFIT_P = 1e-3
 _DRAWS = 5  # of the parameters
 _REPLICATES = 200  # of each
 _FEWEST = 40  # of the frames of each part, where they were dealt out
 _TAIL = 0.1  # share of the replicates that tell how the tail falls
 _LENGTH = 0.5  # in log r, of a smooth error
+FLUX_ERROR = "flux_error"
 
 
 def _total(of: FitResiduals) -> Array:
@@ -62,7 +63,7 @@ _CHECKS: dict[str, Callable[[FitResiduals], Array]] = {
     "worst_frame": _worst,
     "neighbours": _neighbours,
     "wander": _wander,
-    "flux_error": _flux_error,
+    FLUX_ERROR: _flux_error,
 }
 
 
@@ -135,10 +136,10 @@ def predictive_check(
     p_value = -math.expm1(len(checks) * math.log1p(-min(least, 1.0 - 1e-12)))
     worst = np.max([of["worst_frame"] for of in found], axis=0)[:, 1:].ravel()
     outliers = _outliers((job, *others), seen, worst)
-    failed = [c for c in checks if -math.expm1(len(checks) * math.log1p(-c.p_value)) < _MISFIT]
+    failed = [c for c in checks if -math.expm1(len(checks) * math.log1p(-c.p_value)) < MISFIT_P]
     return Fit(
         p_value,
-        p_value < _MISFIT,
+        p_value < MISFIT_P,
         tuple(_words(check, outliers) for check in failed),
         checks[0].statistic,
         checks[0].expected,
@@ -150,7 +151,7 @@ def predictive_check(
 def _outliers(parts: Sequence[Job], seen: Sequence[Array], worst: Array) -> tuple[int, ...]:
     """Return the frames that are worse than all but one in a thousand worst frames should be."""
     start = float(np.quantile(worst, 1.0 - _TAIL))
-    limit = start + float((worst[worst > start] - start).mean()) * math.log(_TAIL / _MISFIT)
+    limit = start + float((worst[worst > start] - start).mean()) * math.log(_TAIL / MISFIT_P)
     found = [
         part.of_sent(np.flatnonzero(part.usable))[of > limit]
         for part, of in zip(parts, seen, strict=True)
@@ -176,7 +177,7 @@ def _words(check: FitCheck, outliers: tuple[int, ...]) -> str:
             f"residuals of neighbouring ranges go together (correlation {check.statistic:.2g}): "
             "the model has a smooth error along the range beyond what `discrepancy` allows"
         )
-    if check.name == "flux_error":
+    if check.name == FLUX_ERROR:
         size = math.sqrt(check.statistic / max(check.expected, 1e-300))
         return (
             f"the object's flux would have to differ from the model by {size:.3g} times what "

@@ -1,0 +1,100 @@
+"""Whether the model can make such readings, and errors of what size they would ask for."""
+
+import dataclasses
+import math
+
+import numpy as np
+
+from inference.density.collapsed import CollapsedDensity
+from inference.frame.known_range import rates_of
+from inference.posterior.answer.fit import Fit
+from inference.posterior.answer.whole import Whole
+from inference.posterior.criticism.best_point import best_point
+from inference.posterior.criticism.discrepancy_check import (
+    MISFIT,
+    LargerDiscrepancy,
+    beside_shadow,
+)
+from inference.posterior.criticism.predictive_check import FLUX_ERROR, MISFIT_P, predictive_check
+from inference.posterior.job import Job
+
+__all__ = ["LARGEST", "flux_error_asked_for", "model_check", "with_larger_flux_error"]
+
+LARGEST = 1.0  # standard deviation of the logarithm of the flux: a factor e
+_BY_CHANCE = 0.05  # of a check, where the model is refuted by all of them
+
+
+def model_check(
+    job: Job,
+    density: CollapsedDensity,
+    whole: Whole,
+    rng: np.random.Generator,
+    others: tuple[Job, ...],
+) -> tuple[Fit, LargerDiscrepancy | None]:
+    """Check the model at draws, and where it fails before a background at the best point of all.
+
+    Parameters
+    ----------
+    whole : Whole
+        The draws, moved by errors of the size that the scene allows.
+    others : tuple of Job
+        The other parts of a job whose frames were dealt out.
+
+    Returns
+    -------
+    (Fit, LargerDiscrepancy or None)
+        The latter where the flux's error was integrated out.
+    """
+    larger = whole.larger
+    fit = predictive_check(job, density, whole.chosen, rng, others)
+    demands = larger is not None and larger.bayes_factor > MISFIT
+    if others or not (fit.misfit or demands):
+        return fit, larger
+    log_r, error = np.log(whole.draws.range_m[..., job.usable]), job.scene.model_error
+    answered = log_r.reshape(-1, log_r.shape[-1])
+    best = best_point(density, whole.chosen, whole.log_r, error, answered)
+    if best is None:
+        return fit, larger
+    if larger is not None:
+        larger = beside_shadow(larger, best)
+    return predictive_check(job, density, whole.chosen, rng, best=best), larger
+
+
+def flux_error_asked_for(job: Job, density: CollapsedDensity, fit: Fit) -> float:
+    """Return how many times larger an error of the flux readings ask for than the scene allows.
+
+    Parameters
+    ----------
+    job : Job
+        As it was given: a size of its errors that is stated in numbers stands.
+    density : CollapsedDensity
+        Of its frames. Where it knows ranges, `inference.posterior.answer.where_known` does this.
+    fit : Fit
+        Of its frames.
+
+    Returns
+    -------
+    float
+        1 where the size that is allowed for does, or noise alone is what is larger; at most what
+        makes an error of `LARGEST`.
+    """
+    error, asked = job.scene.model_error, fit.of(FLUX_ERROR)
+    if error.integrated or rates_of(density.frames) is not None:
+        return 1.0
+    if not (error.flux > 0 and fit.p_value < MISFIT_P):
+        return 1.0
+    if asked.p_value > _BY_CHANCE or not asked.expected > 0:
+        return 1.0
+    times = math.sqrt(asked.statistic / asked.expected)
+    return max(1.0, min(times, LARGEST / error.flux))
+
+
+def with_larger_flux_error(fit: Fit, times: float) -> Fit:
+    """Say that an answer was given room for errors so many times larger."""
+    if not times > 1:
+        return fit
+    room = (
+        f"every interval has room for errors of the object's flux {times:.2g} times what "
+        "`discrepancy` allows"
+    )
+    return dataclasses.replace(fit, reasons=(*fit.reasons, room))
