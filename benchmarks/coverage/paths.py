@@ -87,6 +87,10 @@ PATHS: Mapping[str, Path] = {
 TOLD: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]] = {
     "exact": ({"discrepancy": 0}, {}),
     "nothing": ({}, {"discrepancy": {"flux": DISCREPANCY_SD, "range_m": RANGE_ERROR_SD}}),
+    "nothing, larger errors": (
+        {},
+        {"discrepancy": {"flux": 5.0 * DISCREPANCY_SD, "range_m": RANGE_ERROR_SD}},
+    ),
     "loguniform": (
         {"discrepancy": 0, "range_m": {"prior": "loguniform", "low": 0.02, "high": 15.0}},
         {},
@@ -122,7 +126,7 @@ class PathSet:
     parameters: dict[str, float]
 
 
-def draw_path(path: str, light: str, told: str, number: int) -> PathSet:
+def draw_path(path: str, light: str, told: str, number: int, snr: float = SNR) -> PathSet:
     """Draw a data set of a class of paths.
 
     The stroke starts at 0.1 to 0.4 m and ends 2 to 6 times as far. The object's c0 and c2 are
@@ -137,13 +141,15 @@ def draw_path(path: str, light: str, told: str, number: int) -> PathSet:
         Of `PATHS`, `LIGHT` and `TOLD`.
     number : int
         Of the data set: it alone fixes everything. Even ones are pulsed, odd ones sine waves.
+    snr : float
+        Of the object in the middle of its stroke.
 
     Returns
     -------
     PathSet
     """
     rng = np.random.default_rng([zlib.crc32(f"{path}, {light}".encode()), number])
-    return _data((path, light, told), KINDS[number % 2], FRAMES, SNR, rng)
+    return _data((path, light, told), KINDS[number % 2], FRAMES, snr, rng)
 
 
 def random_scene(seed: int, number: int) -> PathSet:

@@ -17,6 +17,7 @@ _STEPS = 300
 _TRIES = 20  # of one step, each damped four times as much
 _DAMPED = 1e-2  # at first, in units of the priors
 _GAINED = 0.003  # of the deviance, by a step that is the last
+_FARTHEST = 30.0  # standard deviations of a prior: farther lengths are no numbers any more
 
 
 def joint_optimum(experiment: Experiment, readings: Array) -> tuple[Experiment, float]:
@@ -89,7 +90,7 @@ def _stepped(rows: ResponseRows, readings: Array, damping: float) -> Experiment:
     d = e.z.size
     return dataclasses.replace(
         e,
-        z=e.z + step[:d],
+        z=np.clip(e.z + step[:d], -_FARTHEST, _FARTHEST),
         log_r=e.log_r + np.clip(moved, -1.0, 1.0),
         error=e.error + step[d:],
     )

@@ -1,0 +1,114 @@
+"""Posteriors of objects that differ from the model by far more than stands by default.
+
+    python -m benchmarks.larger_errors [--sets 10] [--first 0] [--snr 30000] [--light crosstalk]
+
+Paths of `benchmarks.coverage`, 20 frames, of an object whose flux errs five times as much as the
+default allows, before light that is not known; a scene that says nothing. Every answer is made
+twice from the same draws: with room for the errors that readings ask for where they refute the
+model, and without (the baseline).
+"""
+
+import argparse
+import dataclasses
+import time
+from unittest import mock
+
+import numpy as np
+
+from benchmarks.coverage.paths import LIGHT, PATHS, PathSet, draw_path
+from inference.posterior import fold
+from inference.posterior.answer.posterior import Posterior
+from inference.posterior.settings import SamplerSettings
+from simulator.errors import RefusedError
+from simulator.scene import parse_scene
+
+TOLD = "nothing, larger errors"
+FAR = 5.0
+AT_REST = "at rest, a few moves"  # four places tell too little to refute a model
+
+
+def answers(data: PathSet, seed: int, max_seconds: float) -> tuple[Posterior, Posterior]:
+    """Return what is answered, and what would be without room for larger errors.
+
+    Raises
+    ------
+    RefusedError
+        Where no honest answer exists.
+    """
+    start = time.process_time()
+    settings = SamplerSettings(method="auto", seed=seed, max_seconds=max_seconds)
+    job = fold.prepare(data.sensor, parse_scene(data.scene), data.frames, settings)
+    checkpoint = fold.start(job)
+    while tasks := fold.tasks(job, checkpoint, time.process_time() - start):
+        checkpoint = fold.merge(job, checkpoint, [fold.run(task) for task in tasks])
+    found = fold.summarise(job, checkpoint, 0.0, 0.0)
+    with mock.patch("inference.posterior.summary.flux_error_asked_for", return_value=1.0):
+        return found, fold.summarise(job, checkpoint, 0.0, 0.0)
+
+
+@dataclasses.dataclass
+class Tally:
+    """What some answers held."""
+
+    inside: list[float] = dataclasses.field(default_factory=list)
+    width: list[float] = dataclasses.field(default_factory=list)
+    identified: int = 0
+    far: int = 0
+
+    def take(self, found: Posterior, truth_m: np.ndarray) -> None:
+        """Count an answer."""
+        ranges = found.range_m
+        held = (ranges.q05 <= truth_m) & (truth_m <= ranges.q95)
+        self.inside.append(float(held.mean()))
+        self.width.append(float(np.median((ranges.q95 - ranges.q05) / truth_m)))
+        status = {row.parameter: row.status for row in found.identifiability}
+        off = np.abs(ranges.mean - truth_m) / ranges.sd
+        self.identified += status["range_m"] == "identified"
+        self.far += bool(off.max() > FAR)
+
+    def line(self, name: str) -> str:
+        """Return a row of the table."""
+        inside = f"{np.mean(self.inside):.0%}" if self.inside else ""
+        width = f"{np.median(self.width):.1%}" if self.width else ""
+        return (
+            f"| {name} | {len(self.inside)} | {inside} | {width} | {self.identified} | {self.far} |"
+        )
+
+
+def main() -> None:
+    """Print a table of answers that say misfit, with and without room, and of the others."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--sets", type=int, default=10, help="of each class of paths")
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--snr", type=float, default=3e4)
+    parser.add_argument("--light", choices=LIGHT, default="crosstalk")
+    parser.add_argument("--max-seconds", type=float, default=20.0)
+    arguments = parser.parse_args()
+    room, without, others, late = Tally(), Tally(), Tally(), 0
+    for number in range(arguments.first, arguments.first + arguments.sets):
+        for path in PATHS:
+            if path == AT_REST:
+                continue
+            data = draw_path(path, arguments.light, TOLD, number, arguments.snr)
+            try:
+                found, baseline = answers(data, number, arguments.max_seconds)
+            except RefusedError:
+                late += 1
+                continue
+            if not (found.drawn and found.verdict.converged):
+                late += 1
+            elif found.fit.misfit:
+                room.take(found, data.range_m)
+                without.take(baseline, data.range_m)
+            else:
+                others.take(found, data.range_m)
+    print("| says | sets | ranges held | width | scale identified | a range beyond 5 sd |")
+    print("|---|---|---|---|---|---|")
+    print(room.line("misfit"))
+    print(without.line("misfit, without room for larger errors"))
+    print(others.line("no misfit"))
+    print(f"\n{late} without an answer in time, or refused")
+
+
+if __name__ == "__main__":
+    main()

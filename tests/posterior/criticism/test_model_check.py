@@ -1,0 +1,149 @@
+"""Readings that refute the model and ask for larger errors of the flux get room for them."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks.coverage.paths import PathSet, draw_path
+from benchmarks.larger_errors import TOLD, answers
+from inference.density.discrepant import DiscrepantDensity
+from inference.identifiability.experiment import Experiment
+from inference.identifiability.joint_optimum import joint_optimum
+from inference.posterior import fold
+from inference.posterior.answer.fit import Fit, FitCheck
+from inference.posterior.answer.where_misfit import where_integrated, where_misfit
+from inference.posterior.answer.widened import widened
+from inference.posterior.criticism.model_check import LARGEST, flux_error_asked_for
+from inference.posterior.criticism.predictive_check import FLUX_ERROR, MISFIT_P
+from inference.posterior.job import Job
+from inference.posterior.sample import sample_of
+from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.stage import Selecting, Starting
+from inference.posterior.stages.standing import standing
+from simulator.discrepancy import DISCREPANCY_SD
+from simulator.scene import parse_scene
+
+SNR = 3e4
+ROUNDING = 1e-9
+
+
+def job_of(data: PathSet) -> Job:
+    settings = SamplerSettings(method="auto", seed=4, max_seconds=30.0)
+    return fold.prepare(data.sensor, parse_scene(data.scene), data.frames, settings)
+
+
+def fit_of(p_value: float, asked: FitCheck) -> Fit:
+    return Fit(p_value, p_value < MISFIT_P, (), 50.0, 15.0, (asked,), ())
+
+
+@pytest.mark.parametrize(("path", "number"), [("constant speed", 4), ("independent", 3)])
+def test_readings_that_refute_the_model_have_room_for_larger_errors(path: str, number: int) -> None:
+    """Errors are five times what stands; all draws are the same, and without room none is held."""
+    data = draw_path(path, "crosstalk", TOLD, number, SNR)
+    found, without = answers(data, number, 30.0)
+    assert found.fit.misfit
+    assert any("has room for errors of the object's flux" in why for why in found.fit.reasons)
+    held, before = (
+        np.mean((of.range_m.q05 <= data.range_m) & (data.range_m <= of.range_m.q95))
+        for of in (found, without)
+    )
+    assert held == 1.0
+    assert before < 0.2
+    assert found.draws.log_density.tolist() == without.draws.log_density.tolist()
+
+
+@pytest.fixture(scope="module")
+def sampled() -> tuple[Job, Checkpoint]:
+    job = job_of(draw_path("independent", "crosstalk", TOLD, 3, SNR))
+    checkpoint = fold.start(job)
+    while tasks := fold.tasks(job, checkpoint, 0.0):
+        checkpoint = fold.merge(job, checkpoint, [fold.run(task) for task in tasks])
+    return job, checkpoint
+
+
+def test_draws_that_are_given_away_are_those_of_the_answer(sampled: tuple[Job, Checkpoint]) -> None:
+    job, checkpoint = sampled
+    answer = fold.summarise(job, checkpoint, 0.0, 0.0)
+    part, draws = fold.draw(job, checkpoint)
+    assert part.flux_times > 1
+    assert np.array_equal(draws.range_m, answer.draws.range_m)
+
+
+def test_a_larger_error_is_asked_for_only_where_the_model_is_refuted_by_it() -> None:
+    job = job_of(draw_path("independent", "crosstalk", TOLD, 3, SNR))
+    density = job.density()
+    asked = FitCheck(FLUX_ERROR, 9.0, 1.0, 1e-4)
+    assert flux_error_asked_for(job, density, fit_of(1e-4, asked)) == pytest.approx(3.0)
+    by_noise = dataclasses.replace(asked, p_value=0.06)
+    assert flux_error_asked_for(job, density, fit_of(1e-4, by_noise)) == 1.0
+    assert flux_error_asked_for(job, density, fit_of(2e-3, asked)) == 1.0
+    beyond = dataclasses.replace(asked, statistic=1e9)
+    most = flux_error_asked_for(job, density, fit_of(1e-4, beyond))
+    assert most * DISCREPANCY_SD == pytest.approx(LARGEST)
+    assert flux_error_asked_for(job.with_error_integrated(), density, fit_of(0.0, asked)) == 1.0
+    exact = dataclasses.replace(job, scene=job.scene.model_copy(update={"discrepancy": 0.0}))
+    assert flux_error_asked_for(exact, density, fit_of(0.0, asked)) == 1.0
+
+
+def test_a_range_that_is_known_has_its_own_room() -> None:
+    data = draw_path("independent", "crosstalk", TOLD, 3, SNR)
+    known = np.full(len(data.frames), np.nan)
+    known[0] = data.range_m[0]
+    sd = np.full(len(data.frames), 1e-3)
+    frames = dataclasses.replace(data.frames, known_range_m=known, known_range_sd_m=sd)
+    job = job_of(dataclasses.replace(data, frames=frames))
+    asked = FitCheck(FLUX_ERROR, 9.0, 1.0, 1e-4)
+    assert flux_error_asked_for(job, job.density(), fit_of(1e-4, asked)) == 1.0
+
+
+def test_draws_are_widened_by_a_factor_of_their_variance() -> None:
+    rng = np.random.default_rng(1)
+    z = rng.standard_normal((50, 3)) @ rng.standard_normal((3, 3))
+    log_r = np.concatenate([z @ rng.standard_normal((3, 4)), np.full((50, 1), np.nan)], axis=1)
+    of_z, of_log_r = widened(z, log_r, 5.0)
+    assert np.allclose(of_z @ of_z.T, 4.0 * np.cov(z.T, bias=True), rtol=ROUNDING)
+    expected = 4.0 * np.cov(log_r[:, :4].T, bias=True)
+    assert np.allclose(of_log_r[:4] @ of_log_r[:4].T, expected, rtol=ROUNDING)
+    assert np.allclose(of_log_r[4], 0.0, atol=ROUNDING)
+
+
+def test_all_draws_move_to_the_best_point_and_are_as_uncertain_as_the_way_is_long(
+    sampled: tuple[Job, Checkpoint],
+) -> None:
+    data = draw_path("independent", "crosstalk", TOLD, 3, SNR)
+    given, checkpoint = sampled
+    stage = checkpoint.answering.stage
+    assert not isinstance(stage, Selecting | Starting)
+    z = sample_of(given.density(), standing(stage), np.random.default_rng(2)).flat[:8]
+    job = given.with_error_integrated()
+    density = job.density()
+    assert isinstance(density, DiscrepantDensity)
+    log_r = density.best_ranges(z)[:, :, 0]
+    draws = zip(z, log_r, strict=True)
+    at = [Experiment(density.sensor, density.parameters, *draw) for draw in draws]
+    readings = density.frames[:, :2]
+    of_z, of_log_r = where_integrated(density, at, readings, (z, log_r), 4.0)
+    larger = [dataclasses.replace(each, discrepancy=4.0 * density.discrepancy) for each in at]
+    ways = where_misfit(larger, readings, z, log_r)
+    for found, way, drawn in ((of_z, ways[0], z), (of_log_r, ways[1], log_r)):
+        assert np.array_equal(found[:, 0], found[:, 1])
+        assert np.array_equal(way[:, 0], way[:, 1])
+        more = found[:, 2:] @ found[:, 2:].T
+        assert np.allclose(more, 15.0 * np.cov(drawn.T, bias=True), rtol=1e-6, atol=ROUNDING)
+    # nearer to the truth than draws of a model that the readings refute
+    off = np.median(log_r, axis=0) - np.log(data.range_m)
+    assert np.abs(off + of_log_r[:, 0]).mean() < 0.6 * np.abs(off).mean()
+
+
+def test_a_climb_whose_steps_lead_out_of_all_numbers_stays_in_them() -> None:
+    """From the middle of the priors a first step leads to a c0 that is no number any more."""
+    job = job_of(draw_path("independent", "crosstalk", TOLD, 3, SNR))
+    density = job.density()
+    z = 0.1 * np.random.default_rng(2).standard_normal((1, len(density.parameters)))
+    log_r = density.best_ranges(z)[0, :, 0]
+    at = Experiment(density.sensor, density.parameters, z[0], log_r, discrepancy=DISCREPANCY_SD)
+    end, deviance = joint_optimum(at, density.frames[:, :2])
+    assert np.isfinite(deviance)
+    assert end.finite
