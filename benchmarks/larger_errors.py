@@ -18,7 +18,9 @@ import numpy as np
 from benchmarks.coverage.paths import LIGHT, PATHS, PathSet, draw_path
 from inference.posterior import fold
 from inference.posterior.answer.posterior import Posterior
+from inference.posterior.job import Job
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages.checkpoint import Checkpoint
 from simulator.errors import RefusedError
 from simulator.scene import parse_scene
 
@@ -27,8 +29,8 @@ FAR = 5.0
 AT_REST = "at rest, a few moves"  # four places tell too little to refute a model
 
 
-def answers(data: PathSet, seed: int, max_seconds: float) -> tuple[Posterior, Posterior]:
-    """Return what is answered, and what would be without room for larger errors.
+def sampled(data: PathSet, seed: int, max_seconds: float) -> tuple[Job, Checkpoint]:
+    """Sample a set.
 
     Raises
     ------
@@ -41,6 +43,11 @@ def answers(data: PathSet, seed: int, max_seconds: float) -> tuple[Posterior, Po
     checkpoint = fold.start(job)
     while tasks := fold.tasks(job, checkpoint, time.process_time() - start):
         checkpoint = fold.merge(job, checkpoint, [fold.run(task) for task in tasks])
+    return job, checkpoint
+
+
+def answers(job: Job, checkpoint: Checkpoint) -> tuple[Posterior, Posterior]:
+    """Return what is answered, and what would be without room for larger errors."""
     found = fold.summarise(job, checkpoint, 0.0, 0.0)
     with mock.patch("inference.posterior.summary.flux_error_asked_for", return_value=1.0):
         return found, fold.summarise(job, checkpoint, 0.0, 0.0)
@@ -91,7 +98,7 @@ def main() -> None:
                 continue
             data = draw_path(path, arguments.light, TOLD, number, arguments.snr)
             try:
-                found, baseline = answers(data, number, arguments.max_seconds)
+                found, baseline = answers(*sampled(data, number, arguments.max_seconds))
             except RefusedError:
                 late += 1
                 continue
