@@ -1,11 +1,13 @@
-"""Posteriors of objects that differ from the model by far more than stands by default.
+"""Posteriors of objects that differ from the model by far more than stands by default, or of noise.
 
     python -m benchmarks.larger_errors [--sets 10] [--first 0] [--snr 30000] [--light crosstalk]
+    python -m benchmarks.larger_errors --understated 4 [--snr 300]
 
-Paths of `benchmarks.coverage`, 20 frames, of an object whose flux errs five times as much as the
-default allows, before light that is not known; a scene that says nothing. Every answer is made
-twice from the same draws: with room for the errors that readings ask for where they refute the
-model, and without (the baseline).
+Paths of `benchmarks.coverage`, 20 frames, before light that is not known; a scene that says
+nothing. The object's flux errs five times as much as the default allows; or, with `--understated`,
+as much as that, and the noise is so many times what is stated. Every answer is made twice from the
+same draws: with room for what readings ask for where they refute the model, and without (the
+baseline).
 """
 
 import argparse
@@ -15,7 +17,7 @@ from unittest import mock
 
 import numpy as np
 
-from benchmarks.coverage.paths import LIGHT, PATHS, PathSet, draw_path
+from benchmarks.coverage.paths import LIGHT, PATHS, SNR, PathSet, draw_path
 from inference.posterior import fold
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.job import Job
@@ -25,6 +27,7 @@ from simulator.errors import RefusedError
 from simulator.scene import parse_scene
 
 TOLD = "nothing, larger errors"
+BRIGHT = 3e4  # where errors of the flux show
 FAR = 5.0
 AT_REST = "at rest, a few moves"  # four places tell too little to refute a model
 
@@ -49,8 +52,15 @@ def sampled(data: PathSet, seed: int, max_seconds: float) -> tuple[Job, Checkpoi
 def answers(job: Job, checkpoint: Checkpoint) -> tuple[Posterior, Posterior]:
     """Return what is answered, and what would be without room for larger errors."""
     found = fold.summarise(job, checkpoint, 0.0, 0.0)
-    with mock.patch("inference.posterior.summary.flux_error_asked_for", return_value=1.0):
+    with mock.patch("inference.posterior.summary.asked_for", return_value=(1.0, 1.0)):
         return found, fold.summarise(job, checkpoint, 0.0, 0.0)
+
+
+def understated(data: PathSet, times: float) -> PathSet:
+    """Return a set whose sensor states a noise so many times too small."""
+    noise = data.sensor.noise
+    less = noise.model_copy(update={"read": tuple(each / times for each in noise.read)})
+    return dataclasses.replace(data, sensor=data.sensor.model_copy(update={"noise": less}))
 
 
 @dataclasses.dataclass
@@ -87,16 +97,21 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--sets", type=int, default=10, help="of each class of paths")
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--snr", type=float, default=3e4)
+    parser.add_argument("--snr", type=float)
+    parser.add_argument("--understated", type=float, default=1.0)
     parser.add_argument("--light", choices=LIGHT, default="crosstalk")
     parser.add_argument("--max-seconds", type=float, default=20.0)
     arguments = parser.parse_args()
+    of_noise = arguments.understated != 1.0
+    told, snr = ("nothing", SNR) if of_noise else (TOLD, BRIGHT)
+    snr = arguments.snr or snr
     room, without, others, late = Tally(), Tally(), Tally(), 0
     for number in range(arguments.first, arguments.first + arguments.sets):
         for path in PATHS:
             if path == AT_REST:
                 continue
-            data = draw_path(path, arguments.light, TOLD, number, arguments.snr)
+            data = draw_path(path, arguments.light, told, number, snr)
+            data = understated(data, arguments.understated)
             try:
                 found, baseline = answers(*sampled(data, number, arguments.max_seconds))
             except RefusedError:
@@ -112,7 +127,7 @@ def main() -> None:
     print("| says | sets | ranges held | width | scale identified | a range beyond 5 sd |")
     print("|---|---|---|---|---|---|")
     print(room.line("misfit"))
-    print(without.line("misfit, without room for larger errors"))
+    print(without.line("misfit, without room"))
     print(others.line("no misfit"))
     print(f"\n{late} without an answer in time, or refused")
 

@@ -50,6 +50,8 @@ class Job:
     flux_times : float
         By what the error of the flux is larger than the scene allows, where its readings ask for
         that.
+    noise_times : float
+        By what the variance of the noise is larger than stated, likewise.
     """
 
     sensor: Sensor
@@ -59,6 +61,7 @@ class Job:
     representatives: Representatives | None = None
     numbers: NDArray[np.intp] | None = None
     flux_times: float = 1.0
+    noise_times: float = 1.0
 
     @property
     def seed(self) -> int:

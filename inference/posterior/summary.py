@@ -34,9 +34,9 @@ from inference.posterior.criticism.discrepancy_check import (
 )
 from inference.posterior.criticism.many_frames import bias_of_many_frames
 from inference.posterior.criticism.model_check import (
-    flux_error_asked_for,
+    asked_for,
     model_check,
-    with_larger_flux_error,
+    with_room,
 )
 from inference.posterior.criticism.other_optima import Stated, mark_other_optima
 from inference.posterior.criticism.prior_conflict import prior_conflicts
@@ -173,9 +173,12 @@ def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
     if sample.drawn:
         whole = with_model_error(parts[0], own, sample, draws, density, bias)
         checked = model_check(parts[0], own, whole, rng, parts[1:])
-        times = flux_error_asked_for(given, own, checked[0])
-        if times > 1:
-            parts = tuple(dataclasses.replace(part, flux_times=times) for part in parts)
+        of_flux, of_noise = asked_for(given, own, *checked)
+        if max(of_flux, of_noise) > 1:
+            parts = tuple(
+                dataclasses.replace(part, flux_times=of_flux, noise_times=of_noise)
+                for part in parts
+            )
             whole = with_model_error(parts[0], own, sample, draws, density, bias)
         draws = whole.draws
     return _Drawn(
@@ -299,7 +302,7 @@ def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
         reasons = (*reasons, *doubts(drawn.every, density, sample.flat))
     assert drawn.checked is not None  # noqa: S101  # whatever was drawn was checked
     fit, larger = drawn.checked
-    fit = with_larger_flux_error(fit, job.flux_times)
+    fit = with_room(fit, job)
     judged = _judged(drawn, whole)
     if larger is not None:
         fit = judge_fit(fit, larger)

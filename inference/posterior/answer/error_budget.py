@@ -30,6 +30,7 @@ from inference.posterior.answer.shadow_beside import shadow_beside, with_shadow
 from inference.posterior.answer.where_bent import best_ends, where_bent
 from inference.posterior.answer.where_known import where_known
 from inference.posterior.answer.where_misfit import where_integrated, where_misfit
+from inference.posterior.answer.widened import widened
 from inference.posterior.criticism.discrepancy_check import BENT, LargerDiscrepancy
 from inference.posterior.criticism.glossy_object import GlossyObject
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
@@ -54,6 +55,8 @@ class ErrorBudget(Moves):
         of it, root mean square over ranges and draws; 0 where the flux's was integrated out.
     of_scene : int
         How many of the errors, the last, are what rests on priors of the scene.
+    of_noise : int
+        How many before these are what noise does beyond the stated one.
     by_flux : bool
         Whether most of what errors of flux and shadow move the scale by is the flux's, which can be
         integrated out; looked at only where the response bends.
@@ -63,12 +66,13 @@ class ErrorBudget(Moves):
     of_log_r: ErrorParts
     curvature: float
     of_scene: int
+    of_noise: int
     by_flux: bool
 
     @property
     def model(self) -> slice:
         """Which of the errors are the model's, the constant apart."""
-        return slice(1, -self.of_scene or None)
+        return slice(1, -(self.of_scene + self.of_noise) or None)
 
 
 def error_budget(
@@ -139,6 +143,11 @@ def error_budget(
         for by, moved in zip((by_z, by_log_r), follow, strict=True):
             by[0] = by[0] + moved[:, :, :1]
             by.append(moved[:, :, 1:])
+    of_noise = 0
+    if job.noise_times > 1:
+        for by, more in zip((by_z, by_log_r), widened(z, log_r, job.noise_times), strict=True):
+            by.append(np.broadcast_to(more, (len(at), *more.shape)))
+        of_noise = by_z[-1].shape[2]
     if glossy is not None:
         for by, moved in zip((by_z, by_log_r), (glossy.of_z, glossy.of_log_r), strict=True):
             by[0] = by[0] + moved[:, :1]
@@ -161,9 +170,12 @@ def error_budget(
             (of_z, of_log_r),
             integrated=larger is not None,
             of_scene=of_scene,
+            of_noise=of_noise,
+            noisier=job.noise_times,
         ),
         found.curvature,
         of_scene,
+        of_noise,
         by_flux,
     )
 

@@ -21,6 +21,8 @@ def error_shares(
     *,
     integrated: bool,
     of_scene: int,
+    of_noise: int = 0,
+    noisier: float = 1.0,
 ) -> tuple[ErrorParts, ErrorParts]:
     """Divide the variance of draws of z and of log r into what it comes of.
 
@@ -36,6 +38,10 @@ def error_shares(
         Whether the draws have the error of the flux already.
     of_scene : int
         How many of the errors, the last, are what rests on priors of the scene.
+    of_noise : int
+        How many before these are what noise does beyond the stated one.
+    noisier : float
+        By what these multiply the variance of the draws.
 
     Returns
     -------
@@ -46,21 +52,21 @@ def error_shares(
         name: np.mean(np.square([getattr(each, name) for each in responses]), axis=0)
         for name in ("own", "alone", "shared", "sd")
     }
-    last = -of_scene or None
+    last, end = -of_scene or None, -(of_scene + of_noise) or None
     found = []
     for values, own, shared, part in (
         (z, mean["alone"], mean["sd"] - mean["alone"], moved[0]),
         (log_r, mean["own"], mean["shared"], moved[1]),
     ):
-        added = np.square(part[:, :, 1:last]).sum(axis=2).mean(axis=0)
+        added = np.square(part[:, :, 1:end]).sum(axis=2).mean(axis=0)
         of_law = np.square(part[:, :, last:]).sum(axis=2).mean(axis=0) if of_scene else 0.0
         variance = values.var(axis=0)
         first = np.fmin(own, variance)
         scene = variance - first
         if integrated:  # the draws have the error: what an exact model would leave is the scene's
             scene = np.clip(shared, 0.0, scene)
-        model = variance - first - scene + added
-        scene = scene + of_law
+        model = noisier * (variance - first - scene) + added
+        first, scene = noisier * first, noisier * scene + of_law
         whole = first + scene + model
         unit = np.where(whole > 0, whole, 1.0)
         found.append(ErrorParts(*(np.sqrt(part / unit) for part in (first, scene, model))))

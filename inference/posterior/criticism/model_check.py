@@ -15,10 +15,22 @@ from inference.posterior.criticism.discrepancy_check import (
     LargerDiscrepancy,
     beside_shadow,
 )
-from inference.posterior.criticism.predictive_check import FLUX_ERROR, MISFIT_P, predictive_check
+from inference.posterior.criticism.predictive_check import (
+    FLUX_ERROR,
+    MISFIT_P,
+    TOTAL,
+    predictive_check,
+)
 from inference.posterior.job import Job
 
-__all__ = ["LARGEST", "flux_error_asked_for", "model_check", "with_larger_flux_error"]
+__all__ = [
+    "LARGEST",
+    "asked_for",
+    "flux_error_asked_for",
+    "model_check",
+    "noise_asked_for",
+    "with_room",
+]
 
 LARGEST = 1.0  # standard deviation of the logarithm of the flux: a factor e
 _BY_CHANCE = 0.05  # of a check, where the model is refuted by all of them
@@ -89,12 +101,61 @@ def flux_error_asked_for(job: Job, density: CollapsedDensity, fit: Fit) -> float
     return max(1.0, min(times, LARGEST / error.flux))
 
 
-def with_larger_flux_error(fit: Fit, times: float) -> Fit:
-    """Say that an answer was given room for errors so many times larger."""
-    if not times > 1:
-        return fit
-    room = (
-        f"every interval has room for errors of the object's flux {times:.2g} times what "
-        "`discrepancy` allows"
-    )
-    return dataclasses.replace(fit, reasons=(*fit.reasons, room))
+def asked_for(
+    job: Job, density: CollapsedDensity, fit: Fit, larger: LargerDiscrepancy | None
+) -> tuple[float, float]:
+    """Return for what readings that refute the model ask.
+
+    Parameters
+    ----------
+    larger : LargerDiscrepancy or None
+        Where the flux's error was integrated out: what one twice as large would change. Where
+        ranges are known and ask for it, `inference.posterior.answer.where_known` widens the whole.
+
+    Returns
+    -------
+    (float, float)
+        By what an error of the flux, and the variance of the noise, are larger than the scene
+        allows; the latter where no error of the flux is asked for.
+    """
+    of_flux = flux_error_asked_for(job, density, fit)
+    known = rates_of(density.frames) is not None
+    if of_flux > 1 or (known and larger is not None and larger.bayes_factor > MISFIT):
+        return of_flux, 1.0
+    return 1.0, noise_asked_for(fit)
+
+
+def noise_asked_for(fit: Fit) -> float:
+    """Return by what the variance of the noise readings ask for is larger than the stated one.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of the frames, that no larger error of the flux explains.
+
+    Returns
+    -------
+    float
+        Chi-square over what replicates have (Birge 1932) where it is what refutes the model; 1
+        otherwise.
+    """
+    total = fit.of(TOTAL)
+    if not fit.p_value < MISFIT_P or total.p_value > _BY_CHANCE or not total.expected > 0:
+        return 1.0
+    return max(1.0, total.statistic / total.expected)
+
+
+def with_room(fit: Fit, job: Job) -> Fit:
+    """Say for what an answer was given room."""
+    reasons = fit.reasons
+    if job.flux_times > 1:
+        reasons += (
+            f"every interval has room for errors of the object's flux {job.flux_times:.2g} times "
+            "what `discrepancy` allows",
+        )
+    if job.noise_times > 1:
+        reasons += (
+            f"every interval is as wide as noise {math.sqrt(job.noise_times):.2g} times what is "
+            "stated makes it",
+        )
+    return dataclasses.replace(fit, reasons=reasons)

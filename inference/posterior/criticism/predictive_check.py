@@ -14,7 +14,7 @@ from inference.posterior.criticism.fit_residuals import FitResiduals, fit_residu
 from inference.posterior.job import Job
 from simulator.discrepancy import matern
 
-__all__ = ["FLUX_ERROR", "MISFIT_P", "predictive_check"]
+__all__ = ["FLUX_ERROR", "MISFIT_P", "TOTAL", "predictive_check"]
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ _REPLICATES = 200  # of each
 _FEWEST = 40  # of the frames of each part, where they were dealt out
 _TAIL = 0.1  # share of the replicates that tell how the tail falls
 _LENGTH = 0.5  # in log r, of a smooth error
-FLUX_ERROR = "flux_error"
+TOTAL, FLUX_ERROR = "total", "flux_error"
 
 
 def _total(of: FitResiduals) -> Array:
@@ -59,7 +59,7 @@ def _flux_error(of: FitResiduals) -> Array:
 
 
 _CHECKS: dict[str, Callable[[FitResiduals], Array]] = {
-    "total": _total,
+    TOTAL: _total,
     "worst_frame": _worst,
     "neighbours": _neighbours,
     "wander": _wander,
@@ -161,7 +161,7 @@ def _outliers(parts: Sequence[Job], seen: Sequence[Array], worst: Array) -> tupl
 
 def _words(check: FitCheck, outliers: tuple[int, ...]) -> str:
     """Say what a failed check means."""
-    if check.name == "total":
+    if check.name == TOTAL:
         return (
             f"the frames' chi-square is {check.statistic:.4g} where {check.expected:.4g} is "
             "expected: the noise is larger than stated, or the model is wrong"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.coverage.paths import PathSet, draw_path
-from benchmarks.larger_errors import TOLD, answers, sampled
+from benchmarks.larger_errors import TOLD, answers, sampled, understated
 from inference.density.discrepant import DiscrepantDensity
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.joint_optimum import joint_optimum
@@ -15,8 +15,14 @@ from inference.posterior.answer.fit import Fit, FitCheck
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.answer.where_misfit import where_integrated, where_misfit
 from inference.posterior.answer.widened import widened
-from inference.posterior.criticism.model_check import LARGEST, flux_error_asked_for
-from inference.posterior.criticism.predictive_check import FLUX_ERROR, MISFIT_P
+from inference.posterior.criticism.discrepancy_check import MISFIT, LargerDiscrepancy
+from inference.posterior.criticism.model_check import (
+    LARGEST,
+    asked_for,
+    flux_error_asked_for,
+    noise_asked_for,
+)
+from inference.posterior.criticism.predictive_check import FLUX_ERROR, MISFIT_P, TOTAL
 from inference.posterior.job import Job
 from inference.posterior.sample import sample_of
 from inference.posterior.settings import SamplerSettings
@@ -31,13 +37,16 @@ SET = draw_path("independent", "crosstalk", TOLD, 3, SNR)
 ROUNDING = 1e-9
 
 
+FLUX, NOISE = "has room for errors of the object's flux", "is as wide as noise"
+
+
 def job_of(data: PathSet) -> Job:
     settings = SamplerSettings(method="auto", seed=4, max_seconds=30.0)
     return fold.prepare(data.sensor, parse_scene(data.scene), data.frames, settings)
 
 
-def fit_of(p_value: float, asked: FitCheck) -> Fit:
-    return Fit(p_value, p_value < MISFIT_P, (), 50.0, 15.0, (asked,), ())
+def fit_of(p_value: float, *checks: FitCheck) -> Fit:
+    return Fit(p_value, p_value < MISFIT_P, (), 50.0, 15.0, checks, ())
 
 
 @pytest.fixture(scope="module")
@@ -45,9 +54,10 @@ def refuted() -> tuple[Job, Checkpoint]:
     return sampled(SET, 3, 30.0)
 
 
-def has_room(data: PathSet, found: Posterior, without: Posterior) -> None:
+def has_room(data: PathSet, found: Posterior, without: Posterior, of: str) -> None:
     assert found.fit.misfit
-    assert any("has room for errors of the object's flux" in why for why in found.fit.reasons)
+    assert any(of in why for why in found.fit.reasons)
+    assert not any(of in why for why in without.fit.reasons)
     held, before = (
         np.mean((of.range_m.q05 <= data.range_m) & (data.range_m <= of.range_m.q95))
         for of in (found, without)
@@ -62,7 +72,7 @@ def test_readings_that_refute_the_model_have_room_for_larger_errors(
 ) -> None:
     """Errors are five times what stands; draws are the same, and without room next to none held."""
     found, without = answers(*refuted)
-    has_room(SET, found, without)
+    has_room(SET, found, without, FLUX)
     part, draws = fold.draw(*refuted)
     assert part.flux_times > 1
     assert np.array_equal(draws.range_m, found.draws.range_m)
@@ -71,7 +81,34 @@ def test_readings_that_refute_the_model_have_room_for_larger_errors(
 @pytest.mark.thorough
 def test_readings_of_another_sensor_have_room_too() -> None:
     data = draw_path("constant speed", "crosstalk", TOLD, 4, SNR)
-    has_room(data, *answers(*sampled(data, 4, 30.0)))
+    has_room(data, *answers(*sampled(data, 4, 30.0)), FLUX)
+
+
+def test_noise_that_is_stated_too_small_widens_its_part_of_every_interval() -> None:
+    """By a quarter of what it is; an object that errs as stands by default."""
+    data = understated(draw_path("constant speed", "crosstalk", "nothing", 3), 4.0)
+    found, without = answers(*sampled(data, 3, 30.0))
+    has_room(data, found, without, NOISE)
+    said = next(why for why in found.fit.reasons if NOISE in why)
+    assert 2.0 < float(said.split(NOISE)[1].split()[0]) < 6.0
+    parts, before = found.range_m.sd_parts, without.range_m.sd_parts
+    whole = np.sqrt(parts.noise**2 + parts.scene**2 + parts.model**2)
+    assert np.allclose(whole, found.range_m.sd, rtol=ROUNDING)
+    # the model's part is the same, what noise leaves is not
+    assert np.all(parts.scene > 2.0 * before.scene)
+    assert np.allclose(parts.model, before.model, rtol=0.3)
+
+
+def test_noise_is_asked_for_where_no_error_of_the_flux_is() -> None:
+    job = job_of(SET)
+    density = job.density()
+    total, flux = FitCheck(TOTAL, 90.0, 10.0, 1e-5), FitCheck(FLUX_ERROR, 2.0, 1.0, 0.3)
+    assert noise_asked_for(fit_of(1e-4, total)) == pytest.approx(9.0)
+    assert noise_asked_for(fit_of(2e-3, total)) == 1.0
+    assert noise_asked_for(fit_of(1e-4, dataclasses.replace(total, p_value=0.1))) == 1.0
+    assert asked_for(job, density, fit_of(1e-4, total, flux), None) == pytest.approx((1.0, 9.0))
+    both = fit_of(1e-4, total, dataclasses.replace(flux, statistic=4.0, p_value=1e-3))
+    assert asked_for(job, density, both, None) == pytest.approx((2.0, 1.0))
 
 
 def test_a_larger_error_is_asked_for_only_where_the_model_is_refuted_by_it() -> None:
@@ -98,6 +135,12 @@ def test_a_range_that_is_known_has_its_own_room() -> None:
     job = job_of(dataclasses.replace(SET, frames=frames))
     asked = FitCheck(FLUX_ERROR, 9.0, 1.0, 1e-4)
     assert flux_error_asked_for(job, job.density(), fit_of(1e-4, asked)) == 1.0
+    total = FitCheck(TOTAL, 90.0, 10.0, 1e-5)
+    fit, none = fit_of(1e-4, asked, total), np.zeros(1)
+    demands = LargerDiscrepancy(2.0 * MISFIT, none, none)
+    assert asked_for(job, job.density(), fit, demands) == (1.0, 1.0)
+    little = LargerDiscrepancy(1.0, none, none)
+    assert asked_for(job, job.density(), fit, little) == pytest.approx((1.0, 9.0))
 
 
 def test_draws_are_widened_by_a_factor_of_their_variance() -> None:
