@@ -100,7 +100,7 @@ def test_a_posterior_computes_by_one_thread(monkeypatch: pytest.MonkeyPatch) -> 
 
         monkeypatch.setattr(f"inference.posterior.{place}", watching)
 
-    for place in ("fold.import_libraries", "fold._after", "summary.predictive_check"):
+    for place in ("fold.import_libraries", "fold._after", "criticism.model_check.predictive_check"):
         watched(place)
     sensor = parse_sensor(
         {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1e-5, 1e-3]}}
