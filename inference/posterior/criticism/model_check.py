@@ -72,15 +72,14 @@ def model_check(
     return predictive_check(job, density, whole.chosen, rng, best=best), larger
 
 
-def flux_error_asked_for(job: Job, density: CollapsedDensity, fit: Fit) -> float:
+def flux_error_asked_for(job: Job, fit: Fit) -> float:
     """Return how many times larger an error of the flux readings ask for than the scene allows.
 
     Parameters
     ----------
     job : Job
-        As it was given: a size of its errors that is stated in numbers stands.
-    density : CollapsedDensity
-        Of its frames. Where it knows ranges, `inference.posterior.answer.where_known` does this.
+        As it was given: a size of its errors that is stated in numbers stands, and one that is
+        integrated out because ranges are known has `inference.posterior.answer.where_known`.
     fit : Fit
         Of its frames.
 
@@ -91,9 +90,7 @@ def flux_error_asked_for(job: Job, density: CollapsedDensity, fit: Fit) -> float
         makes an error of `LARGEST`.
     """
     error, asked = job.scene.model_error, fit.of(FLUX_ERROR)
-    if error.integrated or rates_of(density.frames) is not None:
-        return 1.0
-    if not (error.flux > 0 and fit.p_value < MISFIT_P):
+    if error.integrated or not (error.flux > 0 and fit.p_value < MISFIT_P):
         return 1.0
     if asked.p_value > _BY_CHANCE or not asked.expected > 0:
         return 1.0
@@ -118,7 +115,7 @@ def asked_for(
         By what an error of the flux, and the variance of the noise, are larger than the scene
         allows; the latter where no error of the flux is asked for.
     """
-    of_flux = flux_error_asked_for(job, density, fit)
+    of_flux = flux_error_asked_for(job, fit)
     known = rates_of(density.frames) is not None
     if of_flux > 1 or (known and larger is not None and larger.bayes_factor > MISFIT):
         return of_flux, 1.0

@@ -113,18 +113,17 @@ def test_noise_is_asked_for_where_no_error_of_the_flux_is() -> None:
 
 def test_a_larger_error_is_asked_for_only_where_the_model_is_refuted_by_it() -> None:
     job = job_of(SET)
-    density = job.density()
     asked = FitCheck(FLUX_ERROR, 9.0, 1.0, 1e-4)
-    assert flux_error_asked_for(job, density, fit_of(1e-4, asked)) == pytest.approx(3.0)
+    assert flux_error_asked_for(job, fit_of(1e-4, asked)) == pytest.approx(3.0)
     by_noise = dataclasses.replace(asked, p_value=0.06)
-    assert flux_error_asked_for(job, density, fit_of(1e-4, by_noise)) == 1.0
-    assert flux_error_asked_for(job, density, fit_of(2e-3, asked)) == 1.0
+    assert flux_error_asked_for(job, fit_of(1e-4, by_noise)) == 1.0
+    assert flux_error_asked_for(job, fit_of(2e-3, asked)) == 1.0
     beyond = dataclasses.replace(asked, statistic=1e9)
-    most = flux_error_asked_for(job, density, fit_of(1e-4, beyond))
+    most = flux_error_asked_for(job, fit_of(1e-4, beyond))
     assert most * DISCREPANCY_SD == pytest.approx(LARGEST)
-    assert flux_error_asked_for(job.with_error_integrated(), density, fit_of(0.0, asked)) == 1.0
+    assert flux_error_asked_for(job.with_error_integrated(), fit_of(0.0, asked)) == 1.0
     exact = dataclasses.replace(job, scene=job.scene.model_copy(update={"discrepancy": 0.0}))
-    assert flux_error_asked_for(exact, density, fit_of(0.0, asked)) == 1.0
+    assert flux_error_asked_for(exact, fit_of(0.0, asked)) == 1.0
 
 
 def test_a_range_that_is_known_has_its_own_room() -> None:
@@ -134,7 +133,7 @@ def test_a_range_that_is_known_has_its_own_room() -> None:
     frames = dataclasses.replace(SET.frames, known_range_m=known, known_range_sd_m=sd)
     job = job_of(dataclasses.replace(SET, frames=frames))
     asked = FitCheck(FLUX_ERROR, 9.0, 1.0, 1e-4)
-    assert flux_error_asked_for(job, job.density(), fit_of(1e-4, asked)) == 1.0
+    assert flux_error_asked_for(job, fit_of(1e-4, asked)) == 1.0
     total = FitCheck(TOTAL, 90.0, 10.0, 1e-5)
     fit, none = fit_of(1e-4, asked, total), np.zeros(1)
     demands = LargerDiscrepancy(2.0 * MISFIT, none, none)
@@ -182,12 +181,12 @@ def test_all_draws_move_to_the_best_point_and_are_as_uncertain_as_the_way_is_lon
 
 
 def test_a_climb_whose_steps_lead_out_of_all_numbers_stays_in_them() -> None:
-    """From the middle of the priors a first step leads to a c0 that is no number any more."""
-    job = job_of(SET)
-    density = job.density()
-    z = 0.1 * np.random.default_rng(2).standard_normal((1, len(density.parameters)))
-    log_r = density.best_ranges(z)[0, :, 0]
-    at = Experiment(density.sensor, density.parameters, z[0], log_r, discrepancy=DISCREPANCY_SD)
+    """From the middle of the priors one step leads to a c0 of zero."""
+    density = job_of(SET).with_error_integrated().density()
+    z = 0.1 * np.random.default_rng(2).standard_normal((8, len(density.parameters)))[2]
+    log_r = density.best_ranges(z[None])[0, :, 0]
+    larger = 4.0 * DISCREPANCY_SD
+    at = Experiment(density.sensor, density.parameters, z, log_r, discrepancy=larger)
     end, deviance = joint_optimum(at, density.frames[:, :2])
     assert np.isfinite(deviance)
     assert end.finite
