@@ -4,9 +4,9 @@
     python -m benchmarks.larger_errors --understated 4 [--snr 300]
 
 Paths of `benchmarks.coverage`, 20 frames, before light that is not known; a scene that says
-nothing. The object's flux errs five times as much as the default allows; or, with `--understated`,
-as much as that, and the noise is so many times what is stated. Every answer is made twice from the
-same draws: with room for what readings ask for where they refute the model, and without (the
+nothing. The object's flux errs five times as much as the default allows; with `--understated` no
+more than it allows, and the noise is so many times what is stated. Every answer is made twice from
+the same draws: with room for what readings ask for where they refute the model, and without (the
 baseline).
 """
 

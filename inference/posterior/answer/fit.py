@@ -56,7 +56,3 @@ class Fit:
     degrees_of_freedom: float
     checks: tuple[FitCheck, ...]
     outliers: tuple[int, ...]
-
-    def of(self, name: str) -> FitCheck:
-        """Return the check of a name."""
-        return next(check for check in self.checks if check.name == name)

@@ -7,7 +7,7 @@ import numpy as np
 
 from inference.density.collapsed import CollapsedDensity
 from inference.frame.known_range import rates_of
-from inference.posterior.answer.fit import Fit
+from inference.posterior.answer.fit import Fit, FitCheck
 from inference.posterior.answer.whole import Whole
 from inference.posterior.criticism.best_point import best_point
 from inference.posterior.criticism.discrepancy_check import (
@@ -89,7 +89,7 @@ def flux_error_asked_for(job: Job, fit: Fit) -> float:
         1 where the size that is allowed for does, or noise alone is what is larger; at most what
         makes an error of `LARGEST`.
     """
-    error, asked = job.scene.model_error, fit.of(FLUX_ERROR)
+    error, asked = job.scene.model_error, _check(fit, FLUX_ERROR)
     if error.integrated or not (error.flux > 0 and fit.p_value < MISFIT_P):
         return 1.0
     if asked.p_value > _BY_CHANCE or not asked.expected > 0:
@@ -136,7 +136,7 @@ def noise_asked_for(fit: Fit) -> float:
         Chi-square over what replicates have (Birge 1932) where it is what refutes the model; 1
         otherwise.
     """
-    total = fit.of(TOTAL)
+    total = _check(fit, TOTAL)
     if not fit.p_value < MISFIT_P or total.p_value > _BY_CHANCE or not total.expected > 0:
         return 1.0
     return max(1.0, total.statistic / total.expected)
@@ -156,3 +156,7 @@ def with_room(fit: Fit, job: Job) -> Fit:
             "stated makes it",
         )
     return dataclasses.replace(fit, reasons=reasons)
+
+
+def _check(fit: Fit, name: str) -> FitCheck:
+    return next(check for check in fit.checks if check.name == name)
