@@ -81,7 +81,9 @@ def test_readings_that_refute_the_model_have_room_for_larger_errors(
 @pytest.mark.thorough
 def test_readings_of_another_sensor_have_room_too() -> None:
     data = draw_path("constant speed", "crosstalk", TOLD, 4, SNR)
-    has_room(data, *answers(*sampled(data, 4, 30.0)), FLUX)
+    found, without = answers(*sampled(data, 4, 30.0))
+    has_room(data, found, without, FLUX)
+    assert np.all(found.range_m.sd > without.range_m.sd)
 
 
 def test_noise_that_is_stated_too_small_widens_its_part_of_every_interval() -> None:
