@@ -109,21 +109,18 @@ def error_budget(
     experiments, responses, readings = found.experiments, found.each, found.readings
     at, ranges = found.z, found.log_r
     by_z, by_log_r = ([by[:, :, :1], by[:, :, 1:]] for by in (found.by_z, found.by_log_r))
-    at_ends = (
-        z + np.median(by_z[0][:, :, 0], axis=0),
-        log_r + np.median(by_log_r[0][:, :, 0], axis=0),
-    )
     follow: tuple[Array, Array]
-    if job.flux_times > 1:
+    if job.flux_times > 1 and job.numbers is None:  # a climb for each part would take minutes
         if isinstance(density, DiscrepantDensity):
             follow = where_integrated(density, experiments, readings, (z, log_r), job.flux_times)
         else:
-            follow = where_misfit(experiments, readings, *at_ends)
+            follow = where_misfit(experiments, readings, *_moved(z, log_r, by_z[0], by_log_r[0]))
         for by, moved in zip((by_z, by_log_r), follow, strict=True):
             by[0] = by[0] + moved[:, :1]
             by.append(np.broadcast_to(moved[:, 1:], (len(at), *moved[:, 1:].shape)))
     elif found.repeated and experiments[0].shadow > 0:
-        follow = where_bent(best_ends(experiments, readings), *at_ends)
+        ends = best_ends(experiments, readings)
+        follow = where_bent(ends, *_moved(z, log_r, by_z[0], by_log_r[0]))
         for by, moved in zip((by_z, by_log_r), follow, strict=True):
             by.append(np.broadcast_to(moved[:, None], (len(at), moved.size, 1)))
     if larger is not None:
@@ -178,6 +175,11 @@ def error_budget(
         of_noise,
         by_flux,
     )
+
+
+def _moved(z: Array, log_r: Array, by_z: Array, by_log_r: Array) -> tuple[Array, Array]:
+    """Return draws moved by the middle of what moves them all."""
+    return z + np.median(by_z[:, :, 0], axis=0), log_r + np.median(by_log_r[:, :, 0], axis=0)
 
 
 def _range_error(

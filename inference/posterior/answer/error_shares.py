@@ -21,8 +21,8 @@ def error_shares(
     *,
     integrated: bool,
     of_scene: int,
-    of_noise: int = 0,
-    noisier: float = 1.0,
+    of_noise: int,
+    noisier: float,
 ) -> tuple[ErrorParts, ErrorParts]:
     """Divide the variance of draws of z and of log r into what it comes of.
 

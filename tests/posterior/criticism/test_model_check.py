@@ -11,6 +11,7 @@ from inference.density.discrepant import DiscrepantDensity
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.joint_optimum import joint_optimum
 from inference.posterior import fold
+from inference.posterior.answer.error_budget import error_budget
 from inference.posterior.answer.fit import Fit, FitCheck
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.answer.where_misfit import where_integrated, where_misfit
@@ -180,6 +181,27 @@ def test_all_draws_move_to_the_best_point_and_are_as_uncertain_as_the_way_is_lon
     # nearer to the truth than draws of a model that the readings refute
     off = np.median(log_r, axis=0) - np.log(SET.range_m)
     assert np.abs(off + of_log_r[:, 0]).mean() < 0.6 * np.abs(off).mean()
+
+
+def test_where_frames_are_dealt_out_no_part_climbs(
+    refuted: tuple[Job, Checkpoint], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each would take seconds, and there may be fifty; errors are larger there, too."""
+    job, climbs = dataclasses.replace(refuted[0], flux_times=3.0), []
+    density = job.density()
+    z = np.zeros((3, len(density.parameters)))
+    log_r = density.best_ranges(z)[:, :, 0]
+
+    def climbed(*_: object) -> tuple[np.ndarray, np.ndarray]:
+        climbs.append(1)
+        return np.zeros((z.shape[1], 2)), np.zeros((log_r.shape[1], 2))
+
+    monkeypatch.setattr("inference.posterior.answer.error_budget.where_misfit", climbed)
+    for each, expected in ((job.part(np.arange(len(SET.frames))), 0), (job, 1)):
+        rng = np.random.default_rng(1)
+        budget = error_budget(each, density, z, log_r, None, None, None, rng)
+        assert len(climbs) == expected
+        assert np.isfinite(budget.by_z).all()
 
 
 def test_a_climb_whose_steps_lead_out_of_all_numbers_stays_in_them() -> None:
