@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks.random_sets.sets import random_set
 from inference.estimate import estimate
-from inference.fits.answer import likelihood_answer
+from inference.fits.answer import erring_search
 from inference.fits.answer.larger_error import is_default
 from inference.fits.answer.report import DOUBTFUL
 from inference.fits.likelihood.problem import FitProblem
@@ -19,10 +19,11 @@ from tests.recorded.experiment import GAIN, PATH, calibration_of, near_recording
 @pytest.mark.recorded
 @pytest.mark.skipif(not PATH.exists(), reason="../shared/data/tmf8820_plane.json is absent")
 @pytest.mark.parametrize("unit", [pytest.param(1.0, marks=pytest.mark.thorough), 1e-12])
-def test_recorded_photons_without_empty_frames_are_refused(unit: float) -> None:
+def test_recorded_photons_without_empty_frames_get_no_sure_answer(unit: float) -> None:
     """Flux that errs by three times the default, behind a tenth of crosstalk.
 
-    Ranges were 15 to 27 sd off in every frame, without a misfit.
+    Ranges were 15 to 27 sd off in every frame, without a misfit; then they were refused. They are a
+    third short where the object may be glossy, and say so by their width.
     """
     recording = near_recording()
     sensor, clean = pulsed(recording, calibration_of(recording), gain=GAIN)
@@ -40,9 +41,12 @@ def test_recorded_photons_without_empty_frames_are_refused(unit: float) -> None:
         }
     )
     frames = Frames(unit * (clean.readings[chosen] + 0.1 * signal))
-    said = estimate(parse_sensor(document), scene, frames, ["joint_fit"])
-    assert not said.results
-    assert "without the object" in (said.do_first or "")
+    (result,) = estimate(parse_sensor(document), scene, frames, ["joint_fit"]).results
+    away = (result.range_m - recording.distance_m[chosen]) / result.sd_m
+    assert np.abs(away).max() < 3.0
+    assert (result.sd_m / result.range_m).min() > 0.1
+    assert result.parameters is not None
+    assert result.parameters["crosstalk.w2"]["status"] == "weak"
 
 
 @pytest.mark.parametrize("stated", [None, {"flux": 0.072, "range_m": 8e-4, "shadow": 0.2}])
@@ -54,7 +58,7 @@ def test_a_size_that_is_stated_stands(stated: object, monkeypatch: pytest.Monkey
         asked.append(is_default(problem))
         return asked[-1]
 
-    monkeypatch.setattr(likelihood_answer, "is_default", noted)
+    monkeypatch.setattr(erring_search, "is_default", noted)
     case = random_set(4711, 2)
     scene = {**case.scene, **({} if stated is None else {"discrepancy": stated})}
     estimate(case.sensor, parse_scene(scene), case.frames, ["joint_fit"])

@@ -18,8 +18,8 @@ from inference.fits.answer.determined import (
     refuse_if_undetermined,
     tells_nothing,
 )
+from inference.fits.answer.erring_search import NO_LIKELIHOOD, believed, judged
 from inference.fits.answer.inflation import inflation, shift_of
-from inference.fits.answer.larger_error import DOUBLINGS, evidence_of, is_default, twice_as_large
 from inference.fits.answer.model_checks import model_checks
 from inference.fits.answer.profile_scan import profile_scan
 from inference.fits.answer.ranges import (
@@ -31,7 +31,6 @@ from inference.fits.answer.ranges import (
     frame_ranges,
 )
 from inference.fits.answer.report import (
-    DOUBTFUL,
     FALSE_ALARM,
     describe,
     disputed,
@@ -40,19 +39,14 @@ from inference.fits.answer.report import (
     p_value_of,
     spoiled,
 )
-from inference.fits.likelihood.erring import Erring, contradicting, erring_maxima, softened
-from inference.fits.likelihood.erring_profile import profiles
-from inference.fits.likelihood.erring_valley import valleys
+from inference.fits.likelihood.erring import Erring, contradicting, softened
 from inference.fits.likelihood.held_walks import held_walks
 from inference.fits.likelihood.information import residuals_and_information
-from inference.fits.likelihood.integrated import with_integrated_first
-from inference.fits.likelihood.law_mode import law_modes
+from inference.fits.likelihood.law_mode import law_modes, place_of
 from inference.fits.likelihood.maximum import DECIDED, TOP, Maximum, maximum_from
 from inference.fits.likelihood.multistart import find_maxima, find_near, find_starts
 from inference.fits.likelihood.places import places_of
-from inference.fits.likelihood.prior_maxima import prior_maxima
 from inference.fits.likelihood.problem import FitProblem, fit_problem
-from inference.fits.likelihood.range_walks import range_walks
 from inference.fits.likelihood.told import known_ranges
 from inference.realtime.net import SATURATED, rule_out
 from inference.technique import Task
@@ -62,10 +56,6 @@ from simulator.one_thread import one_thread
 __all__ = ["likelihood_answer"]
 
 _WALKS = 3  # that may meet a better optimum than the last
-_NO_LIKELIHOOD = (
-    "no values of the unknowns give the readings a likelihood that can be computed; check gain, "
-    "noise and range_m"
-)
 
 
 @one_thread()
@@ -101,11 +91,12 @@ def likelihood_answer(
         places = None
         if problem.object_errs:  # an exact model leaves nothing for them to share
             places = places_of(problem.frames, problem.present, problem.instrument)
-        problem = dataclasses.replace(problem, law=law, known=known, places=places)
+        modes = law_modes(task.scene, problem.parameters)
+        problem = dataclasses.replace(problem, law=law, known=known, places=places, modes=modes)
     found = _found(problem) if values is None else _found_from(problem, values)
     optima = [optimum for optimum in found if np.isfinite(optimum.deviance)]
     if not optima:
-        raise RefusedError(_NO_LIKELIHOOD)
+        raise RefusedError(NO_LIKELIHOOD)
     if problem.erring:
         return _erring_answer(name, problem, optima, state)
     try:
@@ -215,65 +206,22 @@ def _exact_answer(
     )
 
 
-def _believed(
-    problem: FitProblem, starts: Sequence[Maximum]
-) -> tuple[FitProblem, list[Erring], list[Erring]]:
-    """Return the problem, with a larger error of the model where the frames ask, and its maxima."""
-    found, along = _searched(problem, starts)
-    if not is_default(problem) or not FALSE_ALARM <= _probability(problem, found[0]) < DOUBTFUL:
-        return problem, found, along
-    for _ in range(DOUBLINGS):
-        larger = twice_as_large(problem)
-        more, beside = _searched(larger, [*starts, *found])
-        if not evidence_of(more[0]) > evidence_of(found[0]):
-            break
-        problem, found, along = larger, more, beside
-    return problem, found, along
-
-
-def _probability(problem: FitProblem, top: Erring) -> float:
-    """Return the p-value of a best fit, by all its checks."""
-    checks = model_checks(problem, top)
-    p_value = fit_report(problem, [top], top.chi_square, 0, 1.0, checks)["p_value"]
-    return float(p_value)
-
-
-def _searched(problem: FitProblem, starts: Sequence[Maximum]) -> tuple[list[Erring], list[Erring]]:
-    """Return the maxima, the best first, and points along their valleys."""
-    modes = law_modes(problem.parameters.law) if problem.law else (None,)
-    climb, follow = (prior_maxima, range_walks) if problem.priors else (erring_maxima, valleys)
-    found = [
-        end for mode in modes for end in climb(dataclasses.replace(problem, mode=mode), starts)
-    ]
-    if not found:
-        raise RefusedError(_NO_LIKELIHOOD)
-    found.sort(key=lambda end: end.deviance)
-    along: list[Erring] = []
-    for _ in range(_WALKS):
-        mode = found[0].clean.mode
-        alike = [one for one in found if one.clean.mode is mode]
-        alone = dataclasses.replace(problem, mode=mode)
-        along, better = follow(alone, alike)
-        if better is None and not problem.priors:
-            along += profiles(alone, found[0])
-        if better is None or not better.deviance < found[0].deviance:
-            break
-        found.insert(0, better)
-    if problem.priors:
-        return with_integrated_first(found, along)
-    return found, along
-
-
 def _alone(one: Erring, excess: float) -> Beside:
     """Return other values without noise: what errs has no frame as sure as that."""
     return Beside(excess, one.positions)
+
+
+def _with_width(one: Erring, excess: float) -> Beside:
+    """Return another maximum with how far its ranges reach from there."""
+    _, _, sd, _ = one.at_ranges(one.positions)
+    return Beside(excess, one.positions, np.where(np.isfinite(sd), sd, 0.0))
 
 
 def _erring_answer(
     name: str, problem: FitProblem, starts: Sequence[Maximum], state: NDArray[np.uint8]
 ) -> TechniqueResult:
     """Build the result where the model errs."""
-    problem, found, along = _believed(problem, starts)
+    problem, found, along = believed(problem, starts)
     top = found[0]
     _, facts = residuals_and_information(top.clean, top.x, top.positions)
     if not problem.law and problem.known is None:
@@ -285,25 +233,35 @@ def _erring_answer(
         wider = math.hypot(1.0, off_the_top(top))
         refuse_if_open(top.clean, top, top.facts, wider * math.sqrt(doubt), whole=top.whole)
     decided = top.deviance + doubt * DECIDED
-    near = [one for one in (*found[1:], *along) if one.deviance <= decided]
+    rivals = [one for one in found[1:] if one.deviance <= decided]
     # another mode of the law is another answer; near in the same mode, a wider one
-    others = {id(one.clean.mode): one for one in reversed(near) if one.clean.mode is not None}
-    others.pop(id(top.clean.mode), None)
-    checks = model_checks(problem, top)
+    others = {place_of(one.clean.mode): one for one in reversed(rivals)}
+    others.pop(place_of(top.clean.mode), None)
+    if problem.priors:
+        near = [one for one in (*rivals, *along) if one.deviance <= decided]
+        wide: list[Erring] = []
+    else:  # points beside a rival are decided against by as much more
+        near, wide = [one for one in along if one.deviance <= decided + doubt * WITHIN], rivals
     widening = wider * math.sqrt(doubt)
-    report = fit_report(problem, found, top.chi_square, facts.rank, widening, checks)
-    if report["misfit"]:
-        report["reasons"] += blamed(problem, top, np.flatnonzero(state != SATURATED))
+    report = fit_report(
+        problem, found, top.chi_square, facts.rank, widening, model_checks(problem, top)
+    )
+    for end in judged(found):
+        of_end = fit_report(problem, found, end.chi_square, 0, 1.0, model_checks(problem, end))
+        if of_end["misfit"]:
+            report |= {name: of_end[name] for name in ("p_value", "misfit", "reasons", "checks")}
+            report["reasons"] += blamed(problem, end, np.flatnonzero(state != SATURATED))
+            break
     if contradicted:
         report["misfit"] = True
         report["reasons"].append(CONTRADICTION)
-    parameters = describe(top.clean, top, top.facts, widening, near, top.whole)
+    parameters = describe(top.clean, top, top.facts, widening, near, top.whole, wide)
     if problem.priors:
         told = [parameters[name]["status"] == "identified" for name in problem.names]
         near += held_walks(problem, top, np.flatnonzero(told).tolist())
-        parameters = describe(top.clean, top, top.facts, widening, near, top.whole)
+        parameters = describe(top.clean, top, top.facts, widening, near, top.whole, wide)
         alone = describe(top.clean, top, top.facts, widening, (), top.whole)
-        places = [problem.natural(one.x) for one in found[1:] if one.deviance <= decided]
+        places = [problem.natural(one.x) for one in rivals]
         elsewhere = {name: [x[j] for x in places] for j, name in enumerate(problem.names)}
         parameters = disputed(parameters, alone, elsewhere)
     return frame_ranges(
@@ -317,9 +275,15 @@ def _erring_answer(
         spoiled(parameters, report) if report["misfit"] else parameters,
         report,
         [
-            (beside if problem.priors else _alone)(one, (one.deviance - top.deviance) / doubt)
-            for one in near
-            if one.clean.mode is top.clean.mode
+            *(
+                (beside if problem.priors else _alone)(one, (one.deviance - top.deviance) / doubt)
+                for one in near
+            ),
+            *(
+                _with_width(one, (one.deviance - top.deviance) / doubt)
+                for one in wide
+                if place_of(one.clean.mode) == place_of(top.clean.mode)
+            ),
         ],
         contradicted,
         doubt,

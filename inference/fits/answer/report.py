@@ -10,6 +10,7 @@ import scipy
 
 from inference.fits.answer.model_checks import REASONS, Check
 from inference.fits.answer.ranges import WITHIN
+from inference.fits.likelihood.erring import Erring
 from inference.fits.likelihood.maximum import Maximum
 from inference.fits.likelihood.problem import FitProblem
 from inference.identifiability.information import Information
@@ -41,6 +42,7 @@ def describe(
     wider: float = 1.0,
     undecided: Sequence[Maximum] = (),
     whole: Information | None = None,
+    maxima: Sequence[Erring] = (),
 ) -> dict[str, Any]:
     """Return value, standard deviation and status of every unknown.
 
@@ -54,6 +56,8 @@ def describe(
         them.
     whole : Information, optional
         What is told if the errors of the model are unknown; left out: it has none.
+    maxima : sequence of Erring
+        Further ones, whose own widths count besides, as far as their deviances let them.
 
     Returns
     -------
@@ -76,6 +80,15 @@ def describe(
             there = problem.natural(other.x)
             sds = np.fmax(sds, np.abs(there - values) / reach)
             ratios = np.fmax(ratios, np.abs(np.log(there / values)) / reach)
+        for end in maxima:
+            excess = end.deviance - top.deviance
+            reach, left = math.sqrt(max(excess, WITHIN)), math.sqrt(max(WITHIN - excess, 0.0))
+            there = problem.natural(end.x)
+            chain = problem.chain(end.x)[problem.slots] * problem.units[:, None]
+            own_width = left * wider * end.whole.sd_of(chain)
+            sds = np.fmax(sds, (np.abs(there - values) + own_width) / reach)
+            moved = np.abs(np.log(there / values)) + own_width / np.abs(there)
+            ratios = np.fmax(ratios, moved / reach)
         # the others known, a coordinate is as certain as its own column is long
         own = np.abs(np.diag(functionals)) / np.linalg.norm(facts.jacobian, axis=0)
     columns = zip(values.tolist(), sds.tolist(), ratios.tolist(), strict=True)

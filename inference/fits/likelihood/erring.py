@@ -31,13 +31,13 @@ from inference.fits.likelihood.erring_point import (
     whitened_of,
 )
 from inference.fits.likelihood.maximum import Maximum
-from inference.fits.likelihood.other_starts import half_dark, larger, of_law
+from inference.fits.likelihood.other_starts import larger, of_law, other_crosstalk
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import Told, contradictions, eliminated, improbable, told_at
 from inference.identifiability.elimination import eliminate
 from inference.identifiability.information import Information
 
-__all__ = ["Erring", "contradicting", "end_of", "erring_maxima", "softened"]
+__all__ = ["Erring", "contradicting", "end_from", "end_of", "erring_maxima", "softened"]
 
 Array = NDArray[np.float64]
 
@@ -45,6 +45,7 @@ _RELATIVE = 0.03  # independent error of the signal that stands for a smooth one
 _OF_LIGHT = (1e-2, 1e-3)  # of the light of a middling frame, for an error of its direction
 _STEPS = 60  # of the best climbs
 _KEPT = 4
+_BEHIND = 2  # of the climbs that begin behind other crosstalk
 _SAME = 1e-3  # in log r and deviance
 _NAMED = 5  # frames that contradict are named, at most
 _TURNS = 6  # of a range between its readings and what is known of it
@@ -179,7 +180,8 @@ def erring_maxima(problem: FitProblem, starts: Iterable[Maximum]) -> list[Erring
         Ends of the best climbs, the best first.
     """
     first = _first_climbs(problem, (*starts, *of_law(problem)))[:_KEPT]
-    first += _first_climbs(problem, half_dark(problem, _softened(problem, _OF_LIGHT[0])))[:1]
+    behind = other_crosstalk(problem, _softened(problem, _OF_LIGHT[0]))
+    first += _first_climbs(problem, behind)[:_BEHIND]
     ends: list[tuple[Point, float]] = []
     for at in first:
         if not any(_same(at, end) for end, _ in ends):
@@ -189,6 +191,12 @@ def erring_maxima(problem: FitProblem, starts: Iterable[Maximum]) -> list[Erring
         ends += [climbed(problem, at, _STEPS) for at in larger(problem, ends[0][0])]
         ends.sort(key=lambda end: end[0].deviance)
     return [end_of(problem, at, remaining) for at, remaining in ends]
+
+
+def end_from(problem: FitProblem, start: Erring) -> Erring:
+    """Return the end of a climb from that of another, of a mode of its own or stopped early."""
+    begin = point_at(problem, start.x, start.positions, start.a)
+    return end_of(problem, *climbed(problem, begin, _STEPS))
 
 
 def _first_climbs(problem: FitProblem, starts: Iterable[Maximum]) -> list[Point]:

@@ -4,6 +4,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from inference.fits.likelihood.erring_point import (
@@ -64,6 +65,11 @@ def _eliminated(problem: FitProblem, at: Point) -> Information:
     return eliminated(problem.names, at.jacobian, along, errors, told)
 
 
+def _solved(triangle: Array, wanted: Array) -> Array:
+    """Solve for errors, whose own law keeps the triangle from being singular."""
+    return np.asarray(scipy.linalg.solve_triangular(triangle, wanted, check_finite=False))
+
+
 def _ranges(problem: FitProblem, at: Point, seen: Information, dx: Array, da: Array) -> Array:
     """Return ranges that follow a step."""
     step = seen.response @ dx + seen.error_response @ np.append(da, -1.0)
@@ -83,8 +89,9 @@ def _settled(problem: FitProblem, at: Point) -> Point:
             break
         seen, da = _eliminated(problem, at), np.zeros(k)
         if k > 0:
-            rows = np.vstack([seen.errors[:, :-1], np.eye(k)])
-            da = np.linalg.lstsq(rows, np.concatenate([seen.errors[:, -1], -at.a]), rcond=None)[0]
+            rows = np.vstack([seen.errors, np.column_stack([np.eye(k), -at.a])])
+            triangle = np.asarray(np.linalg.qr(rows, mode="r"))
+            da = _solved(triangle[:k, :k], triangle[:k, k])
         u = _ranges(problem, at, seen, np.zeros(at.x.size), da)
         at = point_at(problem, at.x, u, at.a + da, at.z)
     return at
@@ -171,7 +178,7 @@ def climbed(
             left = triangle[:k, -1] - triangle[:k, k:-1] @ dx
             da = np.zeros(0)
             if k > 0:
-                da = np.linalg.lstsq(triangle[:k, :k], left, rcond=None)[0]
+                da = _solved(triangle[:k, :k], left)
             z, slopes_there = standard_and_slopes(problem, new)
             u = _ranges(problem, at, seen, dx, da)
             there = _settled(problem, point_at(problem, new, u, at.a + da, z))

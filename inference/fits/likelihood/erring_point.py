@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from inference.fits.likelihood.arguments import CROSSTALK, SLOTS
 from inference.fits.likelihood.linearisation import whitened_slopes
 from inference.fits.likelihood.model_error import (
-    errors_of_readings,
+    erring_flux,
     left_at_places,
     own_share_left,
     shadow_of,
@@ -176,7 +176,8 @@ def linearised(
         return residual, by_value @ chain, along, errors, whitener
     signal = by_value[:, :, Value.C2] * values[Value.C2]
     light = np.linalg.solve(whitener, signal[:, :, None])[:, :, 0]
-    parts = [errors_of_readings(problem, light, u)]
+    erring = erring_flux(problem, u)
+    parts = [erring.of_light(light)]
     smooth = parts[0].shape[2]
     shadow = shadow_of(problem, values, u)
     if shadow is not None:
@@ -184,11 +185,18 @@ def linearised(
     errors = whitener @ np.concatenate([*parts, left_at_places(problem, light, u)], axis=2)
     errors = np.where(np.isnan(errors), 0.0, errors)
     if a is not None and smooth > 0:
-        erring = _Erring(problem, u, a[:smooth], whitener)
-        for column in (Value.C0, Value.C1, Value.C2):
-            bare = np.linalg.solve(whitener, by_value[:, :, column, None])
-            by_value[:, :, column] += erring.change(np.asarray(bare[:, :, 0], np.float64))
-        along = along + erring.change(light, _slope_of_light(problem, values, light, u))
+        errs = erring.by(a[:smooth])
+
+        def noised(change: Array) -> Array:
+            bare = np.where(np.isnan(change), 0.0, change)
+            return np.asarray((whitener @ bare[:, :, None])[:, :, 0])
+
+        columns = [Value.C0, Value.C1, Value.C2]
+        bare = np.asarray(np.linalg.solve(whitener, by_value[:, :, columns]), np.float64)
+        for k, column in enumerate(columns):
+            by_value[:, :, column] += noised(errs.change(bare[:, :, k]))
+        slope = _slope_of_light(problem, values, light, u)
+        along = along + noised(errs.change_of_slopes(light, slope))
     if a is not None and shadow is not None:
         more, further = shadow.changes(a[smooth : smooth + parts[1].shape[2]])
         by_value += whitener @ np.nan_to_num(more)
@@ -200,21 +208,6 @@ def linearised(
         with_column(problem.known, errors),
         whitener,
     )
-
-
-class _Erring(NamedTuple):
-    """Errors of the model at given ranges, and what turns readings into noise."""
-
-    problem: FitProblem
-    u: Array
-    a: Array
-    whitener: Array
-
-    def change(self, light: Array, slopes: Array | None = None) -> Array:
-        """Return what the errors do to light or, of its slopes, to these; whitened, (n, 2)."""
-        moved = errors_of_readings(self.problem, light, self.u, slopes)
-        moved = np.where(np.isnan(moved), 0.0, moved) @ self.a
-        return np.asarray((self.whitener @ moved[:, :, None])[:, :, 0])
 
 
 def _slope_of_light(problem: FitProblem, values: Array, light: Array, u: Array) -> Array:

@@ -16,12 +16,13 @@ from inference.frame.table import LOG_RANGE, tabulate
 from simulator.assign import assign
 from simulator.compiled import compiled
 
-__all__ = ["MOST", "frame_modes", "frame_reaches"]
+__all__ = ["MOST", "frame_modes", "frame_reaches", "nearest_modes"]
 
 Array = NDArray[np.float64]
 
 DEVIANCE, REACH = 1, 2  # in a frame's modes, beside `POSITION`
 MOST = 8  # modes of a frame that are kept, the best
+_NEAR = 0.5  # of log r, within which a range is that of a mode
 _BAND = 3.0  # standard deviations of noise that are followed, as in single frames
 _FALL = 0.5 * _BAND * _BAND  # of the log density there
 
@@ -102,6 +103,31 @@ def frame_modes(problem: FitProblem, x: Array) -> tuple[Array, Array]:
     """
     out = _modes_of(problem, x)
     return out[:, :, POSITION], out[:, :, DEVIANCE]
+
+
+def nearest_modes(problem: FitProblem, x: Array, u: Array) -> Array:
+    """Return ranges that explain frames at x, each the nearest to where it was, if that is none.
+
+    Beyond the last range that light tells, nothing leads a climb back.
+
+    Parameters
+    ----------
+    x : ndarray, shape (d,)
+        Coordinates.
+    u : ndarray, shape (n,)
+        log r; nan without an object.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        As ``u`` where that is near a mode, or there is none.
+    """
+    modes, _ = frame_modes(problem, x)
+    away = np.abs(modes - u[:, None])
+    away = np.where(np.isfinite(away), away, np.inf)
+    nearest = np.take_along_axis(modes, away.argmin(axis=1)[:, None], axis=1)[:, 0]
+    least = away.min(axis=1)
+    return np.where(np.isfinite(least) & (least > _NEAR), nearest, u)
 
 
 def frame_reaches(problem: FitProblem, x: Array) -> tuple[Array, Array, Array]:

@@ -1,5 +1,7 @@
 """What smooth errors of the model do to the readings of a fit (docs/model.md, fit-response)."""
 
+from typing import NamedTuple
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -10,7 +12,9 @@ from inference.frame.shadow_error import ShadowError, shadow_basis, shadow_error
 from simulator.discrepancy import NEGLECTED, discrepancy_basis
 
 __all__ = [
-    "errors_of_readings",
+    "ErringFlux",
+    "ErringLight",
+    "erring_flux",
     "left_at_places",
     "number_of_errors",
     "own_share_left",
@@ -47,36 +51,81 @@ def unexplained(residual: Array, errors: Array, moved: Array, share: float) -> f
     return float(rest / (1.0 + share * taken))
 
 
-def errors_of_readings(
-    problem: FitProblem, light: Array, positions: Array, slopes: Array | None = None
-) -> Array:
-    """Return how readings change with errors of the model.
+class ErringFlux(NamedTuple):
+    """Functions of log r by which an object's flux and effective distance err, at given ranges.
+
+    Attributes
+    ----------
+    problem : FitProblem
+        The problem.
+    positions : ndarray, shape (n,)
+        log r; nan without an object.
+    values, slopes : ndarray, shape (n, k)
+        Of k functions, and of their slopes along log r; zero without an object.
+    """
+
+    problem: FitProblem
+    positions: Array
+    values: Array
+    slopes: Array
+
+    def of_light(self, light: Array) -> Array:
+        """Return how readings change with independent standard normal errors, (n, 2, 2 k)."""
+        return _moved(self.problem, light, self.positions, self.values)
+
+    def slopes_of_light(self, light: Array, slopes: Array) -> Array:
+        """Return the derivatives of that along log r; ``slopes`` are those of the light."""
+        moved = _moved(self.problem, slopes, self.positions, self.values)
+        return moved + _moved(self.problem, light, self.positions, self.slopes)
+
+    def by(self, a: Array) -> "ErringLight":
+        """Return what errors of given sizes do, shape (2 k,)."""
+        of_flux, of_range = np.split(a, 2)
+        values = np.column_stack([self.values @ of_flux, self.values @ of_range])
+        slopes = np.column_stack([self.slopes @ of_flux, self.slopes @ of_range])
+        return ErringLight(self.problem, self.positions, values, slopes)
+
+
+class ErringLight(NamedTuple):
+    """What given errors do to light; arrays have a column each for flux and effective distance."""
+
+    problem: FitProblem
+    positions: Array
+    values: Array
+    slopes: Array
+
+    def change(self, light: Array) -> Array:
+        """Return the change of light, shape (n, 2)."""
+        return self._moved(light, self.values)
+
+    def change_of_slopes(self, light: Array, slopes: Array) -> Array:
+        """Return the change of its slopes along log r, shape (n, 2)."""
+        return self._moved(slopes, self.values) + self._moved(light, self.slopes)
+
+    def _moved(self, light: Array, by: Array) -> Array:
+        at, error = self.problem.instrument, self.problem.error
+        late = delayed(light, self.positions, at.r0, at.wave)
+        return np.asarray(error.flux * by[:, :1] * light + error.range_m * by[:, 1:] * late)
+
+
+def erring_flux(problem: FitProblem, positions: Array) -> ErringFlux:
+    """Return the functions by which an object errs; none where it does not.
 
     Parameters
     ----------
-    light : ndarray, shape (n, 2)
-        The object's part of the readings.
+    problem : FitProblem
+        The problem.
     positions : ndarray, shape (n,)
         log r; nan without an object.
-    slopes : ndarray, shape (n, 2), optional
-        Derivative of ``light`` along log r: what is asked for is that of the change.
-
-    Returns
-    -------
-    ndarray, shape (n, 2, k)
-        Along independent standard normal errors, in the unit of ``light``.
     """
     if not problem.object_errs:
-        return np.zeros((*light.shape, 0))
+        return ErringFlux(problem, positions, *np.zeros((2, positions.size, 0)))
     present = np.isfinite(positions)
     basis = discrepancy_basis(*problem.parameters.reach_m)
     at = np.where(present, positions, 0.0)
-    functions = np.where(present[:, None], basis.values(at), 0.0)
-    if slopes is None:
-        return _moved(problem, light, positions, functions)
-    steep = np.where(present[:, None], basis.slopes(at), 0.0)
-    moved = _moved(problem, slopes, positions, functions)
-    return moved + _moved(problem, light, positions, steep)
+    values = np.where(present[:, None], basis.values(at), 0.0)
+    slopes = np.where(present[:, None], basis.slopes(at), 0.0)
+    return ErringFlux(problem, positions, values, slopes)
 
 
 def _moved(problem: FitProblem, light: Array, positions: Array, functions: Array) -> Array:
@@ -138,7 +187,7 @@ def left_at_places(problem: FitProblem, light: Array, positions: Array) -> Array
     Parameters
     ----------
     problem, light, positions
-        As for `errors_of_readings`.
+        The object's part of the readings, shape (n, 2); log r, shape (n,).
 
     Returns
     -------

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inference.fits.likelihood.arguments import CROSSTALK
 from inference.fits.likelihood.conditional_fit import conditional, unconditional
@@ -12,12 +13,17 @@ from inference.fits.likelihood.frame_modes import frame_modes
 from inference.fits.likelihood.maximum import Maximum, approach
 from inference.fits.likelihood.problem import FitProblem
 
-__all__ = ["half_dark", "larger", "of_law"]
+__all__ = ["larger", "of_law", "other_crosstalk"]
+
+Array = NDArray[np.float64]
 
 _AT_EDGE = 1e-6  # of log r
 _SQUARES = ("object.c0", "object.c2", "background.shadow.c0")  # of lengths; their logs are unknowns
 _LARGER = 4.0
 _STEPS = 30  # of a climb with crosstalk held
+# of what the brightest frame has more than the darkest: the light of an object as much farther away
+# as three, two and one and a half times, by an inverse square and steeper
+_LIGHT_LEFT = (0.03, 0.1, 0.3)
 
 
 def of_law(problem: FitProblem) -> list[Maximum]:
@@ -43,11 +49,13 @@ def of_law(problem: FitProblem) -> list[Maximum]:
     return [Maximum(x, 0.0, math.inf, frame_modes(problem, x)[0][:, 0])]
 
 
-def half_dark(problem: FitProblem, softer: FitProblem) -> list[Maximum]:
-    """Return a start whose crosstalk is half of what the darkest frame reads.
+def other_crosstalk(problem: FitProblem, softer: FitProblem) -> list[Maximum]:
+    """Return starts whose crosstalk leaves the darkest frame some light of the object.
 
     A fainter object behind more crosstalk explains frames as well, until the darkest frame is
     crosstalk alone; noise that is in proportion to light pulls starts of softened problems there.
+    Half of what that frame reads is one start. Others are beyond the frame that differs
+    most from the brightest, by shares of what these two differ: crosstalk may be negative.
 
     Parameters
     ----------
@@ -59,22 +67,36 @@ def half_dark(problem: FitProblem, softer: FitProblem) -> list[Maximum]:
     Returns
     -------
     list of Maximum
-        One, or none where crosstalk is not all that is unknown besides the object.
+        None where crosstalk is not all that is unknown besides the object.
     """
     sides = np.flatnonzero(np.isin(problem.slots, CROSSTALK)).tolist()
     if problem.background is not None or len(sides) < len(CROSSTALK) or len(problem) == len(sides):
         return []
     light = problem.frames[problem.present, :2]
-    dark = 0.5 * light[np.argmin(np.hypot(light[:, 0], light[:, 1]))]
+    dark = light[np.argmin(np.hypot(light[:, 0], light[:, 1]))]
+    bright = light[_farthest(light, np.median(light, axis=0))]
+    darkest = light[_farthest(light, bright)]  # crosstalk may be negative
     middle = problem.parameters.natural(np.zeros((1, len(problem.parameters))))
     x = problem.coordinates(middle[:, problem.columns])[0]
-    x[sides] = dark
+    found = []
+    for crosstalk in (0.5 * dark, *(darkest - share * (bright - darkest) for share in _LIGHT_LEFT)):
+        x[sides] = crosstalk
+        found.append(_behind(problem, softer, sides, x))
+    return found
+
+
+def _farthest(light: Array, of: Array) -> int:
+    return int(np.argmax(np.square(light - of).sum(axis=1)))
+
+
+def _behind(problem: FitProblem, softer: FitProblem, sides: list[int], x: Array) -> Maximum:
+    """Climb with crosstalk held where it is at x."""
     # the last first: the places of the others stay
     first, rest = conditional(softer, sides[1], np.clip(x, *problem.bounds(x)))
     second, rest = conditional(first, sides[0], rest)
     found = approach(second, rest, _STEPS)
     x = unconditional(problem, first, unconditional(first, second, found.x))
-    return [Maximum(x, found.deviance, math.inf, found.positions)]
+    return Maximum(x, found.deviance, math.inf, found.positions)
 
 
 def larger(problem: FitProblem, at: Point) -> list[Point]:

@@ -72,8 +72,10 @@ class FitProblem:
         that either.
     law : bool
         Whether the scene's joint law counts as what is known of the unknowns.
+    modes : tuple of LawMode or None
+        Of what is known of the unknowns; that of an object that may be glossy is one.
     mode : LawMode or None
-        That of its modes which is taken; None where it has but one.
+        That which is taken; None: the unknowns have their priors.
     places : Places or None
         Where frames share what following errors of the model leaves; None: nowhere.
     priors : bool
@@ -95,6 +97,7 @@ class FitProblem:
     error: ModelError
     known: KnownRanges | None = None
     law: bool = False
+    modes: tuple[LawMode | None, ...] = (None,)
     mode: LawMode | None = None
     places: Places | None = None
     priors: bool = False

@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inference.fits.likelihood.model_error import errors_of_readings, shadow_of, share_left
+from inference.fits.likelihood.model_error import erring_flux, shadow_of, share_left
 from inference.fits.likelihood.problem import fit_problem
 from inference.technique import Task
 from simulator.discrepancy import DiscrepancyBasis, discrepancy_basis
@@ -69,13 +69,14 @@ class Follow:
         at = np.isfinite(log_r)[:, None]
         light, slopes = np.where(at, self.light, 0.0), np.where(at, self.slopes, 0.0)
         turn = _shown(discrepancy_basis(*problem.parameters.reach_m), log_r)
-        steps = _STEP * errors_of_readings(problem, light, log_r) @ turn
+        erring = erring_flux(problem, log_r)
+        steps = _STEP * erring.of_light(light) @ turn
         seen = task.frames.derivatives
         rates = np.zeros_like(steps)
         if seen is not None:  # as fast as the derivatives say that log r changes
             size = np.square(slopes).sum(axis=1)
             rate = np.einsum("ni,ni->n", slopes, seen) / np.where(size > 0, size, 1.0)
-            moved = errors_of_readings(problem, light, log_r, slopes)
+            moved = erring.slopes_of_light(light, slopes)
             rates = _STEP * rate[:, None, None] * moved @ turn
         shadow = shadow_of(problem, problem.layout.known, log_r)
         if shadow is not None:  # before a known background

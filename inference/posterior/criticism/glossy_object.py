@@ -1,8 +1,7 @@
 """What an answer owes to the default priors of the object: they are those of a diffuse one.
 
-A glossy surface mirrors the emitter: its light falls off as from an object of many times the size,
-and is weaker. Where a scene says nothing of the object it may as well be glossy: what is told is a
-mixture of the draws and of what they would be then. What the readings tell by themselves stays
+Where a scene says nothing of the object it may as well be glossy (`inference.glossy`): what is told
+is a mixture of the draws and of what they would be then. What the readings tell by themselves stays
 where it is.
 """
 
@@ -13,6 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inference.glossy import glossy_move
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
 from simulator.scene import Scene
 
@@ -20,10 +20,6 @@ __all__ = ["GlossyObject", "glossy_object"]
 
 Array = NDArray[np.float64]
 
-_SIZE, _REFLECTANCE = "object.c0", "object.c2"
-# glossy plates of Appendix B against diffuse ones of the same size, over the sigmas of the default
-# priors: c0 is exp(4) times as large in the median, c2 a quarter
-_MOVES = {_SIZE: 4.0 / 2.0, _REFLECTANCE: math.log(0.25) / 1.0}
 _OPEN = 0.05  # of a probability, and of one less it
 _WORDS = (
     "were the object glossy (probability {:.0%}) it would move by {{:.1f}} standard deviations of "
@@ -90,16 +86,11 @@ def glossy_object(
     Returns
     -------
     GlossyObject or None
-        None where c0 is known, or its prior is stated or learnt, or the scene says that its model
-        is exact: priors then mean what they say. A prior of c2 that is stated stands in any case.
+        None where what is stated of it says whether it is.
     """
-    error, present = scene.model_error, np.isfinite(log_r[0])
-    learnt = () if scene.joint is None else scene.joint.unknowns
-    said = {_SIZE: scene.object.c0, _REFLECTANCE: scene.object.c2}
-    left = {name for name, value in said.items() if value is None and name not in learnt}
-    if _SIZE not in left or not (error.flux or error.range_m) or not present.any():
+    move, present = glossy_move(scene, names), np.isfinite(log_r[0])
+    if move is None or not present.any():
         return None
-    move = np.array([_MOVES[name] if name in left else 0.0 for name in names])
     gain = z @ move
     columns = np.concatenate([z, np.where(present, log_r, 0.0)], axis=1)
     moved = (gain - gain.mean()) @ (columns - columns.mean(axis=0)) / len(z)
