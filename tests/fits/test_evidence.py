@@ -12,6 +12,8 @@ from benchmarks.random_sets.sets import random_set
 from inference.estimate import estimate
 from inference.estimates import TechniqueResult
 from inference.fits.answer.erring_search import judged
+from inference.fits.answer.ranges import WITHIN
+from inference.fits.answer.report import describe
 from inference.fits.likelihood.erring import Erring, end_from, erring_maxima, softened
 from inference.fits.likelihood.evidence import evidence_of
 from inference.fits.likelihood.frame_modes import frame_modes, nearest_modes
@@ -185,6 +187,23 @@ def test_a_diffuse_object_has_to_explain_the_frames_too(told_by_frames: Erring) 
     assert judged([glossy, elsewhere, diffuse]) == [glossy, diffuse]
     assert judged([diffuse, glossy]) == [diffuse]
     assert judged([glossy, elsewhere]) == [glossy]
+
+
+def test_a_rival_widens_by_its_own_width_as_far_as_its_excess_leaves(
+    told_by_frames: Erring,
+) -> None:
+    """One at the same place and twice as wide: the 95 % of both together are its own."""
+    top, whole = told_by_frames, told_by_frames.whole
+    wider = dataclasses.replace(whole, jacobian=0.5 * whole.jacobian, errors=0.5 * whole.errors)
+
+    def sd_beside(excess: float) -> np.ndarray:
+        rival = dataclasses.replace(top, whole=wider, deviance=top.deviance + excess)
+        found = describe(top.clean, top, top.facts, whole=whole, maxima=[rival])
+        return np.array([entry["sd"] for entry in found.values()])
+
+    np.testing.assert_allclose(sd_beside(0.0), 2.0 * sd_beside(WITHIN), rtol=0.01)
+    half = 0.75 * WITHIN  # half of the standard deviations of 95 % are left: as wide as the best
+    np.testing.assert_allclose(sd_beside(half), sd_beside(WITHIN), rtol=0.01)
 
 
 def test_a_range_in_the_dark_goes_to_where_a_frame_is_explained() -> None:
