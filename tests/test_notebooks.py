@@ -16,6 +16,8 @@ from service.frame_files import read_frames
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
 mpl.use("Agg")
 NAMES = sorted(path.name for path in NOTEBOOKS.glob("*.ipynb"))
+# beside the one that is shown first; `make notebook-seeds` asks all of them twenty times
+_LONG = ("cannot_be_known.ipynb", "field_calibration.ipynb")
 # what a notebook needs besides the standard library: httpx comes with the service
 ALLOWED = {"hybridtof", "numpy", "matplotlib", "arviz", "httpx"} | sys.stdlib_module_names
 DIAGNOSTICS = "posterior_diagnostics.ipynb"
@@ -105,7 +107,10 @@ def test_runs_in_jupyter() -> None:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::FutureWarning:arviz")  # of its own next version
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.thorough) if name in _LONG else name for name in NAMES],
+)
 def test_holds_its_truth(name: str) -> None:
     """`make notebook-seeds` counts the same intervals over 20 seeds."""
     names, said, passed = executed(name)

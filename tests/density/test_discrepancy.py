@@ -117,7 +117,7 @@ def test_a_vanishing_error_leaves_the_plain_density(kind: str) -> None:
     np.testing.assert_array_less(np.abs(found - plain(z)), allowed + 1e-9 * np.abs(plain(z)))
 
 
-@pytest.mark.parametrize("scale", [1e-12, 1e12])
+@pytest.mark.parametrize("scale", [pytest.param(1e-12, marks=pytest.mark.thorough), 1e12])
 def test_units_do_not_matter(scale: float) -> None:
     sensor = sensor_of("sine_wave", 300.0, shot=1e-6, relative=0.01)
     noise = {

@@ -277,7 +277,9 @@ DISTANCE = "background.distance_m"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", ["loguniform", "reference"])
+@pytest.mark.parametrize(
+    "law", [pytest.param("loguniform", marks=pytest.mark.thorough), "reference"]
+)
 def test_an_object_at_constant_speed_before_a_wall(law: str) -> None:
     """Independent draws of a wide law are not what moves: what only that law tells is said.
 

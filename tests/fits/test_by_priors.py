@@ -197,6 +197,7 @@ def test_what_frames_tell_needs_no_priors() -> None:
     assert not result.fit["by_priors"]
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("near_only")
 def test_a_second_place_of_the_ranges_is_not_crowded_out_by_neighbours_of_the_best() -> None:
     """All 27 ranges were twice what they are, and sure to a seventh: 5.3 standard deviations.

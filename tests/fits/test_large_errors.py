@@ -11,7 +11,11 @@ _DEFAULT = ModelError.stated(None)
 
 
 @pytest.mark.parametrize(
-    ("name", "seeds"), [("free shadow", (2, 7, 9, 11, 13, 15)), ("everything", (1, 5, 13))]
+    ("name", "seeds"),
+    [
+        ("free shadow", (2, 7, 9, 11, 13, 15)),
+        pytest.param("everything", (1, 5, 13), marks=pytest.mark.thorough),
+    ],
 )
 def test_intervals_by_default_hold_the_truth_behind_errors_of_the_default(
     name: str, seeds: tuple[int, ...]

@@ -18,7 +18,7 @@ from tests.fits.random_sets import CLASSES, outcome_of, random_set
 from tests.fits.scenes import values_of
 
 
-@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+@pytest.mark.parametrize("kind", [pytest.param("pulsed", marks=pytest.mark.thorough), "sine_wave"])
 def test_a_fit_without_a_guess_finds_the_optimum_of_a_start_at_the_truth(kind: str) -> None:
     """Of 16 sets more than 3 fail in 1e-3 of cases where 97 % are right."""
     right = [

@@ -79,7 +79,7 @@ def test_a_known_range_that_contradicts_is_a_misfit_that_names_its_frame() -> No
     assert any("frames 8" in reason or "8," in reason for reason in answer.fit.reasons)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_odometry_tells_the_others() -> None:
     """Displacements of every other frame, an encoder's zero 5 m behind: as foreseen, and no row
     is without a status."""

@@ -79,7 +79,9 @@ def _by_quadrature(density: CollapsedDensity, sensor: dict[str, Any], name: str)
 
 
 @pytest.mark.parametrize("case", sorted(CASES))
-@pytest.mark.parametrize("method", ["emcee", "importance"])
+@pytest.mark.parametrize(
+    "method", [pytest.param("emcee", marks=pytest.mark.thorough), "importance"]
+)
 def test_the_posterior_of_one_unknown_is_that_of_quadrature(case: str, method: Any) -> None:
     """Mean within 6 of its Monte Carlo standard errors: by chance in 2e-9 of draws."""
     document, name, true = CASES[case]

@@ -62,7 +62,9 @@ async def _by_jobs(path: Path, request: Any, settings: SamplerSettings) -> dict[
 
 
 # a second for the start, and one for every chunk
-@pytest.mark.parametrize("max_seconds", [1.0, 2.5, 1000.0])
+@pytest.mark.parametrize(
+    "max_seconds", [1.0, pytest.param(2.5, marks=pytest.mark.thorough), 1000.0]
+)
 @pytest.mark.parametrize("optional", [False, True])
 def test_the_same_answer_from_a_call_and_from_the_service(
     max_seconds: float, optional: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

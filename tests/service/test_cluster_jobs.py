@@ -93,6 +93,7 @@ async def test_chunk_that_always_crashes_fails_alone(machines: Machines, tmp_pat
     assert workers.items() <= machines.pids().items()
 
 
+@pytest.mark.thorough
 async def test_a_worker_that_is_stopped_is_done_without(tmp_path: Path) -> None:
     fake_fold.order(hold=str(tmp_path / "mark"))
     with machines_of(SILENT, tmp_path) as machines:

@@ -59,7 +59,7 @@ def made(document: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> 
     sys.path.remove(str(folder))
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 async def test_a_generated_client_talks_to_the_service(made: Any) -> None:
     models: Any = made(".models")
     sensor = models.PulsedSensor(

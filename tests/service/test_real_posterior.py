@@ -106,6 +106,7 @@ async def test_refusal_over_http() -> None:
     assert response.json()["type"] == "urn:hybridtof:problem:refused"
 
 
+@pytest.mark.thorough
 async def test_killed_workers_change_nothing(tmp_path: Path) -> None:
     """The answer is that of one call in a process that nobody disturbs."""
     request = parse(PosteriorRequest, request_body())

@@ -34,6 +34,7 @@ def test_fits_before_a_flat_wall_hold_only_with_the_error_of_its_shadow(number: 
     assert not stated.flagged
 
 
+@pytest.mark.thorough
 def test_a_posterior_before_a_flat_wall_holds_only_with_the_error_of_its_shadow() -> None:
     given = set_of(2, "numbers")
     default = answered(given, "infer", 2)

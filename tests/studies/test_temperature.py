@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from benchmarks.resumable import resume, rows_of
 from benchmarks.temperature import COLUMNS, KINDS, TOLD, cell_of, row_of, said
 from inference.posterior.settings import SamplerSettings
@@ -14,6 +16,7 @@ def test_every_cell_comes_in_turn() -> None:
     assert sorted(cells) == sorted((kind, told) for kind in KINDS for told in TOLD)
 
 
+@pytest.mark.thorough
 def test_drifts_are_found_from_known_ranges(tmp_path: Path) -> None:
     """Of 10 intervals of 90 %, 5 or more hold the truth but in 1 of 6,800 sets.
 

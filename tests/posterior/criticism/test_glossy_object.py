@@ -176,6 +176,7 @@ def _answer(told: str) -> tuple[Posterior, float]:
     return posterior, checkpoint.stage.draws.log_evidence
 
 
+@pytest.mark.thorough
 def test_an_answer_is_near_the_mixture_of_both_priors_asked_apart() -> None:
     """To first order: laws are not normal, and draws in the tail tell how probable the other one
     is; of what is between the two answers, 1.6 standard deviations, four tenths are allowed."""

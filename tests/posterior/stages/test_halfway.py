@@ -61,6 +61,7 @@ def _led_to(job: fold.Job, checkpoint: Checkpoint) -> Checkpoint:
             return checkpoint
 
 
+@pytest.mark.thorough
 def test_where_light_is_confounded_small_populations_set_out() -> None:
     stage = _started().stage
     assert isinstance(stage, Tempering)
@@ -69,6 +70,7 @@ def test_where_light_is_confounded_small_populations_set_out() -> None:
     assert stage.populations == (None,) * POPULATIONS
 
 
+@pytest.mark.thorough
 def test_they_stop_on_their_way() -> None:
     stage = _carried().stage
     assert isinstance(stage, Tempering)

@@ -177,6 +177,7 @@ def test_a_first_step_overlooks_nothing_that_is_bent(off: float) -> None:
     assert not may_be_bent(1.0, 1.0, 0.1)
 
 
+@pytest.mark.thorough
 def test_errors_of_a_shadow_are_no_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is integrated out is the flux's error: it has to be what the scale owes most to."""
     exact = next(c for c in _steps(SHEET) if isinstance(c.stage, Weighted))
