@@ -80,7 +80,10 @@ class FittedParameter(pydantic.BaseModel):
 
 
 class FittedOptimum(pydantic.BaseModel):
-    """One of the distinct optima of a fit; the deviance is -2 log likelihood."""
+    """One of the distinct optima of a fit; the deviance is -2 log likelihood.
+
+    Where the model errs it is that of how probable they are (docs/model.md, fit-evidence).
+    """
 
     excess_deviance: float
     parameters: dict[str, float | None]

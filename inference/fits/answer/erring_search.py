@@ -11,7 +11,7 @@ from inference.fits.answer.ranges import WITHIN
 from inference.fits.answer.report import DOUBTFUL, FALSE_ALARM, fit_report
 from inference.fits.likelihood.erring import Erring, end_from, erring_maxima
 from inference.fits.likelihood.erring_profile import profiles
-from inference.fits.likelihood.erring_valley import valleys
+from inference.fits.likelihood.erring_valley import near, valleys
 from inference.fits.likelihood.evidence import evidence_of
 from inference.fits.likelihood.integrated import with_integrated_first
 from inference.fits.likelihood.law_mode import is_glossy, place_of
@@ -153,12 +153,24 @@ def _by_evidence(problem: FitProblem, found: Sequence[Erring]) -> tuple[list[Err
         if weighed[0] is first:
             along += _profiles_of(problem, first, alike)
             break
+    weighed = _distinct(weighed)
     top = weighed[0]
     lower = top.end.deviance - first.end.deviance + top.evidence - first.evidence
     return (
         [_at(one.end, top.end.deviance + top.evidence - one.evidence) for one in weighed],
         [_at(point, point.deviance + lower) for point in along],
     )
+
+
+def _distinct(weighed: Sequence[_Weighed]) -> list[_Weighed]:
+    """Return maxima that are not one with a more probable one of the same mode."""
+    kept: list[_Weighed] = []
+    for one in weighed:
+        mode = one.end.clean.mode
+        same = (other.end for other in kept if other.end.clean.mode is mode)
+        if not any(near(other, one.end) for other in same):
+            kept.append(one)
+    return kept
 
 
 def _profiles_of(problem: FitProblem, first: _Weighed, alike: Sequence[_Weighed]) -> list[Erring]:

@@ -282,7 +282,7 @@ def fit_report(
         ``p_value`` of the worst of all checks, made up for their number as if they were independent
         (Sidak), ``misfit`` and its ``reasons``, ``checks`` with the p-value of each, ``by_priors``:
         whether those of the unknowns count, ``rank``, ``widening`` and ``optima``, each with its
-        deviance above the first and its values.
+        deviance above the first, as they have it, and its values.
     """
     each = {"chi_square": p_value_of(problem, chi_square)}
     each |= {name: check.p_value for name, check in checks.items()}

@@ -18,7 +18,7 @@ from inference.fits.likelihood.erring_climb import begun, climbed
 from inference.fits.likelihood.frame_modes import nearest_modes
 from inference.fits.likelihood.problem import FitProblem
 
-__all__ = ["valleys"]
+__all__ = ["near", "valleys"]
 
 _STEPS = 8  # of a climb with an unknown held
 _FIRST = 2.0  # standard deviations to where an unknown is held first
@@ -62,7 +62,7 @@ def valleys(
     for base, excess in found:
         if len(bases) == _BASES or not excess < _ENOUGH:
             break
-        if any(_near(base, other) for other in bases):
+        if any(near(base, other) for other in bases):
             continue
         bases.append(base)
         alone, mode = dataclasses.replace(problem, mode=base.clean.mode), id(base.clean.mode)
@@ -75,7 +75,7 @@ def valleys(
     return points, lower
 
 
-def _near(one: Erring, other: Erring) -> bool:
+def near(one: Erring, other: Erring) -> bool:
     """Return whether two ends of climbs are one optimum, to a part of its standard deviations."""
     of_x, _ = other.whole.factors
     sds = np.linalg.norm(of_x, axis=1)
