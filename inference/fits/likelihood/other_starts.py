@@ -67,10 +67,10 @@ def other_crosstalk(problem: FitProblem, softer: FitProblem) -> list[Maximum]:
     Returns
     -------
     list of Maximum
-        None where crosstalk is not all that is unknown besides the object.
+        None where crosstalk is known, or all that is unknown.
     """
     sides = np.flatnonzero(np.isin(problem.slots, CROSSTALK)).tolist()
-    if problem.background is not None or len(sides) < len(CROSSTALK) or len(problem) == len(sides):
+    if len(sides) < len(CROSSTALK) or len(problem) == len(sides):
         return []
     light = problem.frames[problem.present, :2]
     dark = light[np.argmin(np.hypot(light[:, 0], light[:, 1]))]
