@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.glossy import glossy_move
+from simulator.glossy import glossy_move
 from simulator.parameters import Parameters
 from simulator.scene import Scene
 
@@ -51,7 +51,7 @@ def law_modes(scene: Scene, parameters: Parameters) -> tuple[LawMode | None, ...
     """Return the modes of what is known of a scene's unknowns.
 
     Where nothing is said of the object, each has another of the same weight: the priors of a
-    glossy one (`inference.glossy`).
+    glossy one (`simulator.glossy`).
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """What an answer owes to the default priors of the object: they are those of a diffuse one.
 
-Where a scene says nothing of the object it may as well be glossy (`inference.glossy`): what is told
+Where a scene says nothing of the object it may as well be glossy (`simulator.glossy`): what is told
 is a mixture of the draws and of what they would be then. What the readings tell by themselves stays
 where it is.
 """
@@ -12,8 +12,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inference.glossy import glossy_move
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
+from simulator.glossy import glossy_move
 from simulator.scene import Scene
 
 __all__ = ["GlossyObject", "glossy_object"]
