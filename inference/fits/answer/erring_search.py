@@ -149,8 +149,8 @@ def _by_evidence(problem: FitProblem, found: Sequence[Erring]) -> tuple[list[Err
         along, others = valleys(
             problem, [(one.end, first.evidence - one.evidence) for one in alike]
         )
-        weighed = sorted([*weighed, *_weighed(others)], key=lambda one: -one.evidence)
-        if weighed[0] is first:
+        weighed = _weighed([*(one.end for one in weighed), *others])
+        if weighed[0].end is first.end:
             along += _profiles_of(problem, first, alike)
             break
     weighed = _distinct(weighed)
