@@ -202,8 +202,7 @@ def test_what_frames_tell_needs_no_priors() -> None:
 def test_a_second_place_of_the_ranges_is_not_crowded_out_by_neighbours_of_the_best() -> None:
     """All 27 ranges were twice what they are, and sure to a seventh: 5.3 standard deviations.
 
-    The best optimum has ranges twice as large as the next, which is 6.0 worse: five ends of the
-    first valley were all that was kept.
+    The next optimum is 6.0 worse: five ends of the first valley were all that was kept.
     """
     ranges = [
         0.314, 0.4009, 0.2043, 0.2732, 0.1654, 0.294, 0.2148, 0.422, 0.162, 0.4484, 0.2531, 0.3221,
