@@ -51,12 +51,12 @@ def off(one: PathSet, result: TechniqueResult) -> float:
 @pytest.mark.parametrize(
     ("seed", "number"), [(27112026, 2), pytest.param(771204993, 97, marks=pytest.mark.thorough)]
 )
-def test_a_needle_is_no_answer(seed: int, number: int) -> None:
+def test_a_narrow_maximum_is_no_answer(seed: int, number: int) -> None:
     """Ranges were 58 and 23 sd off, and crosstalk 4,991 and 599 sd, `identified` and no misfit.
 
     Nine frames at rest in the dark told crosstalk to the noise of one reading: the fit was better
     by a deviance of 9, and its widths told that it was less probable all the same. Of the other set
-    the best fit that was found was a needle of a wall's thickness.
+    no maximum was found but such narrow ones.
     """
     one = random_set(seed, number)
     assert off(one, fitted(one)) < 4.0

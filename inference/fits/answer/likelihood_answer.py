@@ -243,11 +243,12 @@ def _erring_answer(
     else:  # points beside a rival are decided against by as much more
         near, wide = [one for one in along if one.deviance <= decided + doubt * WITHIN], rivals
     widening = wider * math.sqrt(doubt)
-    report = fit_report(
-        problem, found, top.chi_square, facts.rank, widening, model_checks(problem, top)
-    )
-    for end in judged(found):
-        of_end = fit_report(problem, found, end.chi_square, 0, 1.0, model_checks(problem, end))
+    reports = [
+        (end, fit_report(problem, found, end.chi_square, facts.rank, widening, checks))
+        for end, checks in ((end, model_checks(problem, end)) for end in judged(found))
+    ]
+    report = reports[0][1]
+    for end, of_end in reports:
         if of_end["misfit"]:
             report |= {name: of_end[name] for name in ("p_value", "misfit", "reasons", "checks")}
             report["reasons"] += blamed(problem, end, np.flatnonzero(state != SATURATED))

@@ -75,17 +75,15 @@ def describe(
         sds = np.hypot(sds, model)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         ratios = sds / np.abs(values)
-        for other in undecided:
-            reach = math.sqrt(max(other.deviance - top.deviance, WITHIN))
-            there = problem.natural(other.x)
-            sds = np.fmax(sds, np.abs(there - values) / reach)
-            ratios = np.fmax(ratios, np.abs(np.log(there / values)) / reach)
-        for end in maxima:
-            excess = end.deviance - top.deviance
-            reach, left = math.sqrt(max(excess, WITHIN)), math.sqrt(max(WITHIN - excess, 0.0))
-            there = problem.natural(end.x)
-            chain = problem.chain(end.x)[problem.slots] * problem.units[:, None]
-            own_width = left * wider * end.whole.sd_of(chain)
+        others = [*((one, None) for one in undecided), *((end, end.whole) for end in maxima)]
+        for other, told in others:
+            excess = other.deviance - top.deviance
+            reach, there = math.sqrt(max(excess, WITHIN)), problem.natural(other.x)
+            own_width = np.zeros_like(sds)
+            if told is not None:
+                chain = problem.chain(other.x)[problem.slots] * problem.units[:, None]
+                left = math.sqrt(max(WITHIN - excess, 0.0))
+                own_width = left * wider * told.sd_of(chain)
             sds = np.fmax(sds, (np.abs(there - values) + own_width) / reach)
             moved = np.abs(np.log(there / values)) + own_width / np.abs(there)
             ratios = np.fmax(ratios, moved / reach)

@@ -1,8 +1,9 @@
 """How much of what is known of a scene lies about a maximum: what decides between maxima.
 
-The best fit may be a needle: frames in the dark whose ranges follow their noise tell crosstalk to
-the noise of a reading, at an object that nothing else speaks for. What is nearly as good and a
-thousand times as wide is more probable by as much (docs/model.md, fit-evidence).
+The best fit may be a maximum with next to no probability about it: frames in the dark whose ranges
+follow their noise tell crosstalk to the noise of a reading, at an object that nothing else speaks
+for. What is nearly as good and a thousand times as wide is more probable by as much
+(docs/model.md, fit-evidence).
 """
 
 import math
