@@ -31,7 +31,7 @@ from inference.fits.likelihood.erring_point import (
     whitened_of,
 )
 from inference.fits.likelihood.maximum import Maximum
-from inference.fits.likelihood.other_starts import larger, of_law, other_crosstalk
+from inference.fits.likelihood.other_starts import apart, larger, of_law, other_crosstalk
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import Told, contradictions, eliminated, improbable, told_at
 from inference.identifiability.elimination import eliminate
@@ -179,7 +179,7 @@ def erring_maxima(problem: FitProblem, starts: Iterable[Maximum]) -> list[Erring
     list of Erring
         Ends of the best climbs, the best first.
     """
-    first = _first_climbs(problem, (*starts, *of_law(problem)))[:_KEPT]
+    first = apart(_first_climbs(problem, (*starts, *of_law(problem))))[:_KEPT]
     behind = other_crosstalk(problem, _softened(problem, _OF_LIGHT[0]))
     first += _first_climbs(problem, behind)[:_BEHIND]
     ends: list[tuple[Point, float]] = []

@@ -1,5 +1,6 @@
 """Climbs over unknowns, ranges and errors of the model (docs/model.md, fit-response)."""
 
+import dataclasses
 import math
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from inference.fits.likelihood.frame_modes import frame_modes
 from inference.fits.likelihood.model_error import number_of_errors
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import eliminated
+from inference.frame.sensitivity import Value
 from inference.identifiability.information import Information
 
 __all__ = ["FEW", "Pull", "begun", "climbed", "held_within_priors", "with_other_ranges"]
@@ -54,15 +56,27 @@ def _eliminated(problem: FitProblem, at: Point) -> Information:
         told = told._replace(errors=of_all)
     seen = eliminated(problem.names, at.jacobian, at.along, errors, told)
     # what a range would gain beyond the ends of what is possible no step can take
-    low, high = problem.log_support
+    low, high = problem.log_ends(at.x)
     step = -seen.error_response[:, -1]
-    ended = ((at.u <= low) & (step < 0.0)) | ((at.u >= high) & (step > 0.0))
+    nearest = (at.u <= low) & (step < 0.0)
+    ended = nearest | ((at.u >= high) & (step > 0.0))
     if not ended.any():
         return seen
-    along = np.where(ended[:, None], 0.0, at.along)
+    along, jacobian = np.where(ended[:, None], 0.0, at.along), at.jacobian
     if told is not None:
         told = told._replace(along=np.where(ended[:, None], 0.0, told.along))
-    return eliminated(problem.names, at.jacobian, along, errors, told)
+    if not low > problem.log_support[0]:
+        return eliminated(problem.names, jacobian, along, errors, told)
+    # the nearest that a shadow allows moves with it, and such ranges with that
+    values, chain = problem.opened(at.x)
+    moves = nearest[:, None] * chain[Value.SHADOW_C1] / values[Value.SHADOW_C1]
+    followed = np.where(nearest[:, None], at.along, 0.0)[:, :, None] * moves[:, None, :]
+    seen = eliminated(problem.names, jacobian + followed, along, errors, told)
+    return dataclasses.replace(
+        seen,
+        response=np.where(nearest[:, None], moves, seen.response),
+        own_variance=np.where(nearest, 0.0, seen.own_variance),
+    )
 
 
 def _solved(triangle: Array, wanted: Array) -> Array:
@@ -70,13 +84,13 @@ def _solved(triangle: Array, wanted: Array) -> Array:
     return np.asarray(scipy.linalg.solve_triangular(triangle, wanted, check_finite=False))
 
 
-def _ranges(problem: FitProblem, at: Point, seen: Information, dx: Array, da: Array) -> Array:
-    """Return ranges that follow a step."""
-    step = seen.response @ dx + seen.error_response @ np.append(da, -1.0)
+def _ranges(problem: FitProblem, at: Point, seen: Information, x: Array, da: Array) -> Array:
+    """Return ranges that follow a step to x."""
+    step = seen.response @ (x - at.x) + seen.error_response @ np.append(da, -1.0)
     with np.errstate(invalid="ignore"):
         step = np.minimum(np.maximum(step / (1.0 + seen.own_variance), -0.5), 0.5)
     step[~np.isfinite(step)] = 0.0
-    low, high = problem.log_support
+    low, high = problem.log_ends(x)
     u = np.minimum(np.maximum(at.u + step, low), high)
     return np.where(np.isfinite(at.u), u, np.nan)
 
@@ -92,7 +106,7 @@ def _settled(problem: FitProblem, at: Point) -> Point:
             rows = np.vstack([seen.errors, np.column_stack([np.eye(k), -at.a])])
             triangle = np.asarray(np.linalg.qr(rows, mode="r"))
             da = _solved(triangle[:k, :k], triangle[:k, k])
-        u = _ranges(problem, at, seen, np.zeros(at.x.size), da)
+        u = _ranges(problem, at, seen, at.x, da)
         at = point_at(problem, at.x, u, at.a + da, at.z)
     return at
 
@@ -180,7 +194,7 @@ def climbed(
             if k > 0:
                 da = _solved(triangle[:k, :k], left)
             z, slopes_there = standard_and_slopes(problem, new)
-            u = _ranges(problem, at, seen, dx, da)
+            u = _ranges(problem, at, seen, new, da)
             there = _settled(problem, point_at(problem, new, u, at.a + da, z))
             if math.isfinite(there.deviance):
                 gained = at.deviance - there.deviance_weighted_as(at)
@@ -252,6 +266,6 @@ def _settled_ranges(problem: FitProblem, at: Point) -> Point:
     """Let ranges follow unknowns and errors, which stay."""
     for _ in range(_TURNS):
         seen = _eliminated(problem, at)
-        u = _ranges(problem, at, seen, np.zeros(at.x.size), np.zeros(at.a.size))
+        u = _ranges(problem, at, seen, at.x, np.zeros(at.a.size))
         at = point_at(problem, at.x, u, at.a, at.z)
     return at

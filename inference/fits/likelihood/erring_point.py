@@ -39,6 +39,7 @@ Array = NDArray[np.float64]
 
 _FARTHEST = 30.0  # standard deviations of the priors, beyond which no slope is
 _DIFFERENCE = 1e-4
+_INSIDE = 2e-9  # of log r from its ends, where kernels still tell its slope
 _EACH = np.eye(SLOTS)
 
 
@@ -168,7 +169,11 @@ def linearised(
     n, (values, chain) = u.size, problem.opened(x)
     by_value, along, residual = np.empty((n, 2, SLOTS)), np.empty((n, 2)), np.empty((n, 2))
     fit = problem.kernel_fit()
-    whitened_slopes(by_value, along, residual, values, _EACH, np.ascontiguousarray(u), fit)
+    at = np.ascontiguousarray(u)
+    if a is not None:  # of a range at an end of what is possible a step has to know where it leads
+        low, high = problem.log_ends(x)
+        at = np.clip(at, low + _INSIDE, high - _INSIDE)
+    whitened_slopes(by_value, along, residual, values, _EACH, at, fit)
     # crosstalk moves the readings themselves
     whitener = by_value[:, :, list(CROSSTALK)]
     if not (problem.object_errs or problem.shadow_errs or problem.places is not None):

@@ -1,6 +1,7 @@
 """Where climbs begin that no screen of the unknowns finds (docs/model.md, fit-response)."""
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,17 +14,40 @@ from inference.fits.likelihood.frame_modes import frame_modes
 from inference.fits.likelihood.maximum import Maximum, approach
 from inference.fits.likelihood.problem import FitProblem
 
-__all__ = ["larger", "of_law", "other_crosstalk"]
+__all__ = ["apart", "larger", "of_law", "other_crosstalk"]
 
 Array = NDArray[np.float64]
 
 _AT_EDGE = 1e-6  # of log r
 _SQUARES = ("object.c0", "object.c2", "background.shadow.c0")  # of lengths; their logs are unknowns
+_APART = 0.1  # of log r of a frame, from which on points are two places
 _LARGER = 4.0
 _STEPS = 30  # of a climb with crosstalk held
 # of what the brightest frame has more than the darkest: as if that were 5.9, 3.3 and 2.1 times as
 # far away by an inverse square, 2.4, 1.8 and 1.4 times by the fourth power
 _LIGHT_LEFT = (0.03, 0.1, 0.3)
+
+
+def apart(points: Iterable[Point]) -> list[Point]:
+    """Return points in the same order, those last whose ranges all lie near those of another.
+
+    Most starts come to the same few places: of the best alone none may be at the best place of all.
+
+    Parameters
+    ----------
+    points : iterable of Point
+        Ends of short climbs, the best first.
+
+    Returns
+    -------
+    list of Point
+    """
+    first: list[Point] = []
+    last: list[Point] = []
+    for at in points:
+        alike = any(np.nanmax(np.abs(at.u - one.u), initial=0.0) < _APART for one in first)
+        (last if alike else first).append(at)
+    return first + last
 
 
 def of_law(problem: FitProblem) -> list[Maximum]:

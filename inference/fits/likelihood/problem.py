@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,6 +185,14 @@ class FitProblem:
         """Ends of log r that the scene allows."""
         low, high = np.log(self.support).tolist()
         return low, high
+
+    def log_ends(self, x: Array) -> tuple[float, float]:
+        """Return the ends of log r at coordinates x: nearer than -c1' a shadow is negative."""
+        low, high = self.log_support
+        if self.background is None:
+            return low, high
+        nearest = -float(self.opened(x)[0][Value.SHADOW_C1])
+        return (max(low, math.log(nearest)) if nearest > 0.0 else low), high
 
     @functools.cached_property
     def columns(self) -> list[int]:
