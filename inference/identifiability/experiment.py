@@ -191,10 +191,19 @@ class Experiment:
         ndarray, shape (n, 2, k)
             Along the coefficients of the errors of flux and shadow.
         """
+        return self._whitened_by_noise if whitener is None else self._whitened_terms(whitener)
+
+    @functools.cached_property
+    def _whitened_by_noise(self) -> tuple[Array, Array, Array]:
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
+            parts = self._whitened_terms(whiteners(self.sensor, self.readings))
+        for part in parts:
+            part.flags.writeable = False
+        return parts
+
+    def _whitened_terms(self, whitener: Array) -> tuple[Array, Array, Array]:
         of = self.readings
         with np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore"):
-            if whitener is None:
-                whitener = whiteners(self.sensor, of)
             by_term = np.einsum("nij,njk->nik", whitener, of.by_term)
             along = np.einsum("nij,nj->ni", whitener, of.by_range)
             along[np.isnan(self.log_r)] = np.nan

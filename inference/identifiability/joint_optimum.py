@@ -20,7 +20,9 @@ _GAINED = 0.003  # of the deviance, by a step that is the last
 _FARTHEST = 30.0  # standard deviations of a prior: farther lengths are no numbers any more
 
 
-def joint_optimum(experiment: Experiment, readings: Array) -> tuple[Experiment, float]:
+def joint_optimum(
+    experiment: Experiment, readings: Array, steps: int = _STEPS
+) -> tuple[Experiment, float]:
     """Climb over unknowns, ranges and errors of the model together (Levenberg and Marquardt).
 
     Parameters
@@ -29,6 +31,8 @@ def joint_optimum(experiment: Experiment, readings: Array) -> tuple[Experiment, 
         Where to begin, with the sizes of its errors.
     readings : ndarray, shape (n, 2 or 4)
         As for `inference.identifiability.model_response.model_response`.
+    steps : int
+        At most so many.
 
     Returns
     -------
@@ -41,7 +45,7 @@ def joint_optimum(experiment: Experiment, readings: Array) -> tuple[Experiment, 
         experiment = dataclasses.replace(experiment, error=none)
     here, damping = ResponseRows(experiment), 0.0
     last = _deviance(here, readings)
-    for _ in range(_STEPS):
+    for _ in range(steps):
         for _ in range(_TRIES):
             there = ResponseRows(_stepped(here, readings, damping))
             with np.errstate(all="ignore"):

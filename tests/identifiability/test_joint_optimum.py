@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from inference.identifiability.joint_optimum import joint_optimum
+from inference.posterior.answer.where_bent import best_end
 from tests.identifiability.test_shadow_response import KINDS, experiment
 
 
@@ -25,3 +26,19 @@ def test_a_climb_ends_no_worse_than_at_the_truth(kind: str) -> None:
     assert np.isnan(end.log_r[-1])
     # nothing but priors is off: the readings are met
     assert np.square(end.z).sum() + np.square(end.error).sum() == pytest.approx(deviance, rel=0.5)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_only_the_best_of_short_climbs_goes_on_and_ends_as_the_best_of_long_ones(kind: str) -> None:
+    at = experiment(kind, 0.07)
+    rng = np.random.default_rng(5)
+    truth = dataclasses.replace(at, error=rng.standard_normal(at.by_error.shape[2]))
+    readings = truth.readings.mean
+    draws = [
+        dataclasses.replace(at, z=at.z + by, log_r=at.log_r + by / 8.0)
+        for by in (0.8, 0.4, -0.4, -0.8)
+    ]
+    long = min(joint_optimum(one, readings)[1] for one in draws)
+    best = best_end(draws, readings)
+    assert best is not None
+    assert joint_optimum(best, readings)[1] == pytest.approx(long, abs=0.006)

@@ -27,7 +27,7 @@ from inference.posterior.answer.error_shares import error_shares
 from inference.posterior.answer.moves import Moves
 from inference.posterior.answer.responses import chosen_draws, flux_leads, responses_at
 from inference.posterior.answer.shadow_beside import shadow_beside, with_shadow
-from inference.posterior.answer.where_bent import best_ends, where_bent
+from inference.posterior.answer.where_bent import best_end, where_bent
 from inference.posterior.answer.where_known import where_known
 from inference.posterior.answer.where_misfit import where_integrated, where_misfit
 from inference.posterior.answer.widened import widened
@@ -119,8 +119,8 @@ def error_budget(
             by[0] = by[0] + moved[:, :1]
             by.append(np.broadcast_to(moved[:, 1:], (len(at), *moved[:, 1:].shape)))
     elif found.repeated and experiments[0].shadow > 0:
-        ends = best_ends(experiments, readings)
-        follow = where_bent(ends, *_moved(z, log_r, by_z[0], by_log_r[0]))
+        best = best_end(experiments, readings)
+        follow = where_bent(best, *_moved(z, log_r, by_z[0], by_log_r[0]))
         for by, moved in zip((by_z, by_log_r), follow, strict=True):
             by.append(np.broadcast_to(moved[:, None], (len(at), moved.size, 1)))
     if larger is not None:

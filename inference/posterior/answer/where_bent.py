@@ -1,7 +1,7 @@
 """What draws of an exact model owe to their branch where errors of the model bend the response."""
 
+import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,23 +9,20 @@ from numpy.typing import NDArray
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.joint_optimum import joint_optimum
 
-__all__ = ["End", "best_ends", "where_bent"]
+__all__ = ["best_end", "where_bent"]
 
 Array = NDArray[np.float64]
 
 _REACH = 0.01  # share of the draws on each side that is as good as none
 _STARTS, _FRAMES = 4, 2400  # climbs, and frames of all of them
+_FIRST = 60  # steps of each
 
 
-class End(NamedTuple):
-    """Where a climb over unknowns, ranges and errors ends, and its deviance."""
-
-    point: Experiment
-    deviance: float
-
-
-def best_ends(experiments: Sequence[Experiment], readings: Array) -> list[End]:
+def best_end(experiments: Sequence[Experiment], readings: Array) -> Experiment | None:
     """Seek the best point of unknowns, ranges and errors together from some draws.
+
+    Climbs of bent valleys go on for hundreds of steps of which none gains anything that counts, so
+    that only the best of the first part goes on.
 
     Parameters
     ----------
@@ -36,19 +33,20 @@ def best_ends(experiments: Sequence[Experiment], readings: Array) -> list[End]:
 
     Returns
     -------
-    list of End
-        By ascending deviance; those that are numbers.
+    Experiment or None
+        None where no climb ends at a number.
     """
     frames = experiments[0].log_r.size
     starts = int(np.clip(_FRAMES // frames, 1, min(_STARTS, len(experiments))))
-    ends = [
-        End(*joint_optimum(experiments[i], readings))
+    first = [
+        joint_optimum(experiments[i], readings, _FIRST)
         for i in np.linspace(0, len(experiments) - 1, starts).astype(np.intp)
     ]
-    return sorted((end for end in ends if np.isfinite(end.deviance)), key=lambda end: end.deviance)
+    best, deviance = min(first, key=lambda end: end[1])
+    return joint_optimum(best, readings)[0] if math.isfinite(deviance) else None
 
 
-def where_bent(ends: Sequence[End], z: Array, log_r: Array) -> tuple[Array, Array]:
+def where_bent(best: Experiment | None, z: Array, log_r: Array) -> tuple[Array, Array]:
     """Return how far the best point of unknowns, ranges and errors together lies from the draws.
 
     An exact model may hold a narrow branch of its posterior for improbable beside a wide one that
@@ -56,8 +54,8 @@ def where_bent(ends: Sequence[End], z: Array, log_r: Array) -> tuple[Array, Arra
 
     Parameters
     ----------
-    ends : sequence of End
-        From `best_ends`.
+    best : Experiment or None
+        From `best_end`.
     z : ndarray, shape (m, d)
         Draws, moved by the response.
     log_r : ndarray, shape (m, n)
@@ -70,9 +68,8 @@ def where_bent(ends: Sequence[End], z: Array, log_r: Array) -> tuple[Array, Arra
         everywhere where draws reach as far as all ranges of that point: they know its branch.
     """
     off_z, off = np.zeros(z.shape[1]), np.zeros(log_r.shape[1])
-    if not ends or log_r.shape[1] <= z.shape[1]:
+    if best is None or log_r.shape[1] <= z.shape[1]:
         return off_z, off
-    best = ends[0].point
     present = np.isfinite(best.log_r)
     low, middle, high = np.quantile(log_r[:, present], [_REACH, 0.5, 1.0 - _REACH], axis=0)
     there = best.log_r[present]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from inference.density.discrepant import DiscrepantDensity
 from inference.identifiability.experiment import Experiment
-from inference.posterior.answer.where_bent import best_ends, where_bent
+from inference.posterior.answer.where_bent import best_end, where_bent
 from inference.posterior.answer.widened import widened
 
 __all__ = ["where_integrated", "where_misfit"]
@@ -31,7 +31,7 @@ def where_misfit(
     experiments : sequence of Experiment
         Draws with errors of that size.
     readings : ndarray, shape (frames, 2 or 4)
-        As for `best_ends`.
+        As for `best_end`.
     moved_z, moved_log_r : ndarray, shape (n, d) and (n, frames)
         Draws, moved by the response to such errors.
 
@@ -40,7 +40,7 @@ def where_misfit(
     (ndarray, ndarray)
         Shapes (d, 2) and (frames, 2): a constant, and an independent error as large.
     """
-    found = where_bent(best_ends(experiments, readings), moved_z, moved_log_r)
+    found = where_bent(best_end(experiments, readings), moved_z, moved_log_r)
     of_z, of_log_r = (np.stack([way, way], axis=1) for way in found)
     return of_z, of_log_r
 

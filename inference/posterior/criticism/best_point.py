@@ -13,7 +13,7 @@ from inference.frame.known_range import rates_of
 from inference.frame.warmth import gains_of
 from inference.identifiability.experiment import Experiment
 from inference.posterior.answer.shadow_beside import with_shadow
-from inference.posterior.answer.where_bent import best_ends
+from inference.posterior.answer.where_bent import best_end
 from simulator.model_error import ModelError
 
 __all__ = ["BestPoint", "best_point"]
@@ -84,10 +84,9 @@ def best_point(
     ]
     if isinstance(density, DiscrepantDensity):
         experiments = with_shadow(density, experiments, shadow)
-    ends = best_ends(experiments, readings)
-    if not ends:
+    best = best_end(experiments, readings)
+    if best is None:
         return None
-    best = ends[0].point
     present = np.isfinite(best.log_r)
     low, high = np.quantile(answered[:, present], [_REACH, 1.0 - _REACH], axis=0)
     there = best.log_r[present]
