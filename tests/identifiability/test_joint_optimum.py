@@ -32,7 +32,8 @@ def test_a_climb_ends_no_worse_than_at_the_truth(kind: str) -> None:
 def test_only_the_best_of_short_climbs_goes_on_and_ends_as_the_best_of_long_ones(kind: str) -> None:
     at = experiment(kind, 0.07)
     rng = np.random.default_rng(5)
-    truth = dataclasses.replace(at, error=rng.standard_normal(at.by_error.shape[2]))
+    error = np.asarray(rng.standard_normal(at.by_error.shape[2]))
+    truth = dataclasses.replace(at, error=error)
     readings = truth.readings.mean
     draws = [
         dataclasses.replace(at, z=at.z + by, log_r=at.log_r + by / 8.0)

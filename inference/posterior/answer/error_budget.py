@@ -31,7 +31,7 @@ from inference.posterior.answer.where_bent import best_end, where_bent
 from inference.posterior.answer.where_known import where_known
 from inference.posterior.answer.where_misfit import where_integrated, where_misfit
 from inference.posterior.answer.widened import widened
-from inference.posterior.criticism.discrepancy_check import BENT, LargerDiscrepancy
+from inference.posterior.criticism.discrepancy_check import ADDED, LargerDiscrepancy
 from inference.posterior.criticism.glossy_object import GlossyObject
 from inference.posterior.criticism.prior_sensitivity import PriorSensitivity
 from inference.posterior.job import Job
@@ -105,7 +105,7 @@ def error_budget(
     shadow = error.shadow if density.parameters.has_background else 0.0
     chosen = chosen_draws(len(z), log_r.shape[1])
     found = responses_at(job, density, z[chosen], log_r[chosen], rng)
-    by_flux = not found.curvature > BENT or flux_leads(found)
+    by_flux = not found.curvature > ADDED or flux_leads(found)
     experiments, responses, readings = found.experiments, found.each, found.readings
     at, ranges = found.z, found.log_r
     by_z, by_log_r = ([by[:, :, :1], by[:, :, 1:]] for by in (found.by_z, found.by_log_r))

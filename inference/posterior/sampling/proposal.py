@@ -136,7 +136,10 @@ class Local:
     def log_density(self, z: Array) -> Array:
         """Return the log density at z of shape (n, d), shape (n,)."""
         x, log_det = self.transport.unbend(z)
-        return self.law.log_density(x) + log_det
+        density, near = np.full(len(z), -np.inf), np.isfinite(x).all(axis=1)
+        # what a map has beyond all numbers is far from every law in its coordinates
+        density[near] = self.law.log_density(x[near]) + log_det[near]
+        return density
 
     def draw(self, random: np.random.Generator | np.random.RandomState, n: int) -> Array:
         """Draw n points, shape (n, d)."""

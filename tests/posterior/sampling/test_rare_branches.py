@@ -114,3 +114,19 @@ def test_a_proposal_s_draws_follow_its_density() -> None:
     ratio = np.exp(law - math.log(2 * math.pi * 4 * WIDTH**2) - proposal.log_density(z))
     assert abs(ratio.mean() - 1) < 5 * ratio.std() / math.sqrt(len(z))  # a false alarm in 2e6
     assert ratio.std() / math.sqrt(len(z)) < 0.05
+
+
+def test_what_lies_beyond_all_numbers_in_a_maps_coordinates_has_no_density() -> None:
+    """Its square over the others' was none, and weights from it neither."""
+    law = _laws()[1]
+    near = law.law.centres
+    z = law.transport.bend(near)[0]
+    far = np.array([[1e300, 0.0], [np.inf, 0.0]])
+    narrow = dataclasses.replace(
+        law, transport=dataclasses.replace(law.transport, axes=1e-150 * law.transport.axes)
+    )
+    assert not np.isfinite(narrow.transport.unbend(far)[0]).all()
+    assert np.isneginf(narrow.log_density(far)).all()
+    # among others they change nothing
+    both = law.log_density(np.vstack([z, far[1:]]))
+    np.testing.assert_array_equal(both[:1], law.log_density(z))
