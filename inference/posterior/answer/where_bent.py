@@ -21,8 +21,8 @@ _FIRST = 60  # steps of each
 def best_end(experiments: Sequence[Experiment], readings: Array) -> Experiment | None:
     """Seek the best point of unknowns, ranges and errors together from some draws.
 
-    Climbs of bent valleys go on for hundreds of steps of which none gains anything that counts, so
-    that only the best of the first part goes on.
+    Climbs of bent valleys go on for hundreds of steps that gain little each: after the first part
+    only the best goes on.
 
     Parameters
     ----------

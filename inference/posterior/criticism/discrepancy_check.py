@@ -44,7 +44,7 @@ Array = NDArray[np.float64]
 
 _FACTOR = 2.0
 MISFIT = 1e3  # Bayes factor: a false-alarm rate of at most 1e-3
-BENT = 0.3  # share of a linear response that the next order adds, above which it is no guide
+_BENT = 0.3  # share of a linear response that the next order adds, above which it is no guide
 ADDED = 0.2  # of the whole uncertainty that the next order adds, above which it is none either
 _MOST = 0.5  # of the uncertainty, above which that matters
 
@@ -148,7 +148,7 @@ def is_bent(model: float, whole: float, curvature: float) -> bool:
         What the next order would add to the response to them, as a share of it.
     """
     added = curvature * model > ADDED * whole
-    return model > _MOST * whole and (curvature > BENT or added)
+    return model > _MOST * whole and (curvature > _BENT or added)
 
 
 def may_be_bent(model: float, whole: float, curvature: float) -> bool:
@@ -161,7 +161,7 @@ def may_be_bent(model: float, whole: float, curvature: float) -> bool:
         of repeated steps to a factor of 1.6 in nine of ten, the ratio of the others to 1.3.
     """
     added = curvature * model > 0.5 * ADDED * whole
-    return model > 0.6 * _MOST * whole and (curvature > 0.5 * BENT or added)
+    return model > 0.6 * _MOST * whole and (curvature > 0.5 * _BENT or added)
 
 
 def with_model_part(
