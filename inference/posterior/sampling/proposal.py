@@ -69,7 +69,9 @@ class Mixture:
         """Return squared Mahalanobis distances, shape (m, n)."""
         # einsum, not BLAS: its threads cost more than these few numbers
         standard = np.einsum("mij,mnj->mni", self._inverses, z - self.centres[:, None])
-        return np.asarray(np.einsum("mni,mni->mn", standard, standard))
+        squares = np.einsum("mni,mni->mn", standard, standard)
+        # of what lies beyond all numbers infinities may cancel
+        return np.where(np.isnan(squares), np.inf, squares)
 
     def draw(self, random: np.random.Generator | np.random.RandomState, n: int) -> Array:
         """Draw n points, shape (n, d); emcee brings a RandomState."""
@@ -196,6 +198,7 @@ class Proposal:
             return laplace
         x, log_det = self.transport.unbend(z)
         mapped = math.log1p(-_LAPLACE_SHARE) + log_student(x) + log_det
+        mapped = np.where(np.isnan(mapped), -np.inf, mapped)
         return np.asarray(np.logaddexp(math.log(_LAPLACE_SHARE) + laplace, mapped))
 
     def draw(self, random: np.random.Generator | np.random.RandomState, n: int) -> Array:

@@ -127,6 +127,7 @@ def test_what_lies_beyond_all_numbers_in_a_maps_coordinates_has_no_density() -> 
     )
     assert not np.isfinite(narrow.transport.unbend(far)[0]).all()
     assert np.isneginf(narrow.log_density(far)).all()
+    assert np.isneginf(Proposal(BARE.optima, narrow.transport, 0.5).log_density(far)).all()
     # among others they change nothing
     both = law.log_density(np.vstack([z, far[1:]]))
     np.testing.assert_array_equal(both[:1], law.log_density(z))
