@@ -27,6 +27,7 @@ from inference.posterior.selection.consequence import Reported
 from inference.posterior.selection.models import Candidate
 from inference.posterior.selection.selection import Decision, Selection
 from inference.posterior.stages.stage import (
+    Outset,
     Selecting,
     Settled,
     Starting,
@@ -137,6 +138,7 @@ _PARTS = {
         Local,
         Mixture,
         Optimum,
+        Outset,
         Pool,
         Population,
         Proposal,

@@ -11,12 +11,13 @@
 Between chunks a checkpoint may be stored and read again: the result is the same to the last bit.
 
 Where weighted draws from the Laplace shapes at the optima, or from maps fitted to them, are even
-and points from the prior do not contradict them, they are the answer with the method `auto`, and
-ensembles walk at once with `emcee`. Where not, rounds of weighted draws follow from the points from
+and points from the prior do not contradict them, they are the answer with the method `auto`. Where
+not, rounds of weighted draws follow from the points from
 the prior, and where these do not do from populations that are carried from the prior to the
 posterior. Such draws are the answer with `auto`, where the points or populations agree with them;
 otherwise ensembles walk in the last map's coordinates. Where linear response to the model's errors
 bends around such draws, rounds follow from where it moves them, with the errors integrated out.
+With `emcee` many walkers make some steps from what `auto` would answer with.
 What each stage does is in `inference.posterior.stages`.
 """
 
@@ -32,7 +33,14 @@ from inference.posterior.progress import Progress
 from inference.posterior.sampling.ensemble import Ensemble
 from inference.posterior.sampling.population import Population
 from inference.posterior.selection.models import Candidate
-from inference.posterior.stages import responding, selecting, starting, tempering, walking
+from inference.posterior.stages import (
+    responding,
+    selecting,
+    starting,
+    tempering,
+    walking,
+    walking_on,
+)
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.looking import Looked, LookTask, taken_in
 from inference.posterior.stages.responding import RespondTask
@@ -54,6 +62,7 @@ from inference.posterior.stages.stage import (
 from inference.posterior.stages.starting import StartTask
 from inference.posterior.stages.tempering import TemperTask
 from inference.posterior.stages.walking import WalkTask
+from inference.posterior.stages.walking_on import WalkOnTask
 from inference.posterior.summary import draw, summarise
 from simulator.compiled import at_once
 from simulator.one_thread import one_thread
@@ -84,6 +93,7 @@ Task = (
     | EvaluateTask
     | WalkTask
     | RespondTask
+    | WalkOnTask
 )
 Piece = Candidate | Looked | Evaluated | Checkpoint | Population | Ensemble
 P = TypeVar("P")
@@ -127,7 +137,7 @@ def tasks(job: Job, checkpoint: Checkpoint, cpu_s: float = 0.0) -> tuple[Task, .
         case Walking() as stage if not stage.finished:
             return walking.tasks(sampled(job, checkpoint), stage)
         case Walking() | Weighted() | Settled():
-            return responding.tasks(job, checkpoint)
+            return responding.tasks(job, checkpoint) or walking_on.tasks(job, checkpoint)
 
 
 @one_thread()
@@ -187,7 +197,7 @@ def merge(job: Job, checkpoint: Checkpoint, pieces: Sequence[Piece]) -> Checkpoi
             after, used = walking.merge(sampled(job, checkpoint), stage, ensembles)
             return dataclasses.replace(checkpoint, stage=after, calls=calls + used)
         case Walking() | Weighted() | Settled():
-            if not responding.tasks(job, checkpoint):
+            if not (responding.tasks(job, checkpoint) or walking_on.tasks(job, checkpoint)):
                 raise ValueError("the job is finished: there is nothing to take in")
             return _after(checkpoint, pieces)
 
@@ -201,6 +211,7 @@ def _after(checkpoint: Checkpoint, pieces: Sequence[object]) -> Checkpoint:
         selection=checkpoint.selection,
         integrated=checkpoint.integrated or reached.integrated,
         exact=reached.exact or checkpoint.exact,
+        linear=checkpoint.linear or reached.linear,
     )
     return responding.decided(after)
 

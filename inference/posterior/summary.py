@@ -79,7 +79,7 @@ def _parameters(
     names, shares = density.parameters.names, whole.budget.of_z
     if sample.chains is not None:
         natural = density.parameters.natural(sample.flat).reshape(sample.z.shape)
-        return summaries_of_chains(names, natural, whole.parameters, shares)
+        return summaries_of_chains(names, natural, whole.parameters, shares, sample.chains.start)
     if sample.weighted is not None:
         return summaries_of_weights(names, whole.parameters, sample.weighted.weights, shares)
     return {}  # nothing is unknown
@@ -280,7 +280,8 @@ def _ranges(drawn: _Drawn, whole: Whole) -> RangeSummary:
             whole = with_model_error(part, own, sample, draws, drawn.density, drawn.bias)
         folds = near_fold(part, own, whole.chosen, whole.log_r)
         shares = _of_all_frames(part, whole.budget.of_log_r)
-        found.append(range_summary(whole.draws, folds, sample.resampled, shares))
+        start = None if sample.chains is None else sample.chains.start
+        found.append(range_summary(whole.draws, folds, sample.resampled, shares, start))
     if len(found) == 1:
         return found[0]
     numbers = [part.of_sent(np.arange(len(part.frames))) for part in drawn.parts]

@@ -77,7 +77,7 @@ def _count(sample: Sample, frames: int) -> int:
     ess = float(size)
     if sample.chains is not None:
         columns = np.moveaxis(sample.z, -1, 0)
-        sizes = [effective_sample_size(column) for column in columns]
+        sizes = [effective_sample_size(column, sample.chains.start) for column in columns]
         ess = min((size for size in sizes if math.isfinite(size)), default=0.0)
     elif sample.weighted is not None:
         ess = sample.weighted.ess

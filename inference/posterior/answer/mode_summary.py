@@ -37,7 +37,7 @@ def mode_summary(
         error: float | None = None
         if sample.chains is not None:
             inside = sample.mode == k
-            weight, error = float(inside.mean()), share_error(inside)
+            weight, error = float(inside.mean()), share_error(inside, sample.chains.start)
         elif sample.weighted is not None:
             weights = sample.weighted.weights
             inside = optima.nearest(sample.weighted.z) == k

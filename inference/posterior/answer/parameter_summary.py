@@ -25,7 +25,11 @@ _FEWEST = 1000  # draws among which modes are looked for: of one walker they are
 
 
 def summaries_of_chains(
-    names: tuple[str, ...], draws: Array, moved: Array, shares: ErrorParts
+    names: tuple[str, ...],
+    draws: Array,
+    moved: Array,
+    shares: ErrorParts,
+    start: float | None = None,
 ) -> dict[str, ParameterSummary]:
     """Summarise the draws of ensembles.
 
@@ -39,12 +43,14 @@ def summaries_of_chains(
         The same with the errors of the model: what is reported.
     shares : ErrorParts of ndarray, shape (d,)
         Of the standard deviations.
+    start : float or None
+        As of `effective_sample_size`.
     """
     ensembles, walkers, steps, _ = draws.shape
     result = {}
     for j, name in enumerate(names):
         drawn, x = draws[..., j], moved[..., j]
-        ess = effective_sample_size(drawn)
+        ess = effective_sample_size(drawn, start)
         # as many as are independent: a mode of a thousandth has ten of ten thousand
         looked_at = max(ess, _FEWEST) if math.isfinite(ess) else _FEWEST
         each = min(math.ceil(looked_at / (ensembles * walkers)), steps)
@@ -52,7 +58,7 @@ def summaries_of_chains(
         cuts = boundaries(x[:, :, thin].ravel())
         label = labels(x, cuts)
         modes = tuple(
-            _mode(x[label == k], None, float((label == k).mean()), share_error(label == k))
+            _mode(x[label == k], None, float((label == k).mean()), share_error(label == k, start))
             for k in range(cuts.size + 1)
         )
         several = cuts.size > 0
@@ -66,7 +72,7 @@ def summaries_of_chains(
             q50,
             q95,
             ess,
-            tail_effective_sample_size(drawn),
+            tail_effective_sample_size(drawn, start),
             split_r_hat(drawn),
             math.nan if several else sd / math.sqrt(ess),
             modes,

@@ -13,10 +13,10 @@ __all__ = ["mean_error", "quantile_error"]
 Array = NDArray[np.float64]
 
 
-def _effective(draws: Array, weights: Array | None) -> float:
+def _effective(draws: Array, weights: Array | None, start: float | None) -> float:
     """Return the number of independent draws that a mean of these is as good as."""
     if weights is None:
-        return effective_sample_size(draws)
+        return effective_sample_size(draws, start)
     squares = np.square(draws - draws.mean())
     # resampled by weight: the error of the weights (a sum of squared ones, of which one is the
     # share of the draw here) and that of resampling
@@ -24,7 +24,7 @@ def _effective(draws: Array, weights: Array | None) -> float:
     return float(squares.mean()) / error if error > 0 else math.nan
 
 
-def mean_error(draws: Array, weights: Array | None) -> float:
+def mean_error(draws: Array, weights: Array | None, start: float | None = None) -> float:
     """Return the standard error of the mean of draws.
 
     Parameters
@@ -34,16 +34,20 @@ def mean_error(draws: Array, weights: Array | None) -> float:
     weights : ndarray, shape (ensembles, walkers, steps), or None
         Of the draws that these were resampled from by weight, which sum to one before; None for
         walkers.
+    start : float or None
+        Of walkers, as of `effective_sample_size`.
 
     Returns
     -------
     float
         nan where the draws do not differ.
     """
-    return float(draws.std()) / math.sqrt(_effective(draws, weights))
+    return float(draws.std()) / math.sqrt(_effective(draws, weights, start))
 
 
-def quantile_error(draws: Array, at: float, weights: Array | None) -> float:
+def quantile_error(
+    draws: Array, at: float, weights: Array | None, start: float | None = None
+) -> float:
     """Return the standard error of a quantile of draws (Vehtari et al. 2021).
 
     The share of draws below the quantile is known like that of so many independent draws: its law
@@ -56,7 +60,7 @@ def quantile_error(draws: Array, at: float, weights: Array | None) -> float:
         Draws of one quantity.
     at : float
         Probability of the quantile.
-    weights : ndarray or None
+    weights, start : ndarray, float, or None
         As for `mean_error`.
 
     Returns
@@ -65,7 +69,7 @@ def quantile_error(draws: Array, at: float, weights: Array | None) -> float:
         nan where the draws do not differ.
     """
     below = (draws <= np.quantile(draws, at)).astype(float)
-    n = _effective(below, weights)
+    n = _effective(below, weights, start)
     if not math.isfinite(n):
         return math.nan
     one_sd = float(scipy.special.ndtr(1.0))

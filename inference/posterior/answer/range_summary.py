@@ -24,6 +24,7 @@ def range_summary(
     near_fold: NDArray[np.bool_],
     resampled: Array | None,
     shares: ErrorParts,
+    start: float | None = None,
 ) -> RangeSummary:
     """Summarise the ranges of all frames of a job.
 
@@ -38,6 +39,8 @@ def range_summary(
         from.
     shares : ErrorParts of ndarray, shape (frames,)
         Of the standard deviations.
+    start : float or None
+        Of walkers, as of `effective_sample_size`.
     """
     n = draws.range_m.shape[-1]
     columns = {name: np.full(n, np.nan) for name in RANGE_COLUMNS}
@@ -46,15 +49,15 @@ def range_summary(
     for frame in np.flatnonzero(np.isfinite(draws.range_m[0, 0, 0])):
         r = draws.range_m[..., frame]
         cuts = boundaries(np.log(r).ravel())
-        modes[frame] = _modes(r, labels(np.log(r), cuts), cuts.size + 1, weights)
+        modes[frame] = _modes(r, labels(np.log(r), cuts), cuts.size + 1, weights, start)
         q = quantiles(r, several_modes=cuts.size > 0)
         for at, value in zip(QUANTILES, q, strict=True):
             name = f"q{100 * at:02.0f}"
             columns[name][frame] = value
-            columns[f"mcse_{name}"][frame] = quantile_error(r, at, weights)
+            columns[f"mcse_{name}"][frame] = quantile_error(r, at, weights, start)
         if cuts.size == 0:
             columns["mean"][frame], columns["sd"][frame] = r.mean(), r.std(ddof=1)
-            columns["mcse_mean"][frame] = mean_error(r, weights)
+            columns["mcse_mean"][frame] = mean_error(r, weights, start)
     parts = of_sd(shares, columns["sd"])
     return RangeSummary(**columns, sd_parts=parts, near_fold=near_fold, modes=tuple(modes))
 
@@ -88,13 +91,21 @@ def joined(
 
 
 def _modes(
-    r: Array, label: NDArray[np.intp], count: int, weights: Array | None
+    r: Array,
+    label: NDArray[np.intp],
+    count: int,
+    weights: Array | None,
+    start: float | None,
 ) -> tuple[RangeMode, ...]:
     result = []
     for k in range(count):
         inside = label == k
         weight = float(inside.mean())
-        error = share_error(inside) if weights is None else resampled_share_error(inside, weights)
+        error = (
+            share_error(inside, start)
+            if weights is None
+            else resampled_share_error(inside, weights)
+        )
         q05, q50, q95 = quantiles(r[inside], several_modes=False)
         sd = float(r[inside].std(ddof=1)) if inside.sum() > 1 else 0.0
         result.append(RangeMode(q50, weight, error, sd, q05, q95))

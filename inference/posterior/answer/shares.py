@@ -5,13 +5,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.posterior.sampling.diagnostics import effective_sample_size
+
 __all__ = ["resampled_share_error", "share_error", "weighted_share_error"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-def share_error(inside: Mask) -> float | None:
+def share_error(inside: Mask, start: float | None = None) -> float | None:
     """Return the standard error of a share of the draws of several ensembles.
 
     The largest of three estimates: that of a Markov chain of two states with as many entries as
@@ -23,6 +25,9 @@ def share_error(inside: Mask) -> float | None:
     ----------
     inside : ndarray of bool, shape (ensembles, walkers, steps)
         Whether each draw counts.
+    start : float or None
+        Effective size of the draws of the posterior at which the walkers began; None where they
+        began elsewhere.
 
     Returns
     -------
@@ -34,6 +39,9 @@ def share_error(inside: Mask) -> float | None:
     share = float(inside.mean())
     if share == 1.0:
         return 0.0
+    if start is not None:
+        size = effective_sample_size(inside.astype(float), start)
+        return math.sqrt(share * (1.0 - share) / size) if size > 0 else None
     changes = np.diff(inside.astype(np.int8), axis=2)
     # in the long run as many come as go; over a short one either may be seen first
     entries = 0.5 * float(np.abs(changes).sum())

@@ -130,7 +130,7 @@ def moments_disagree(
     if frame is None:
         return None  # some parameter does not move: the length gate has named it
     white = frame.white(chains.z)
-    own = _own_moments(white)
+    own = _own_moments(white, chains.start)
     estimates: list[tuple[str, Moments]] = []
     trusted = weighted.k_hat < MAX_K_HAT and weighted.ess > _LEAST_ESS
     if white.shape[-1] <= MOST_DIMENSIONS and not trusted:
@@ -199,12 +199,12 @@ def _surroundings(density: LogDensity, chains: Chains, optima: Mixture) -> Array
     return np.concatenate([points.reshape(-1, chains.z.shape[-1]), chains.z[:, :, -1].mean(axis=1)])
 
 
-def _own_moments(white: Array) -> Moments:
+def _own_moments(white: Array, start: float | None) -> Moments:
     """Moments of the draws with their Monte Carlo errors."""
     columns = []
     for x in np.moveaxis(white, -1, 0):
         for power in (x, x * x):
-            ess = effective_sample_size(power)
+            ess = effective_sample_size(power, start)
             columns.append((power.mean(), power.std() / math.sqrt(max(ess, 1.0))))
     first, second = np.array(columns).reshape(-1, 2, 2).transpose(1, 2, 0)
     return Moments(first[0], second[0], first[1], second[1])
@@ -228,10 +228,13 @@ def _mode_weights(chains: Chains, optima: Mixture, weighted: WeightedDraws) -> s
         weight = float(weighted.weights @ inside)
         error = float(np.sqrt(weighted.weights**2 @ (inside - weight) ** 2))
         mine = (chains.mode == k).astype(float)
-        ess = effective_sample_size(mine)
+        ess = effective_sample_size(mine, chains.start)
         # a mode entered in some ensembles and left by none has no time of autocorrelation; then
         # the importance draws alone say how far off its weight may be
         own_error = float(mine.std()) / math.sqrt(max(ess, 1.0)) if math.isfinite(ess) else 0.0
+        if chains.start is not None:  # how many begin in a mode, and stay there, is chance
+            least = weight * (1.0 - weight) / math.prod(mine.shape[:2])
+            own_error = max(own_error, math.sqrt(max(least, 0.0)))
         if abs(weight - mine.mean()) > _STANDARD_ERRORS * math.hypot(error, own_error) + _ROUNDING:
             return (
                 f"mode {k + 1} has {mine.mean():.1%} of the draws and {weight:.1%} by importance "

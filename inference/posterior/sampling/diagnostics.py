@@ -2,7 +2,9 @@
 
 Walkers of one ensemble propose from one another, so an ensemble counts as one chain. The effective
 sample size comes from the series of means over an ensemble's walkers, which carries whatever
-correlation the walkers have among themselves.
+correlation the walkers have among themselves. Walkers that began at draws of the posterior are
+draws of it, independent of one another, after any number of steps. So however short they walk and
+however long they stay, their means over the steps differ by as much as these are uncertain.
 """
 
 import math
@@ -60,13 +62,16 @@ def autocorrelation_time(series: Array, common: bool = False) -> float:
     return float(max(taus[window], 1.0))
 
 
-def effective_sample_size(draws: Array) -> float:
+def effective_sample_size(draws: Array, start: float | None = None) -> float:
     """Return the effective sample size of the mean of all draws.
 
     Parameters
     ----------
     draws : ndarray, shape (ensembles, walkers, steps)
         Draws of one quantity.
+    start : float or None
+        Effective size of the draws of the posterior at which the walkers began; None where they
+        began elsewhere, and walked long.
 
     Returns
     -------
@@ -75,10 +80,27 @@ def effective_sample_size(draws: Array) -> float:
     """
     ensembles, _, steps = draws.shape
     variance = float(draws.var())
+    if start is not None:
+        return _of_short_walks(draws, variance, start)
     means = draws.mean(axis=1)
     # between the ensembles as well as within: both say how uncertain the mean is
     tau = autocorrelation_time(means.T, common=True)
     square = float(means.var(ddof=1)) * tau / (ensembles * steps)
+    if not variance > 0 or not square > 0:
+        return math.nan
+    return float(min(variance / square, draws.size))
+
+
+def _of_short_walks(draws: Array, variance: float, start: float) -> float:
+    """Return the same from the spread of the walkers' means, and what is left of the start's error.
+
+    The regression of a walker's mean on where it began says how much of an error of the start all
+    means still have in common.
+    """
+    means, first = draws.mean(axis=2).ravel(), draws[:, :, 0].ravel()
+    spread = float(first.var())
+    left = 0.0 if spread == 0 else float(np.mean((first - first.mean()) * means)) / spread
+    square = float(means.var(ddof=1)) / means.size + left**2 * variance / start
     if not variance > 0 or not square > 0:
         return math.nan
     return float(min(variance / square, draws.size))
@@ -90,10 +112,10 @@ def rank_normalise(draws: Array) -> Array:
     return np.asarray(scipy.special.ndtri((ranks - 0.375) / (draws.size + 0.25)))
 
 
-def tail_effective_sample_size(draws: Array) -> float:
+def tail_effective_sample_size(draws: Array, start: float | None = None) -> float:
     """Return the smaller effective sample size of the 5 % and 95 % quantiles' indicators."""
     quantiles = np.quantile(draws, [0.05, 0.95])
-    return float(min(effective_sample_size((draws <= q).astype(float)) for q in quantiles))
+    return float(min(effective_sample_size((draws <= q).astype(float), start) for q in quantiles))
 
 
 def split_r_hat(draws: Array) -> float:

@@ -33,6 +33,7 @@ _BURN_IN = 0.2  # share of the steps left out
 _STANDSTILL = 0.25  # of the kept steps that a walker may spend in one place
 _TRANSITIONS = 20  # between modes, over all walkers
 _DISAGREEMENT = 1e-5  # false-alarm rate of the comparison of the ensembles' means
+_STUCK = 0.1  # of the walkers that began at draws, that may stay where they began
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,6 +73,9 @@ class Chains:
     log_ratio : ndarray, shape (ensembles, m, steps), or None
         Log of the density over that of the proposal, of the first m walkers; None where nothing was
         proposed from.
+    start : float or None
+        Effective size of the draws of the posterior at which all ensembles but the last began;
+        None where they began elsewhere.
     """
 
     z: Array
@@ -81,6 +85,7 @@ class Chains:
     names: tuple[str, ...]
     streams: tuple[bytes, ...] = ()
     log_ratio: Array | None = None
+    start: float | None = None
 
     @property
     def stay(self) -> float:
@@ -109,6 +114,7 @@ def chains_of(
     ensembles: tuple[Ensemble, ...],
     nearest: Callable[[Array], NDArray[np.intp]],
     names: tuple[str, ...],
+    start: float | None = None,
 ) -> Chains:
     """Leave out the burn-in and line up the draws of all ensembles."""
     skip = math.ceil(_BURN_IN * ensembles[0].steps)
@@ -116,7 +122,8 @@ def chains_of(
     log_density = np.array([e.chain_log_prob[skip:].T for e in ensembles])
     mode = nearest(z.reshape(-1, z.shape[-1])).reshape(z.shape[:-1])
     acceptance = np.array([e.accepted / max(e.steps, 1) for e in ensembles])
-    return Chains(z, log_density, mode, acceptance, names, tuple(map(_digest, ensembles)))
+    streams = tuple(map(_digest, ensembles))
+    return Chains(z, log_density, mode, acceptance, names, streams, start=start)
 
 
 def _digest(ensemble: Ensemble) -> bytes:
@@ -159,11 +166,13 @@ def _acceptance(chains: Chains) -> str | None:
     moved = _moved(chains)
     steps = moved.shape[2]
     stuck = ~moved.any(axis=2)
-    if stuck.any():
+    if stuck.mean() > (0.0 if chains.start is None else _STUCK):
         return f"{int(stuck.sum())} walkers never moved after the burn-in"
     worst = float(chains.acceptance.mean(axis=1).min())
     if worst < _LEAST_ACCEPTANCE:
         return f"an ensemble accepted only {worst:.1%} of its proposals"
+    if chains.start is not None:
+        return None
     index = np.arange(steps)
     last = np.maximum.accumulate(np.where(moved, index, -1), axis=2)
     longest = int((index - last).max())
@@ -219,13 +228,18 @@ def _means(chains: Chains) -> str | None:
     for quantity, draws in chains.quantities():
         if quantity.startswith("mode"):
             continue
-        means = draws.mean(axis=1)
-        tau = autocorrelation_time(means.T)
-        error = float(means.var(axis=1, ddof=1).mean()) * tau / steps
+        if chains.start is None:
+            means = draws.mean(axis=1)
+            tau = autocorrelation_time(means.T)
+            independent = steps / tau
+        else:
+            means = draws.mean(axis=2)
+            independent = float(means.shape[1])
+        error = float(means.var(axis=1, ddof=1).mean()) / independent
         centre = means.mean(axis=1)
         square = float(((centre - centre.mean()) ** 2).sum()) / error
-        # the error itself is estimated, from steps / tau independent values an ensemble
-        freedom = max(ensembles * (steps / tau - 1), 1.0)
+        # the error itself is estimated, from so many independent values an ensemble
+        freedom = max(ensembles * (independent - 1), 1.0)
         p = float(scipy.stats.f.sf(square / (ensembles - 1), ensembles - 1, freedom))
         if p < _DISAGREEMENT / tests:
             return f"the ensembles' means of {quantity} differ by more than their errors"
@@ -236,7 +250,7 @@ def _precision(chains: Chains, target_ess: int) -> str | None:
     """Hold the Monte Carlo errors of the means to what was asked for."""
     least, name = math.inf, ""
     for quantity, draws in zip(chains.names, np.moveaxis(chains.z, -1, 0), strict=True):
-        ess = effective_sample_size(draws)
+        ess = effective_sample_size(draws, chains.start)
         if not ess >= least:  # a constant has none
             least, name = ess, quantity
     if math.isnan(least):
@@ -267,6 +281,9 @@ def _transitions(chains: Chains) -> str | None:
 def judge(chains: Chains, target_ess: int) -> Verdict:
     """Pass the draws through all gates.
 
+    Of walkers that began at draws of the posterior neither a length is asked, nor entries into
+    every mode: how often modes and branches were drawn is then told by how many walkers are there.
+
     Parameters
     ----------
     target_ess : int
@@ -282,14 +299,15 @@ def judge(chains: Chains, target_ess: int) -> Verdict:
     first = [reason for gate in (_shared_streams, _start) if (reason := gate(chains)) is not None]
     if _start(chains) is not None:
         return Verdict(False, tuple(first))  # nothing can be computed from infinities
+    walked = chains.start is None
     findings = (
         _acceptance(chains),
-        _length(chains),
-        _stay(chains),
+        _length(chains) if walked else None,
+        _stay(chains) if walked else None,
         _agreement(chains),
         _means(chains),
         _precision(chains, target_ess),
-        _transitions(chains),
+        _transitions(chains) if walked else None,
     )
     reasons = (*first, *(reason for reason in findings if reason is not None))
     return Verdict(not reasons, reasons)

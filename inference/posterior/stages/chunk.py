@@ -1,15 +1,21 @@
 """The size of a chunk: counted in evaluations, never timed, so that it is the same everywhere."""
 
+from collections.abc import Mapping
+from typing import Literal
+
 from inference.posterior.job import Job
 from inference.posterior.sampling.rounds import STEP
 from inference.posterior.stages.stage import MOST_STEPS
 
-__all__ = ["draws_of_rounds", "evaluations", "parts_of_a_step", "steps_from"]
+__all__ = ["Began", "draws_of_rounds", "evaluations", "parts_of_a_step", "steps_from"]
+
+Began = Literal["at draws", "warm", "cold"]
 
 _CHUNK_S = 0.33  # half of the longest chunk
 _EVALUATION_S = 2.5e-6  # a frame under one parameter vector, for sizing chunks only
 _WITH_DISCREPANCY = 10.0  # times as long, where the flux's error is integrated out
 _EASIEST = 90  # steps: 50 times of a little more than one, and a burn-in of a fifth
+_FIRST: Mapping[Began, int] = {"at draws": 24, "warm": _EASIEST, "cold": 2 * _EASIEST}
 _GROWTH = 0.25
 _DRAW_S = 2e-4  # of rounds, beside its evaluation: maps are fitted, and other laws are asked
 _PARTS = 2  # of a step of rounds that takes long: more would each fit its maps anew
@@ -38,14 +44,19 @@ def parts_of_a_step(job: Job) -> int:
     return _PARTS if STEP * _evaluation_s(job) > _CHUNK_S else 1
 
 
-def steps_from(job: Job, done: int, walkers: int, warm: bool) -> int:
+def steps_from(job: Job, done: int, walkers: int, began: Began) -> int:
     """Return how many steps an ensemble makes in a chunk after those that are done.
 
-    The first ones of a warm start are what the easiest posterior takes, then it is a share of those
-    that are done: what is made beyond need is no more than that.
+    The first ones are what the easiest posterior takes, then it is a share of those that are done:
+    what is made beyond need is no more than that.
+
+    Parameters
+    ----------
+    began : "at draws", "warm" or "cold"
+        Where: at draws that could be the answer; near such; anywhere.
     """
     step_s = _STEP_S + walkers * _evaluation_s(job)
-    first = _EASIEST if warm else 2 * _EASIEST
+    first = _FIRST[began]
     wanted = first if done == 0 else _GROWTH * done
     most = 2 * _CHUNK_S / step_s
     return int(min(max(min(wanted, most), 20), 500, MOST_STEPS - done))

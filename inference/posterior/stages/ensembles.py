@@ -4,19 +4,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
+from inference.posterior.answer.separation import boundaries, labels
 from inference.posterior.job import Job
-from inference.posterior.sampling.ensemble import WALKERS, Ensemble, new_ensemble, warm_walkers
+from inference.posterior.sampling.aliases import aliases_of
+from inference.posterior.sampling.ensemble import (
+    WALKERS,
+    Ensemble,
+    advance,
+    new_ensemble,
+    restart,
+    warm_walkers,
+)
 from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.proposal import Proposal
+from inference.posterior.sampling.verdict import Verdict
+from inference.posterior.stages.stage import Outset, Walking, Weighted
 from inference.posterior.streams import Stream
 from simulator.errors import RefusedError
 
-__all__ = ["POPULATIONS", "from_weighted", "new_ensembles"]
+__all__ = ["POPULATIONS", "answer_of", "are_told", "from_draws", "from_weighted", "new_ensembles"]
 
 Array = NDArray[np.float64]
 
 POPULATIONS = 2  # independent of one another, so that they can disagree
 _TRIES = 50  # draws of as many points as there are walkers
+_ON_THE_WAY = 20  # steps: a walker where next to nothing is takes the first jump that leads away
+_IN_A_MODE = 10  # walkers that are to begin in each mode: its share is then told to a third
+_HEAVY = 1e-3  # of the largest weight: draws that carry less are no modes
+_MANY_WALKERS = 64  # of an ensemble that begins at draws of the posterior, each a draw of its own
 
 
 def new_ensembles(
@@ -83,3 +98,67 @@ def from_weighted(
     starts = tuple(draws.z[order[k::count]] for k in range(count))
     seeds = job.seeds(Stream.ENSEMBLES)
     return new_ensembles(density, proposal, (*starts, others), seeds, walkers)
+
+
+def are_told(job: Job, draws: WeightedDraws) -> bool:
+    """Tell whether weighted draws can be the answer as they are, or walkers that begin at them.
+
+    Of a mode that hardly any walker begins in next to nothing would be told: where one has a small
+    share of the draws, ensembles walk until they have come and gone often enough.
+    """
+    if job.settings.method != "emcee":
+        return True
+    walkers = (job.settings.ensembles - 1) * _MANY_WALKERS
+    heavy = draws.weights > _HEAVY * draws.weights.max()
+    for column in draws.z.T:
+        cuts = boundaries(column[heavy])
+        shares = np.bincount(labels(column, cuts), draws.weights, cuts.size + 1)
+        if shares.min() * walkers < _IN_A_MODE:
+            return False
+    return True
+
+
+def answer_of(job: Job, proposal: Proposal, draws: WeightedDraws, others: Array) -> Weighted:
+    """Return weighted draws that could be the answer; with `emcee`, from where ensembles walk.
+
+    Parameters
+    ----------
+    proposal, draws : Proposal, WeightedDraws
+        Trusted, and worth what was asked for.
+    others : ndarray, shape (n, d)
+        Points that came from the prior and know nothing of them.
+    """
+    outset = Outset(proposal, others) if job.settings.method == "emcee" else None
+    return Weighted(proposal.optima, draws, Verdict(True, ()), outset)
+
+
+def from_draws(
+    job: Job, density: CollapsedDensity, draws: WeightedDraws, outset: Outset
+) -> tuple[Walking, int]:
+    """Set up ensembles that walk from draws that could be the answer.
+
+    All but the last begin at draws by their weights, many at those of much weight: walkers are then
+    draws of the posterior whatever few steps they make. The last begins at the other points, and
+    its way from there is forgotten.
+
+    Returns
+    -------
+    (Walking, int)
+        And the density evaluations that it took.
+    """
+    proposal, count = outset.proposal, job.settings.ensembles - 1
+    rng, walkers = job.stream(Stream.MEMBERS), _MANY_WALKERS
+    places = (rng.random() + np.arange(count * walkers)) / (count * walkers)
+    chosen = np.searchsorted(np.cumsum(draws.weights), places * draws.weights.sum())
+    chosen = rng.permutation(np.minimum(chosen, len(draws.z) - 1))
+    seeds = job.seeds(Stream.ENSEMBLES)
+    own = [
+        new_ensemble(proposal, draws.z[some], draws.log_density[some], seed)
+        for some, seed in zip(np.split(chosen, count), seeds.spawn(count), strict=True)
+    ]
+    (other,) = new_ensembles(density, proposal, (outset.others,), seeds, walkers)
+    other = advance(density, proposal, other, _ON_THE_WAY, aliases_of(density))
+    pending = Verdict(False, ("no steps were made",))
+    ensembles = (*own, restart(other, proposal, proposal))
+    stage = Walking(proposal, ensembles, pending, 0, weighted=draws, start=draws.worth)
+    return stage, walkers * (1 + _ON_THE_WAY)

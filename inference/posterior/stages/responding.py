@@ -97,14 +97,14 @@ class RespondTask:
 def tasks(job: Job, checkpoint: Checkpoint) -> tuple[RespondTask, ...]:
     """Return what is left to do where sampling is finished: to look at the response, once.
 
-    Ensembles would walk ten times as long with the error integrated out: with the method `emcee`
-    the rows of the answer say what linear response leaves open.
+    What was asked for by importance alone stays that of the Laplace shapes: the rows of the answer
+    say what linear response leaves open.
     """
     stage = checkpoint.stage
     assert not isinstance(stage, Selecting | Starting)  # noqa: S101  # sampling is finished
     reached, own = stage.verdict.converged, sampled(job, checkpoint)
-    auto = job.settings.method == "auto" or isinstance(stage, Settled)
-    if checkpoint.linear or not (reached and auto and own.can_integrate_error):
+    may = job.settings.method != "importance" or isinstance(stage, Settled)
+    if checkpoint.linear or not (reached and may and own.can_integrate_error):
         return ()
     return (RespondTask(own, stage),)
 

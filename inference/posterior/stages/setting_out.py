@@ -20,10 +20,15 @@ from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.rounds import first_draws, next_draws, taken_in
 from inference.posterior.sampling.rounds_so_far import Rounds, RoundsSoFar, Wanted
 from inference.posterior.sampling.transport import fit_map
-from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.sampling.warm import MAP_SHARE
 from inference.posterior.stages.checkpoint import Checkpoint
-from inference.posterior.stages.ensembles import POPULATIONS, from_weighted, new_ensembles
+from inference.posterior.stages.ensembles import (
+    POPULATIONS,
+    answer_of,
+    are_told,
+    from_weighted,
+    new_ensembles,
+)
 from inference.posterior.stages.stage import Tempering, Walking, Weighted
 from inference.posterior.stages.standing import best_known
 from inference.posterior.streams import Stream
@@ -187,8 +192,9 @@ def _set_out(
 ) -> tuple[Tempering | Weighted | Walking, int]:
     """Answer by the draws of rounds; set up ensembles, or begin again, where they fail."""
     auto = job.settings.method == "auto"
-    if auto and found.trusted and found.draws.worth >= job.settings.target_ess:
-        return Weighted(found.proposal.optima, found.draws, Verdict(True, ())), found.calls
+    enough = found.trusted and found.draws.worth >= job.settings.target_ess
+    if enough and are_told(job, found.draws):
+        return answer_of(job, found.proposal, found.draws, members[0].z), found.calls
     if not stage.early:
         walking = walking_from(job, stage, members, found)
     elif _may_try_again(stage, found) and (auto or not found.trusted):

@@ -2,19 +2,23 @@
 
 ::
 
-    Selecting -> Starting -+-> Weighted
+    Selecting -> Starting -+-> Weighted (-> Walking)
                            +-> Settled
-                           +-> Tempering -> Weighted or Walking
-                           +-> Walking -> (Tempering -> Weighted or Walking)
+                           +-> Tempering -> Weighted (-> Walking) or Walking
+                           +-> Walking -> (Tempering -> Weighted (-> Walking) or Walking)
 
 A job without optional terms begins with `Starting`. Ensembles that hardly move call for
-populations, once. Where errors of the model are integrated out behind an exact model, `Tempering`
+populations, once. From weighted draws that could be the answer ensembles walk with the method
+`emcee`. Where errors of the model are integrated out behind an exact model, `Tempering`
 follows once more, on its moved draws, and the checkpoint keeps what the exact model came to.
 """
 
 import dataclasses
 import math
 from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from inference.posterior.progress import Phase, Progress
 from inference.posterior.sampling.ensemble import Ensemble
@@ -29,6 +33,7 @@ from inference.posterior.sampling.verdict import Chains, Verdict, chains_of
 __all__ = [
     "MOST_STEPS",
     "Drawing",
+    "Outset",
     "Selecting",
     "Settled",
     "Stage",
@@ -38,6 +43,8 @@ __all__ = [
     "Weighted",
     "optima_of",
 ]
+
+Array = NDArray[np.float64]
 
 MOST_STEPS = 20_000
 _COMPARED = 40_000  # draws at most, whose density is compared with that of the proposal
@@ -177,6 +184,9 @@ class Walking:
     weighted : WeightedDraws or None
         Importance draws that the ensembles started from, and are held to; None where there are
         none to be trusted.
+    start : float or None
+        Their effective size, where they could be the answer and all walkers but those of the last
+        ensemble began at them: such walkers need not forget where they began.
     """
 
     proposal: Proposal
@@ -186,6 +196,7 @@ class Walking:
     ess: float | None = None
     r_hat: float | None = None
     weighted: WeightedDraws | None = None
+    start: float | None = None
 
     @property
     def steps(self) -> int:
@@ -199,7 +210,9 @@ class Walking:
 
     def chains(self, names: tuple[str, ...]) -> Chains:
         """Return the kept draws of all ensembles; `names` are those of the parameters."""
-        kept = chains_of(self.ensembles, self.proposal.optima.nearest, names)
+        kept = chains_of(self.ensembles, self.proposal.optima.nearest, names, self.start)
+        if self.start is not None:
+            return kept  # where they stay is of no account
         ensembles, walkers, steps, d = kept.z.shape
         some = slice(min(walkers, max(_COMPARED // (ensembles * max(steps, 1)), 1)))
         proposed = self.proposal.log_density(kept.z[:, some].reshape(-1, d))
@@ -223,6 +236,22 @@ class Walking:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class Outset:
+    """From where ensembles walk behind weighted draws.
+
+    Attributes
+    ----------
+    proposal : Proposal
+        Of their jumps.
+    others : ndarray, shape (n, d)
+        Points that came from the prior and know nothing of the draws: where the last one begins.
+    """
+
+    proposal: Proposal
+    others: Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Weighted:
     """Importance sampling was done.
 
@@ -234,14 +263,19 @@ class Weighted:
         Draws with their weights.
     verdict : Verdict
         On them.
+    outset : Outset or None
+        Of ensembles that are to walk from them; None where they are the answer.
     """
 
     optima: Mixture
     draws: WeightedDraws
     verdict: Verdict
+    outset: Outset | None = None
 
     def progress(self, _: int) -> Progress:
         """Tell how far this is."""
+        if self.outset is not None:
+            return Progress("sampling", 0, None, self.draws.worth, None, False)
         count = len(self.draws.z)
         return Progress("summarising", count, count, self.draws.worth, None, True)
 

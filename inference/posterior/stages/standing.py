@@ -37,6 +37,9 @@ def standing(stage: Drawing) -> Drawing:
         `Weighted` where nothing was drawn yet and weighted draws can be trusted; otherwise the
         stage, with a verdict that says what is wanting.
     """
+    if isinstance(stage, Weighted) and stage.outset is not None:  # ensembles are still to walk
+        pending = Verdict(False, ("no steps were made",))
+        stage = Tempering(stage.outset.proposal, (), pending, stage.draws)
     if not isinstance(stage, Tempering | Walking):
         return stage
     if isinstance(stage, Walking) and stage.steps >= _LEAST_STEPS:

@@ -18,7 +18,12 @@ from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.sampling.warm import beyond, warm_start
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.chunk import evaluations
-from inference.posterior.stages.ensembles import POPULATIONS, from_weighted
+from inference.posterior.stages.ensembles import (
+    POPULATIONS,
+    answer_of,
+    are_told,
+    from_weighted,
+)
 from inference.posterior.stages.looking import (
     Looked,
     LookTask,
@@ -193,13 +198,15 @@ def _first_stage(
         known = None if warm.contradicted else warm.draws
         stage = from_scouts(job, density, proposal, scouts, known)
         return stage or Tempering(proposal, (None,) * POPULATIONS, pending, known), calls
-    drawn, may_answer = warm.draws, job.settings.method == "auto" and not _has_too_many(density)
+    drawn, may_answer = warm.draws, not _has_too_many(density)
     if may_answer:
         drawn, used = _weighted_draws(density, warm.proposal, job)
         calls += used
-    contradicted = beyond(density, warm.proposal, drawn, scouts.hot) >= TOLERATED
-    if may_answer and _enough(drawn, job) and not contradicted:
-        return Weighted(proposal.optima, drawn.that_count, Verdict(True, ())), calls
+    # walkers are held to the fewer draws: they are to find what more of these weigh too coarsely
+    held_to = drawn if job.settings.method == "auto" else warm.draws
+    contradicted = beyond(density, warm.proposal, held_to, scouts.hot) >= TOLERATED
+    if may_answer and _enough(drawn, job) and not contradicted and are_told(job, drawn):
+        return answer_of(job, warm.proposal, drawn.that_count, scouts.z), calls
     # walkers, too, would hardly ever jump to where no weight leads
     if contradicted and (stage := from_scouts(job, density, warm.proposal, scouts, warm.draws)):
         return stage, calls

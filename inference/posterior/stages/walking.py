@@ -19,7 +19,7 @@ from inference.posterior.sampling.proposal import Proposal
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.sampling.verdict import Chains, Verdict, judge
 from inference.posterior.sampling.warm import MAP_SHARE
-from inference.posterior.stages.chunk import steps_from
+from inference.posterior.stages.chunk import Began, steps_from
 from inference.posterior.stages.ensembles import POPULATIONS
 from inference.posterior.stages.stage import Tempering, Walking
 
@@ -28,6 +28,7 @@ __all__ = ["WalkTask", "is_slow", "merge", "tasks"]
 # steps of autocorrelation above which the proposal is adapted: as often as there are entries
 _SLOW = (10.0, 10.0, 40.0)
 _PILOT_DRAWS = 10_000
+_SHORT_WALK = 400  # steps in which walkers that began at draws agree, or never do
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -58,8 +59,10 @@ def tasks(job: Job, stage: Walking) -> tuple[WalkTask, ...]:
     """Return the steps of every ensemble; none where more would serve nothing."""
     if stage.finished:
         return ()
-    warm, walkers = stage.weighted is not None, stage.ensembles[0].walkers
-    steps = steps_from(job, stage.steps, walkers, warm)
+    began: Began = "cold" if stage.weighted is None else "warm"
+    if stage.start is not None:
+        began = "at draws"
+    steps = steps_from(job, stage.steps, stage.ensembles[0].walkers, began)
     return tuple(WalkTask(job, stage.proposal, ensemble, steps) for ensemble in stage.ensembles)
 
 
@@ -85,10 +88,14 @@ def merge(
 
 
 def _judged(job: Job, stage: Walking, kept: Chains) -> Tempering | Walking:
-    if is_slow(kept, stage.adaptations):
+    if stage.start is not None and stage.steps >= _SHORT_WALK:
+        # what they began at is doubted: they go on as if from elsewhere
+        stage = dataclasses.replace(stage, start=None)
+        kept = stage.chains(job.density().parameters.names)
+    if stage.start is None and is_slow(kept, stage.adaptations):
         return _adapted(job, stage, kept)
     columns = np.moveaxis(kept.z, -1, 0)
-    least = min(effective_sample_size(draws) for draws in columns)
+    least = min(effective_sample_size(draws, stage.start) for draws in columns)
     worst = max(split_r_hat(draws) for draws in columns)
     return dataclasses.replace(
         stage,
