@@ -27,10 +27,12 @@ SEED = 1
 
 
 @functools.cache
-def _job(method: str) -> fold.Job:
+def _job(method: str, target_ess: int = 400) -> fold.Job:
     """Crosstalk and a wall that both are unknown: the readings tell their sum alone."""
     data = draw_path("log-spaced", "both", "nothing", SEED)
-    settings = SamplerSettings.model_validate({"seed": SEED, "method": method})
+    settings = SamplerSettings.model_validate(
+        {"seed": SEED, "method": method, "target_ess": target_ess}
+    )
     return fold.prepare(data.sensor, parse_scene(data.scene), data.frames, settings)
 
 
@@ -48,9 +50,9 @@ def _carried() -> Checkpoint:
     return checkpoint
 
 
-def _after(method: str) -> Checkpoint:
+def _after(method: str, target_ess: int = 400) -> Checkpoint:
     """Return what rounds lead to, in however many chunks."""
-    return _led_to(_job(method), _carried())
+    return _led_to(_job(method, target_ess), _carried())
 
 
 def _led_to(job: fold.Job, checkpoint: Checkpoint) -> Checkpoint:
@@ -90,8 +92,13 @@ def test_rounds_from_there_answer_at_a_fraction_of_the_cost() -> None:
 
 def test_ensembles_start_from_their_draws() -> None:
     stage = _after("emcee").stage
+    assert isinstance(stage, Weighted)
+    assert stage.outset is not None
+    # more is asked than these draws are worth: they are where a long walk begins
+    stage = _after("emcee", 20_000).stage
     assert isinstance(stage, Walking)
     assert stage.weighted is not None
+    assert stage.start is None
     assert stage.adaptations == 2
 
 

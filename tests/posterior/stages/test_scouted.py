@@ -25,9 +25,11 @@ SD = np.array([0.4555, 0.3724, 0.0645, 0.2634, 0.0458])
 ESS = 7800
 
 
-def _job(method: str = "auto") -> fold.Job:
+def _job(method: str = "auto", target_ess: int = 400) -> fold.Job:
     sensor, scene, simulation = _case("sine_wave", "object, crosstalk", 10.0, SEED)
-    settings = SamplerSettings.model_validate({"seed": SEED, "method": method})
+    settings = SamplerSettings.model_validate(
+        {"seed": SEED, "method": method, "target_ess": target_ess}
+    )
     return fold.prepare(sensor, scene, simulation.frames, settings)
 
 
@@ -47,9 +49,9 @@ def _rounds(*_: Any) -> Rounds:
     return in_rounds(job.density(), stage.proposal, populations, rng, wanted)
 
 
-def _after(method: str, monkeypatch: pytest.MonkeyPatch) -> Any:
+def _after(method: str, monkeypatch: pytest.MonkeyPatch, target_ess: int = 400) -> Any:
     plant_rounds(monkeypatch, lambda *_: _rounds())
-    job = _job(method)
+    job = _job(method, target_ess)
     (task,) = fold.tasks(job, _started())
     return fold.merge(job, _started(), [fold.run(task)]).stage
 
@@ -93,8 +95,14 @@ def test_rounds_that_begin_at_these_points_answer(monkeypatch: pytest.MonkeyPatc
 
 def test_ensembles_start_from_their_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     stage = _after("emcee", monkeypatch)
+    assert isinstance(stage, Weighted)
+    assert stage.outset is not None
+    assert stage.draws is _rounds().draws
+    # more is asked than these draws are worth: they are where a long walk begins
+    stage = _after("emcee", monkeypatch, 20_000)
     assert isinstance(stage, Walking)
     assert stage.weighted is _rounds().draws
+    assert stage.start is None
     assert stage.adaptations > 0  # what jumps propose from was held to the draws
     # the first chunk is what the easiest posterior takes: 50 times of a little more than one step
     assert {task.steps for task in walking.tasks(_job("emcee"), stage)} == {90}

@@ -15,6 +15,7 @@ from inference.posterior.sampling.rounds_so_far import RoundsSoFar, Wanted
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages import walking
+from inference.posterior.stages.ensembles import from_draws
 from inference.posterior.stages.stage import Starting, Tempering, Walking, Weighted
 from inference.posterior.stages.standing import _weighted, standing
 from inference.posterior.stages.starting import begin
@@ -29,7 +30,7 @@ def test_stopped_before_the_first_chunk_the_weighted_draws_answer() -> None:
     settings = SamplerSettings(method="emcee", seed=7)
     job = fold.prepare(*example("pulsed", crosstalk=False), settings)
     checkpoint = begin(job, Starting())
-    assert isinstance(checkpoint.stage, Walking)
+    assert isinstance(checkpoint.stage, Weighted)
     assert isinstance(standing(checkpoint.stage), Weighted)
     first = fold.summarise(job, checkpoint, 0.0, 0.0)
     while pieces := [fold.run(task) for task in fold.tasks(job, checkpoint)]:
@@ -52,11 +53,13 @@ def test_weighted_draws_stand_while_a_proposal_is_adapted(monkeypatch: pytest.Mo
     """What was walked is forgotten then; that there was an answer is not."""
     settings = SamplerSettings(method="emcee", seed=7)
     job = fold.prepare(*example("pulsed", crosstalk=False), settings)
-    stage = begin(job, Starting()).stage
-    assert isinstance(stage, Walking)
+    drawn = begin(job, Starting()).stage
+    assert isinstance(drawn, Weighted)
+    assert drawn.outset is not None
+    stage = from_draws(job, job.density(), drawn.draws, drawn.outset)[0]
     assert stage.weighted is not None
     monkeypatch.setattr(walking, "is_slow", lambda *_: True)
-    adapted = dataclasses.replace(stage, adaptations=2)
+    adapted = dataclasses.replace(stage, adaptations=2, start=None)
     pieces = [task.run() for task in walking.tasks(job, adapted)]
     after, _ = walking.merge(job, adapted, pieces)
     assert isinstance(after, Walking)
