@@ -29,6 +29,7 @@ __all__ = [
     "at",
     "class_row",
     "draw",
+    "settings_of",
     "surface",
     "told",
 ]
@@ -53,7 +54,12 @@ SHADOW: Mapping[str, Any] = {
     "c1": {"prior": "normal", "mean": 0.0, "sd": 0.5},
 }
 # what the scene says of the model's error; of the ranges it says nothing
-TERMS: Mapping[str, Mapping[str, Any]] = {"default": {}, "exact": {"discrepancy": 0}}
+_WALKED = "walked"  # nothing is stated of the method either, which is then `emcee`
+TERMS: Mapping[str, Mapping[str, Any]] = {
+    "default": {},
+    "exact": {"discrepancy": 0},
+    _WALKED: {},
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -205,9 +211,15 @@ def told(data: DataSet, term: str) -> dict[str, Any]:
     return {**data.terms, **TERMS[term]}
 
 
+def settings_of(term: str, number: int) -> SamplerSettings:
+    """Return how a data set is sampled: by `auto`, but where no method is stated."""
+    if term == _WALKED:
+        return SamplerSettings(seed=number)
+    return SamplerSettings(method="auto", seed=number)
+
+
 def class_row(group: SceneClass, term: str, number: int, version: str = "") -> Row:
     """Draw a data set and hold its posterior's intervals to the truth."""
     data = draw(group, number)
-    settings = SamplerSettings(method="auto", seed=number)
-    scene = told(data, term)
+    settings, scene = settings_of(term, number), told(data, term)
     return interval_row(data.name, data.sensor, scene, data.frames, data.range_m, settings, version)

@@ -11,8 +11,12 @@ from benchmarks.coverage.report import GOAL, Coverage
 
 __all__ = ["draw"]
 
-_COLOURS = {"exact": "tab:red", "default": "tab:blue"}
-_LABELS = {"exact": "model taken for exact", "default": "nothing stated"}
+_COLOURS = {"exact": "tab:red", "default": "tab:blue", "walked": "tab:green"}
+_LABELS = {
+    "exact": "model taken for exact",
+    "default": "nothing stated",
+    "walked": "nothing stated, by walkers",
+}
 
 
 def draw(found: Sequence[Coverage], path: Path) -> None:

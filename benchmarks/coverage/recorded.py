@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.coverage.classes import TERMS
+from benchmarks.coverage.classes import TERMS, settings_of
 from benchmarks.coverage.intervals import interval_row
 from benchmarks.resumable import Row
-from inference.posterior.settings import SamplerSettings
 from service.adapters.histograms import pulsed, sine_wave
 from simulator.frames import Frames
 from simulator.scene import parse_scene
@@ -70,8 +69,7 @@ def recorded_row(term: str, number: int, version: str = "") -> Row:
     """Infer the ranges of a cell; intervals are those of the frames with an object."""
     cell = CELLS[number]
     sensor, scene, frames, truth = recorded_frames(cell, number)
-    settings = SamplerSettings(method="auto", seed=number)
-    told = {**scene, **TERMS[term]}
+    settings, told = settings_of(term, number), {**scene, **TERMS[term]}
     return interval_row(cell.name, sensor, told, frames, truth, settings, version)
 
 

@@ -1,6 +1,7 @@
 """What each way to a range says of a random set, as a row of a table."""
 
 import dataclasses
+import functools
 import time
 from collections.abc import Callable, Mapping
 
@@ -139,8 +140,10 @@ def _tracked(data: PathSet, number: int, seconds: float, held: Held) -> Row:  # 
     return {"flags": f"misfit in {int(found.misfit.sum())}" if found.misfit.any() else ""}
 
 
-def _inferred(data: PathSet, number: int, seconds: float, held: Held) -> Row:
-    settings = SamplerSettings(method="auto", seed=number, max_seconds=seconds)
+def _inferred(method: str, data: PathSet, number: int, seconds: float, held: Held) -> Row:
+    settings = SamplerSettings.model_validate(
+        {"method": method, "seed": number, "max_seconds": seconds}
+    )
     asked = int(np.isfinite(data.range_m).sum())
     try:
         found = posterior_of(data, settings)
@@ -167,7 +170,8 @@ WAYS: Mapping[str, Callable[[PathSet, int, float, Held], Row]] = {
     "estimate": _at_once,
     "fits": _by_fits,
     "tracker": _tracked,
-    "posterior": _inferred,
+    "posterior": functools.partial(_inferred, "auto"),
+    "walked": functools.partial(_inferred, "emcee"),
 }
 
 
@@ -177,7 +181,8 @@ def answer_row(way: str, seed: int, seconds: float, number: int, version: str = 
     Parameters
     ----------
     way : str
-        Of `WAYS`: every technique of single frames; every fit; the tracker; a posterior.
+        Of `WAYS`: every technique of single frames; every fit; the tracker; a posterior by `auto`;
+        one by `emcee`, as it is where no method is stated.
     seed, number : int
         As for `random_set`.
     seconds : float

@@ -15,9 +15,10 @@ class SamplerSettings(Validated):
     Attributes
     ----------
     method : "emcee", "importance" or "auto"
-        Ensembles of walkers; Laplace with Student-t importance sampling, refused above a Pareto
-        k-hat of 0.5; or importance sampling where its weights, and points that came from the
-        prior, say that it is good enough, ensembles otherwise.
+        Ensembles of walkers, which begin at weighted draws where these could be the answer;
+        Laplace with Student-t importance sampling, refused above a Pareto k-hat of 0.5; or such
+        weighted draws themselves, where their weights, and points that came from the prior, say
+        that they are good enough, ensembles otherwise.
     ensembles : int
         Independent ensembles; fewer than four cannot show much disagreement.
     target_ess : int

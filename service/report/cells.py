@@ -134,7 +134,7 @@ def cells_of(scene: ReportScene, effort: Effort) -> Iterator[Cell]:
             yield Cell(scene, "fit", name, frames, 1, effort.sets, seconds)
 
     def sampled(family: str, frames: int, draws: int, sets: int) -> Cell:
-        each = (1.0 + frames / 20 + draws / 1600) * (10 if hard and family == "emcee" else 1)
+        each = (1.0 + frames / 20 + draws / 1600) * (3 if hard and family == "emcee" else 1)
         seconds = sets * each * (0.5 if family == "importance" else 1.0)
         return Cell(scene, family, "", frames, draws, sets, seconds)
 
