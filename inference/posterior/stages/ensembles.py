@@ -22,14 +22,23 @@ from inference.posterior.stages.stage import Outset, Walking, Weighted
 from inference.posterior.streams import Stream
 from simulator.errors import RefusedError
 
-__all__ = ["POPULATIONS", "answer_of", "are_told", "from_draws", "from_weighted", "new_ensembles"]
+__all__ = [
+    "POPULATIONS",
+    "answer_of",
+    "are_told",
+    "from_draws",
+    "from_weighted",
+    "new_ensembles",
+    "worth_wanted",
+]
 
 Array = NDArray[np.float64]
 
 POPULATIONS = 2  # independent of one another, so that they can disagree
 _TRIES = 50  # draws of as many points as there are walkers
 _ON_THE_WAY = 20  # steps: a walker where next to nothing is takes the first jump that leads away
-_IN_A_MODE = 10  # walkers that are to begin in each mode: its share is then told to a third
+_WALKED_FROM = 400  # effective size of the draws that walkers begin at
+_IN_A_MODE = 4  # walkers that are to begin in each mode
 _HEAVY = 1e-3  # of the largest weight: draws that carry less are no modes
 _MANY_WALKERS = 64  # of an ensemble that begins at draws of the posterior, each a draw of its own
 
@@ -98,6 +107,15 @@ def from_weighted(
     starts = tuple(draws.z[order[k::count]] for k in range(count))
     seeds = job.seeds(Stream.ENSEMBLES)
     return new_ensembles(density, proposal, (*starts, others), seeds, walkers)
+
+
+def worth_wanted(job: Job) -> int:
+    """Return the effective size that weighted draws are to have: what is asked of the answer.
+
+    Walkers that begin at them make the rest themselves, as an error of the draws is forgotten.
+    """
+    target = job.settings.target_ess
+    return min(target, _WALKED_FROM) if job.settings.method == "emcee" else target
 
 
 def are_told(job: Job, draws: WeightedDraws) -> bool:

@@ -28,6 +28,7 @@ from inference.posterior.stages.ensembles import (
     are_told,
     from_weighted,
     new_ensembles,
+    worth_wanted,
 )
 from inference.posterior.stages.stage import Tempering, Walking, Weighted
 from inference.posterior.stages.standing import best_known
@@ -179,7 +180,7 @@ def _led_to(job: Job, stage: Tempering, reached: RoundsSoFar | Rounds) -> Checkp
 
 def _wanted(job: Job, stage: Tempering, members: Sequence[Population]) -> Wanted:
     """Return what rounds are to come to: populations that stop on their way are held to more."""
-    target = job.settings.target_ess
+    target = worth_wanted(job)
     if stage.early:
         most = SCOUTED_DRAWS if stage.scouted else HALFWAY_DRAWS
         return Wanted(target, most, TOLERATED, 0.0)
@@ -191,19 +192,18 @@ def _set_out(
     job: Job, stage: Tempering, members: list[Population], found: Rounds
 ) -> tuple[Tempering | Weighted | Walking, int]:
     """Answer by the draws of rounds; set up ensembles, or begin again, where they fail."""
-    auto = job.settings.method == "auto"
-    enough = found.trusted and found.draws.worth >= job.settings.target_ess
+    enough = found.trusted and found.draws.worth >= worth_wanted(job)
     if enough and are_told(job, found.draws):
         return answer_of(job, found.proposal, found.draws, members[0].z), found.calls
     if not stage.early:
         walking = walking_from(job, stage, members, found)
-    elif _may_try_again(stage, found) and (auto or not found.trusted):
-        # in a chunk of its own: a job may be out of time by now
-        return dataclasses.replace(stage, weighted=found.draws, tried=True), found.calls
-    elif found.trusted and not auto:
+    elif enough:
         density, others = job.density(), members[0].z
         ensembles = from_weighted(job, density, found.proposal, found.draws, others)
         walking = Walking(found.proposal, ensembles, stage.verdict, 2, weighted=found.draws)
+    elif _may_try_again(stage, found):
+        # in a chunk of its own: a job may be out of time by now
+        return dataclasses.replace(stage, weighted=found.draws, tried=True), found.calls
     else:
         # until larger populations are on their way an answer is made of what there is
         if found.dissent < TOLERATED:

@@ -23,6 +23,7 @@ from inference.posterior.stages.ensembles import (
     answer_of,
     are_told,
     from_weighted,
+    worth_wanted,
 )
 from inference.posterior.stages.looking import (
     Looked,
@@ -230,7 +231,7 @@ def _has_too_many(density: CollapsedDensity) -> bool:
 
 
 def _enough(weighted: WeightedDraws, job: Job) -> bool:
-    return weighted.k_hat < MAX_K_HAT and weighted.worth >= job.settings.target_ess
+    return weighted.k_hat < MAX_K_HAT and weighted.worth >= worth_wanted(job)
 
 
 def _importance(density: CollapsedDensity, proposal: Proposal, job: Job) -> tuple[Weighted, int]:
@@ -258,7 +259,7 @@ def _weighted_draws(
     density: CollapsedDensity, proposal: Proposal, job: Job
 ) -> tuple[WeightedDraws, int]:
     """Draw until the effective sample size is reached, if that is in sight."""
-    target = job.settings.target_ess
+    target = worth_wanted(job)
     most = min(_MOST_IMPORTANCE_DRAWS, _MOST_IMPORTANCE_FRAMES // len(density.frames))
     count = min(max(_IMPORTANCE_DRAWS, 2 * target), most)
     weighted = draw_weighted(density, proposal, job.stream(Stream.IMPORTANCE), count)

@@ -115,9 +115,9 @@ def _two_modes(share: float) -> WeightedDraws:
     return WeightedDraws(z, np.zeros(2000), weights, 0.1, 0.0)
 
 
-@pytest.mark.parametrize(("share", "told"), [(0.3, True), (0.06, True), (0.04, False)])
+@pytest.mark.parametrize(("share", "told"), [(0.3, True), (0.03, True), (0.01, False)])
 def test_of_a_mode_with_few_walkers_too_little_would_be_told(share: float, told: bool) -> None:
-    """Of 192 walkers that begin at draws ten are to begin in each mode."""
+    """Of 192 walkers that begin at draws four are to begin in each mode."""
     assert are_told(_job(), _two_modes(share)) is told
     assert are_told(_job("auto"), _two_modes(share))
 
