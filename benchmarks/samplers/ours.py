@@ -40,7 +40,7 @@ def ours(job: Job, cap: float) -> tuple[Outcome, fold.Checkpoint]:
         empty = np.empty((0, len(job.density().parameters)))
         return Outcome(seconds, False, 0.0, math.inf, empty, np.empty(0), note), checkpoint
     kept = stage.chains(job.density().parameters.names).z
-    ess, r_hat = judged(kept)
+    ess, r_hat = judged(kept, stage.start)
     return Outcome(
         seconds, posterior.verdict.converged, ess, r_hat, *equal(kept), note=note
     ), checkpoint

@@ -26,10 +26,13 @@ class Outcome:
     note: str = ""
 
 
-def judged(z: Array) -> tuple[float, float]:
-    """Least effective sample size and largest R-hat of (chains, walkers, steps, d)."""
+def judged(z: Array, start: float | None = None) -> tuple[float, float]:
+    """Least effective sample size and largest R-hat of (chains, walkers, steps, d).
+
+    `start` is that of walkers which began at draws of the posterior.
+    """
     columns = np.moveaxis(z, -1, 0)
-    sizes = [effective_sample_size(x) for x in columns]
+    sizes = [effective_sample_size(x, start) for x in columns]
     return float(np.nan_to_num(min(sizes))), float(max(split_r_hat(x) for x in columns))
 
 

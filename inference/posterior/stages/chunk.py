@@ -15,7 +15,7 @@ _CHUNK_S = 0.33  # half of the longest chunk
 _EVALUATION_S = 2.5e-6  # a frame under one parameter vector, for sizing chunks only
 _WITH_DISCREPANCY = 10.0  # times as long, where the flux's error is integrated out
 _EASIEST = 90  # steps: 50 times of a little more than one, and a burn-in of a fifth
-_FIRST: Mapping[Began, int] = {"at draws": 24, "warm": _EASIEST, "cold": 2 * _EASIEST}
+_FIRST: Mapping[Began, int] = {"at draws": 12, "warm": _EASIEST, "cold": 2 * _EASIEST}
 _GROWTH = 0.25
 _DRAW_S = 2e-4  # of rounds, beside its evaluation: maps are fitted, and other laws are asked
 _PARTS = 2  # of a step of rounds that takes long: more would each fit its maps anew
@@ -59,4 +59,5 @@ def steps_from(job: Job, done: int, walkers: int, began: Began) -> int:
     first = _FIRST[began]
     wanted = first if done == 0 else _GROWTH * done
     most = 2 * _CHUNK_S / step_s
-    return int(min(max(min(wanted, most), 20), 500, MOST_STEPS - done))
+    least = min(first, 20)
+    return int(min(max(min(wanted, most), least), 500, MOST_STEPS - done))

@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 
 POPULATIONS = 2  # independent of one another, so that they can disagree
 _TRIES = 50  # draws of as many points as there are walkers
-_ON_THE_WAY = 20  # steps: a walker where next to nothing is takes the first jump that leads away
+_ON_THE_WAY = 12  # steps: a walker where next to nothing is takes the first jump that leads away
 _WALKED_FROM = 400  # effective size of the draws that walkers begin at
 _IN_A_MODE = 4  # walkers that are to begin in each mode
 _HEAVY = 1e-3  # of the largest weight: draws that carry less are no modes
