@@ -12,13 +12,12 @@ Between chunks a checkpoint may be stored and read again: the result is the same
 
 Where weighted draws from the Laplace shapes at the optima, or from maps fitted to them, are even
 and points from the prior do not contradict them, they are the answer with the method `auto`. Where
-not, rounds of weighted draws follow from the points from
-the prior, and where these do not do from populations that are carried from the prior to the
-posterior. Such draws are the answer with `auto`, where the points or populations agree with them;
-otherwise ensembles walk in the last map's coordinates. Where linear response to the model's errors
-bends around such draws, rounds follow from where it moves them, with the errors integrated out.
-With `emcee` many walkers make some steps from what `auto` would answer with.
-What each stage does is in `inference.posterior.stages`.
+not, rounds of weighted draws follow from the points from the prior, and where these do not do from
+populations that are carried from the prior to the posterior. Such draws are the answer with `auto`,
+where the points or populations agree with them; otherwise ensembles walk in the last map's
+coordinates. Where linear response to the model's errors bends around such draws, rounds follow from
+where it moves them, with the errors integrated out. With `emcee` many walkers make some steps from
+what `auto` would answer with. What each stage does is in `inference.posterior.stages`.
 """
 
 import dataclasses

@@ -99,7 +99,8 @@ def _of_short_walks(draws: Array, variance: float, start: float) -> float:
     """
     means, first = draws.mean(axis=2).ravel(), draws[:, :, 0].ravel()
     spread = float(first.var())
-    left = 0.0 if spread == 0 else float(np.mean((first - first.mean()) * means)) / spread
+    common = float(np.mean((first - first.mean()) * (means - means.mean())))
+    left = common / spread if spread > 0 else 0.0
     square = float(means.var(ddof=1)) / means.size + left**2 * variance / start
     if not variance > 0 or not square > 0:
         return math.nan

@@ -136,7 +136,9 @@ def are_told(job: Job, draws: WeightedDraws) -> bool:
     return True
 
 
-def answer_of(job: Job, proposal: Proposal, draws: WeightedDraws, others: Array) -> Weighted:
+def answer_of(
+    job: Job, proposal: Proposal, draws: WeightedDraws, others: Array, adaptations: int
+) -> Weighted:
     """Return weighted draws that could be the answer; with `emcee`, from where ensembles walk.
 
     Parameters
@@ -145,8 +147,10 @@ def answer_of(job: Job, proposal: Proposal, draws: WeightedDraws, others: Array)
         Trusted, and worth what was asked for.
     others : ndarray, shape (n, d)
         Points that came from the prior and know nothing of them.
+    adaptations : int
+        0 where no populations were called for so far.
     """
-    outset = Outset(proposal, others) if job.settings.method == "emcee" else None
+    outset = Outset(proposal, others, adaptations) if job.settings.method == "emcee" else None
     return Weighted(proposal.optima, draws, Verdict(True, ()), outset)
 
 
@@ -178,5 +182,7 @@ def from_draws(
     other = advance(density, proposal, other, _ON_THE_WAY, aliases_of(density))
     pending = Verdict(False, ("no steps were made",))
     ensembles = (*own, restart(other, proposal, proposal))
-    stage = Walking(proposal, ensembles, pending, 0, weighted=draws, start=draws.worth)
+    stage = Walking(
+        proposal, ensembles, pending, outset.adaptations, weighted=draws, start=draws.worth
+    )
     return stage, walkers * (1 + _ON_THE_WAY)

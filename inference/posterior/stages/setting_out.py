@@ -52,6 +52,7 @@ _SHARE = 0.5  # of what the populations took, that importance sampling behind th
 _MOST_DRAWS = (12_000, 40_000)  # but so many at least, and at most
 SCOUTED_DRAWS = 20_000  # that rounds from scouts may take: as many as carry one population
 HALFWAY_DRAWS = 40_000  # and those from small populations, twice: as many as carry these
+_FITTED = 2  # adaptations of a law that was held to weighted draws
 _LEADING = 50.0  # effective size of draws, from which on rounds may begin again at them
 _ERRING = 4  # number of the streams of rounds with errors of the model integrated out, the first
 TOLERATED = 0.01  # of what scouts met on their way from the prior, beyond every weight
@@ -194,13 +195,14 @@ def _set_out(
     """Answer by the draws of rounds; set up ensembles, or begin again, where they fail."""
     enough = found.trusted and found.draws.worth >= worth_wanted(job)
     if enough and are_told(job, found.draws):
-        return answer_of(job, found.proposal, found.draws, members[0].z), found.calls
+        others = members[0].z
+        return answer_of(job, found.proposal, found.draws, others, _FITTED), found.calls
     if not stage.early:
         walking = walking_from(job, stage, members, found)
     elif enough:
         density, others = job.density(), members[0].z
         ensembles = from_weighted(job, density, found.proposal, found.draws, others)
-        walking = Walking(found.proposal, ensembles, stage.verdict, 2, weighted=found.draws)
+        walking = Walking(found.proposal, ensembles, stage.verdict, _FITTED, weighted=found.draws)
     elif _may_try_again(stage, found):
         # in a chunk of its own: a job may be out of time by now
         return dataclasses.replace(stage, weighted=found.draws, tried=True), found.calls
@@ -255,5 +257,5 @@ def walking_from(
     ensembles = new_ensembles(density, proposal, tuple(starts), seeds, walkers)
     weighted = found.draws if found is not None and trusted else None
     # a law that was held to weighted draws is left for one fitted to walkers only where these stay
-    adaptations = 2 if trusted else 1
+    adaptations = _FITTED if trusted else 1
     return Walking(proposal, ensembles, stage.verdict, adaptations, weighted=weighted)

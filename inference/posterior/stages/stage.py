@@ -245,10 +245,13 @@ class Outset:
         Of their jumps.
     others : ndarray, shape (n, d)
         Points that came from the prior and know nothing of the draws: where the last one begins.
+    adaptations : int
+        As of `Walking`.
     """
 
     proposal: Proposal
     others: Array
+    adaptations: int
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -207,7 +207,7 @@ def _first_stage(
     held_to = drawn if job.settings.method == "auto" else warm.draws
     contradicted = beyond(density, warm.proposal, held_to, scouts.hot) >= TOLERATED
     if may_answer and _enough(drawn, job) and not contradicted and are_told(job, drawn):
-        return answer_of(job, warm.proposal, drawn.that_count, scouts.z), calls
+        return answer_of(job, warm.proposal, drawn.that_count, scouts.z, 0), calls
     # walkers, too, would hardly ever jump to where no weight leads
     if contradicted and (stage := from_scouts(job, density, warm.proposal, scouts, warm.draws)):
         return stage, calls

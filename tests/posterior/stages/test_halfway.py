@@ -92,6 +92,7 @@ def test_ensembles_start_from_their_draws(monkeypatch: pytest.MonkeyPatch) -> No
     stage = _after("emcee").stage
     assert isinstance(stage, Weighted)
     assert stage.outset is not None
+    assert stage.outset.adaptations == 2
     # a mode that hardly any walker would begin in: they are where a long walk begins
     monkeypatch.setattr(setting_out, "are_told", lambda *_: False)
     stage = _after("emcee").stage

@@ -134,6 +134,9 @@ def test_walkers_that_never_agree_go_on_as_if_from_elsewhere(
     assert after.start is None
     assert not after.verdict.converged
     assert "autocorrelation times" in " ".join(after.verdict.reasons)
+    assert after.adaptations == 0  # populations may be called for
+    behind = dataclasses.replace(_outset(), adaptations=2)  # and behind populations not again
+    assert from_draws(job, job.density(), _drawn().draws, behind)[0].adaptations == 2
     monkeypatch.undo()
     after, _ = walking.merge(job, stage, pieces)
     assert isinstance(after, Walking)
