@@ -24,9 +24,9 @@ def _walk(rng: np.random.Generator, memory: float, pool: int) -> np.ndarray:
 @pytest.mark.parametrize("memory", [0.0, 0.5, 0.9, 0.99, 0.9999])
 @pytest.mark.parametrize("pool", [300, 1_000_000])
 def test_means_err_as_the_size_says(memory: float, pool: int) -> None:
-    """However long walkers stay: autocorrelation over twenty steps would say it ten times too
-    large. The mean of 400 squares has a standard error of 0.07: bands of 4.5 of them, a false
-    alarm once in 1e5 of each of ten."""
+    """However long walkers stay: autocorrelation of the ensembles' means says 0.4 to 10 times as
+    much. The mean of 400 squares has a standard error of 0.07: bands of 4.5 of them, a false alarm
+    once in 1e5 of each of ten."""
     rng = np.random.default_rng(7)
     squares, sizes = [], []
     for _ in range(RUNS):
