@@ -67,7 +67,7 @@ def test_walkers_end_where_the_draws_are() -> None:
 
 
 def test_response_to_errors_is_looked_at_before_any_walks() -> None:
-    checkpoint = dataclasses.replace(begin(_job(), Starting()), calls=0)
+    checkpoint = begin(_job(), Starting())
     (task,) = fold.tasks(_job(), checkpoint)
     assert not isinstance(task, WalkOnTask)
     checkpoint = fold.merge(_job(), checkpoint, [fold.run(task)])
@@ -88,7 +88,6 @@ def test_as_many_walkers_begin_at_a_draw_as_its_weight_says() -> None:
     assert np.abs(began - draws.z[near]).max() < 1e-8
     counts = np.bincount(near, minlength=len(draws.z))
     assert np.abs(counts - len(began) * draws.weights / draws.weights.sum()).max() < 1.0
-    # dealt out by chance: no ensemble has the draws of one stretch
     assert stage.start == draws.worth
 
 
