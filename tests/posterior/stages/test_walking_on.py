@@ -76,7 +76,7 @@ def test_response_to_errors_is_looked_at_before_any_walks() -> None:
     assert isinstance(task, WalkOnTask)
     checkpoint = fold.merge(_job(), checkpoint, [fold.run(task)])
     assert isinstance(checkpoint.stage, Walking)
-    # and is not looked at again
+    assert checkpoint.linear  # and is not looked at again, when they have walked
     assert all(isinstance(task, walking.WalkTask) for task in fold.tasks(_job(), checkpoint))
     assert not any(isinstance(task, WalkOnTask) for task in fold.tasks(_job("auto"), checkpoint))
 
