@@ -10,6 +10,7 @@ from inference.posterior.answer.posterior import ParameterMode, ParameterSummary
 from inference.posterior.answer.quantiles import quantiles, weighted_quantiles
 from inference.posterior.answer.separation import boundaries, labels
 from inference.posterior.answer.shares import share_error, weighted_share_error
+from inference.posterior.sampling.by_weight import heavy
 from inference.posterior.sampling.diagnostics import (
     effective_sample_size,
     split_r_hat,
@@ -107,12 +108,11 @@ def summaries_of_weights(
     dict of str to ParameterSummary
         R-hat is None; effective sample sizes are those of weighted draws.
     """
-    # draws that carry next to nothing are no modes
-    heavy = weights > 1e-3 * weights.max(initial=0.0)
+    carry = heavy(weights)
     result = {}
     for j, name in enumerate(names):
         column = x[:, j]
-        cuts = boundaries(column[heavy])
+        cuts = boundaries(column[carry])
         label = labels(column, cuts)
         modes = []
         for k in range(cuts.size + 1):

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.aliases import Aliases, aliases_of
+from inference.posterior.sampling.by_weight import systematic
 from inference.posterior.sampling.effort import Effort, Move
 from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.transport import TriangularMap, fit_map, straight_map
@@ -119,9 +120,7 @@ def _resampled(population: Population, size: int, rng: np.random.Generator) -> P
     order = rng.permutation(len(likelihood))
     weights = np.exp(step * (likelihood[order] - top))
     gain = step * top + math.log(float(weights.mean()))
-    positions = (rng.random() + np.arange(size)) / size
-    sums = np.cumsum(weights / weights.sum())
-    index = order[np.minimum(np.searchsorted(sums, positions), len(weights) - 1)]
+    index = order[systematic(weights, size, rng)]
     return dataclasses.replace(
         population,
         z=population.z[index],

@@ -7,6 +7,7 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.answer.separation import boundaries, labels
 from inference.posterior.job import Job
 from inference.posterior.sampling.aliases import aliases_of
+from inference.posterior.sampling.by_weight import heavy, systematic
 from inference.posterior.sampling.ensemble import (
     WALKERS,
     Ensemble,
@@ -39,7 +40,6 @@ _TRIES = 50  # draws of as many points as there are walkers
 _ON_THE_WAY = 12  # steps: a walker where next to nothing is takes the first jump that leads away
 _WALKED_FROM = 400  # effective size of the draws that walkers begin at
 _IN_A_MODE = 4  # walkers that are to begin in each mode
-_HEAVY = 1e-3  # of the largest weight: draws that carry less are no modes
 _MANY_WALKERS = 64  # of an ensemble that begins at draws of the posterior, each a draw of its own
 
 
@@ -127,9 +127,9 @@ def are_told(job: Job, draws: WeightedDraws) -> bool:
     if job.settings.method != "emcee":
         return True
     walkers = (job.settings.ensembles - 1) * _MANY_WALKERS
-    heavy = draws.weights > _HEAVY * draws.weights.max()
+    carry = heavy(draws.weights)
     for column in draws.z.T:
-        cuts = boundaries(column[heavy])
+        cuts = boundaries(column[carry])
         shares = np.bincount(labels(column, cuts), draws.weights, cuts.size + 1)
         if shares.min() * walkers < _IN_A_MODE:
             return False
@@ -170,9 +170,7 @@ def from_draws(
     """
     proposal, count = outset.proposal, job.settings.ensembles - 1
     rng, walkers = job.stream(Stream.MEMBERS), _MANY_WALKERS
-    places = (rng.random() + np.arange(count * walkers)) / (count * walkers)
-    chosen = np.searchsorted(np.cumsum(draws.weights), places * draws.weights.sum())
-    chosen = rng.permutation(np.minimum(chosen, len(draws.z) - 1))
+    chosen = rng.permutation(systematic(draws.weights, count * walkers, rng))
     seeds = job.seeds(Stream.ENSEMBLES)
     own = [
         new_ensemble(proposal, draws.z[some], draws.log_density[some], seed)
