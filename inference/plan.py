@@ -67,8 +67,9 @@ def obstacle(
         if frames is not None and frames.derivatives is None:
             if frames.time_s is None:
                 return "needs derivative columns, or time_s to form differences"
-            if len(frames) < 2:
-                return "needs derivative columns, or at least two frames to form differences"
+            least, told = (2, "two") if scene.motion == "tangential" else (3, "three")
+            if len(frames) < least:
+                return f"needs derivative columns, or at least {told} frames to form differences"
     if known.crosstalk is None and "crosstalk" not in technique.immune_to:
         state = "optional" if "crosstalk" in scene.optional_terms else "unknown"
         return f"is not immune to crosstalk, and the scene's is {state}"

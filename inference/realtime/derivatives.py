@@ -22,12 +22,13 @@ __all__ = ["DERIVATIVE_REASONS", "LONELY", "UNEVEN_GAIN", "derivatives_of"]
 
 Array = NDArray[np.float64]
 
-LONELY, UNEVEN_GAIN, DROWNED_CHANGE, ROUGH = range(4)
+LONELY, UNEVEN_GAIN, DROWNED_CHANGE, ROUGH, PAIR = range(5)
 DERIVATIVE_REASONS = (
     "no other frame to form a difference with",
     "the frame's gain changes, so that unknown crosstalk does not cancel in differences",
     "the readings change by no more than their noise",
     "the readings change too unevenly from frame to frame for a derivative",
+    "two frames alone do not tell how far a difference is from the derivative",
 )
 _TOLD = 1.0 / 3.0  # uncertainty of a direction [rad] above which no bias of a wider window is seen
 
@@ -96,7 +97,8 @@ def derivatives_of(
                 whole[stretch] = some
         state[usable[uneven.near]] = first_reason + ROUGH
         missing = np.isnan(windows.first) & np.isnan(windows.var1) & (state == 0)
-        state[missing] = first_reason + UNEVEN_GAIN
+        alone = gain is None or usable.size < 3
+        state[missing] = first_reason + (PAIR if alone else UNEVEN_GAIN)
         state[(windows.direction_sd > _TOLD) & (state == 0)] = first_reason + DROWNED_CHANGE
     else:
         state[usable] = first_reason + LONELY

@@ -31,6 +31,8 @@ Indices = NDArray[np.intp]
 
 HALF_WIDTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
 _NODES = 5
+# a chord of a curve is a tangent somewhere between its ends, and two readings do not say where
+_LEAST_ON_A_CURVE = 3
 # standard deviations. At 2 one of some sixty pairs of windows disagreed by chance in many frames,
 # and left the narrower one where it was off: 90 % intervals held 80 % of 2,500 frames of a sweep
 _AGREEMENT = 3.0
@@ -150,18 +152,17 @@ def _bias(
 ) -> tuple[float, float, float]:
     """Return about how far a derivative is from the truth, as a vector.
 
-    Last comes by how much three readings of the window err, relative to the derivative.
+    Last comes by how much three readings of the window err, two of three, relative to the
+    derivative.
     """
-    if count == 2:  # nothing tells
-        return 0.0, 0.0, 0.0
     few = 3 if count > 3 else 2
     first = min(max(at - 1, 0), count - few)
     part = _difference(t, net, nodes, at, first, first + few - 1)
     b1, b2 = whole.d1 - part.d1, whole.d2 - part.d2
-    if count < _NODES:
-        return b1, b2, 0.0
     size = math.hypot(whole.d1 / s1, whole.d2 / s2)
     bend = math.hypot(b1 / s1, b2 / s2) / size if size > 0.0 else math.inf
+    if count < _NODES:
+        return b1, b2, bend
     share = _BENDS * _FACTORIALS * whole.distances / (part.distances * part.distances) * bend
     return share * b1, share * b2, bend
 
@@ -198,7 +199,7 @@ def differences(t: Array, net: Net, gain: Array | None, radial: bool, out: Windo
         s1, s2 = math.sqrt(net.var1[i]), math.sqrt(net.var2[i])
         for m in HALF_WIDTHS:
             count, at = _placed(i, m, start, end, nodes)
-            if count == 0:
+            if count < (_LEAST_ON_A_CURVE if radial else 2):
                 break
             whole = _difference(t, net, nodes, at, 0, count - 1)
             b1, b2, bend = _bias(t, net, nodes, count, at, whole, s1, s2)
@@ -225,19 +226,22 @@ def differences(t: Array, net: Net, gain: Array | None, radial: bool, out: Windo
             # along itself too: a chord from a bright frame to a dark one has a direction of its
             # own
             bias = math.hypot(b1 / s1, b2 / s2)
-            # to one side errors of third and fifth order do not point the same way: where frames
-            # are far apart, an estimate that lies along the change says nothing of what is across
-            if radial and count == _NODES and at != _NODES // 2 and square > 0.0:
+            # to one side, and of fewer readings, errors of one order and the next do not point the
+            # same way: where frames are far apart, an estimate that lies along the change says
+            # nothing of what is across
+            aside = count == _NODES and at != _NODES // 2
+            if radial and square > 0.0 and (aside or count < _NODES):
                 sideways = bias / math.sqrt(square) * min(_CROOKED * bend, 1.0)
                 # nor do series to one side converge where the light grows severalfold within them:
                 # what an order more changes says how far they are from it
-                side = 0 if at < _NODES // 2 else 1
-                four = _difference(t, net, nodes, at, side, side + _NODES - 2)
-                three = _difference(t, net, nodes, at, 2 * side, 2 * side + _NODES - 3)
-                last = abs(x * (whole.d1 - four.d1) / s1 - y * (whole.d2 - four.d2) / s2)
-                before = abs(x * (four.d1 - three.d1) / s1 - y * (four.d2 - three.d2) / s2)
-                slower = min(last / before, 1.0) if before > 0.0 else 1.0
-                sideways = max(sideways, last * slower / square)
+                if aside:
+                    side = 0 if at < _NODES // 2 else 1
+                    four = _difference(t, net, nodes, at, side, side + _NODES - 2)
+                    three = _difference(t, net, nodes, at, 2 * side, 2 * side + _NODES - 3)
+                    last = abs(x * (whole.d1 - four.d1) / s1 - y * (whole.d2 - four.d2) / s2)
+                    before = abs(x * (four.d1 - three.d1) / s1 - y * (four.d2 - three.d2) / s2)
+                    slower = min(last / before, 1.0) if before > 0.0 else 1.0
+                    sideways = max(sideways, last * slower / square)
                 if sideways > turn:
                     more += sideways * sideways - turn * turn
                     turn = sideways
