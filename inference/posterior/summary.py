@@ -101,14 +101,16 @@ def _judged(drawn: "_Drawn", whole: Whole) -> tuple[Identifiability, ...]:
         common_range=static,
         rates=rates_of(density.frames),
     )
-    shares = dict(zip(density.parameters.names, whole.budget.of_z.model.tolist(), strict=True))
+    budget, names = whole.budget, density.parameters.names
+    shares = dict(zip(names, budget.of_z.model.tolist(), strict=True))
+    missed = dict(zip(names, budget.missed.tolist(), strict=True))
     scale = whole.scale_error, whole.spread.scale
-    budget = whole.budget
     rows = with_model_part(
         rows,
         *scale,
         budget.curvature,
         shares,
+        missed,
         by_flux=budget.by_flux,
         asked_for=job.flux_times > 1,
     )

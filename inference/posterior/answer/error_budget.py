@@ -53,6 +53,8 @@ class ErrorBudget(Moves):
     curvature : float
         What the next order would add to the response to the errors of flux and shadow, as a share
         of it, root mean square over ranges and draws; 0 where the flux's was integrated out.
+    missed : ndarray, shape (d,)
+        By how many standard deviations the next order would move each unknown.
     of_scene : int
         How many of the errors, the last, are what rests on priors of the scene.
     of_noise : int
@@ -65,6 +67,7 @@ class ErrorBudget(Moves):
     of_z: ErrorParts
     of_log_r: ErrorParts
     curvature: float
+    missed: Array
     of_scene: int
     of_noise: int
     by_flux: bool
@@ -171,6 +174,7 @@ def error_budget(
             noisier=job.noise_times,
         ),
         found.curvature,
+        found.missed,
         of_scene,
         of_noise,
         by_flux,

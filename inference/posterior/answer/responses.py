@@ -87,6 +87,19 @@ class Responses:
         moved = self.by_log_r[:, present, 1:].mean(axis=1)
         return float(np.sqrt(np.square(moved).sum(axis=1).mean()))
 
+    @property
+    def missed(self) -> Array:
+        """By how many standard deviations the next order would move each unknown, shape (d,).
+
+        An exact model may put an unknown far from where errors let it be, as measured by what they
+        leave of it: what the next order adds to so long a way then counts, however small a share.
+        """
+        moved = self.by_z
+        there = self.z + moved[:, :, 0]
+        spread = there.var(axis=0) + np.square(moved[:, :, 1:]).sum(axis=2).mean(axis=0)
+        off = self.curvature * np.abs(moved[:, :, 0].mean(axis=0))
+        return np.divide(off, np.sqrt(spread), out=np.zeros_like(off), where=spread > 0)
+
     def _beside(self, shift: Array, moved: Array) -> Array:
         stretch = np.hypot(1.0, min(self.curvature, 1.0))  # the next order makes nothing narrower
         return np.concatenate([shift, stretch * moved], axis=2)

@@ -37,6 +37,7 @@ __all__ = [
     "judge_fit",
     "larger_discrepancy",
     "may_be_bent",
+    "misses",
     "with_model_part",
 ]
 
@@ -47,6 +48,7 @@ MISFIT = 1e3  # Bayes factor: a false-alarm rate of at most 1e-3
 _BENT = 0.3  # share of a linear response that the next order adds, above which it is no guide
 ADDED = 0.2  # of the whole uncertainty that the next order adds, above which it is none either
 _MOST = 0.5  # of the uncertainty, above which that matters
+_MISSED = 1.0  # standard deviations of an unknown that the next order would move it by
 
 
 @dataclasses.dataclass(frozen=True)
@@ -164,12 +166,24 @@ def may_be_bent(model: float, whole: float, curvature: float) -> bool:
     return model > 0.6 * _MOST * whole and (curvature > 0.5 * _BENT or added)
 
 
+def misses(missed: Array) -> bool:
+    """Tell whether the response misses an unknown, of which the scale may know nothing.
+
+    Parameters
+    ----------
+    missed : ndarray, shape (d,)
+        By how many standard deviations the next order would move each.
+    """
+    return bool(np.any(missed > _MISSED))
+
+
 def with_model_part(
     rows: tuple[Identifiability, ...],
     model: float,
     whole: float,
     curvature: float,
     shares: Mapping[str, float],
+    missed: Mapping[str, float],
     *,
     by_flux: bool,
     asked_for: bool = False,
@@ -186,6 +200,8 @@ def with_model_part(
         What the next order would add to the response to them, as a share of it.
     shares : mapping of str to float
         The model's part of the standard deviation of each unknown.
+    missed : mapping of str to float
+        By how many of its standard deviations the next order would move it.
     by_flux : bool
         Whether most of it is the flux's, which can be integrated out, not a shadow's.
     asked_for : bool
@@ -196,7 +212,7 @@ def with_model_part(
     tuple of Identifiability
         The same rows, that of ``range_m`` with the figure. Where the response is not linear and
         most of the uncertainty, it is `weak` at best, and so are unknowns of whose uncertainty it
-        is most.
+        is most, or that it misses.
     """
     if not model > 0:
         return rows
@@ -219,6 +235,7 @@ def with_model_part(
         scale = row.parameter == "range_m"
         said = row.reason + text if scale else row.reason
         most = bent and (scale or shares.get(row.parameter, 0.0) > _MOST)
+        most |= missed.get(row.parameter, 0.0) > _MISSED
         if most:
             said += f", {further}" if scale else f"; most of that is the model's error, {further}"
         status = "weak" if most and row.status == "identified" else row.status

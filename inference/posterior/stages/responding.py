@@ -9,6 +9,7 @@ to remains the answer, and says so.
 
 import dataclasses
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from inference.posterior.answer.responses import (
     flux_leads,
     repeated,
 )
-from inference.posterior.criticism.discrepancy_check import is_bent, may_be_bent
+from inference.posterior.criticism.discrepancy_check import is_bent, may_be_bent, misses
 from inference.posterior.job import Job
 from inference.posterior.sample import Sample, sample_of
 from inference.posterior.sampling.population import arrived_at
@@ -78,10 +79,10 @@ class RespondTask:
             return stands
         by_noise = float(log_r[:, np.isfinite(log_r[0])].mean(axis=1).std())
         found = first_responses(job, density, chosen, log_r, rng)
-        if not may_be_bent(found.of_scale, math.hypot(found.of_scale, by_noise), found.curvature):
+        if not _bent(may_be_bent, found, by_noise):
             return stands
         found = repeated(job, found, rng)
-        if not is_bent(found.of_scale, math.hypot(found.of_scale, by_noise), found.curvature):
+        if not _bent(is_bent, found, by_noise):
             return stands
         if not flux_leads(found):  # a shadow's is not integrated
             return stands
@@ -92,6 +93,12 @@ class RespondTask:
         if stage is None:
             return dataclasses.replace(stands, calls=_MEMBERS)
         return Checkpoint(stage, _MEMBERS, integrated=True, exact=self.stage)
+
+
+def _bent(test: Callable[[float, float, float], bool], found: Responses, by_noise: float) -> bool:
+    """Tell whether the response bends, of the scale or by what it misses of an unknown."""
+    model = found.of_scale
+    return test(model, math.hypot(model, by_noise), found.curvature) or misses(found.missed)
 
 
 def tasks(job: Job, checkpoint: Checkpoint) -> tuple[RespondTask, ...]:

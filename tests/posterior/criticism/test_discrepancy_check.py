@@ -128,30 +128,30 @@ def test_a_few_draws_in_the_tail_do_not_decide(unit: float) -> None:
 
 def test_the_model_error_is_a_number_and_small_ones_take_no_status_away() -> None:
     """Issue 12.7: a scale known to 0.03 % that the model's error moves by as much."""
-    small = with_model_part(ROWS, 3e-4, 4e-4, 0.0, {"object.c2": 0.9}, by_flux=True)
+    small = with_model_part(ROWS, 3e-4, 4e-4, 0.0, {"object.c2": 0.9}, {}, by_flux=True)
     assert small[0] == ROWS[0]
     assert small[1].status == "identified"
     assert small[1].reason.endswith("model error: +-0.03 %")
-    assert with_model_part(ROWS, 0.0, 0.04, 0.0, {}, by_flux=True) == ROWS
+    assert with_model_part(ROWS, 0.0, 0.04, 0.0, {}, {}, by_flux=True) == ROWS
 
 
 def test_what_is_mostly_told_by_a_bent_response_is_weak() -> None:
     """The scale, and such unknowns as owe most of their uncertainty to it."""
     rows = tuple(dataclasses.replace(row, status="identified") for row in ROWS)
-    bent = with_model_part(rows, 0.03, 0.04, 0.4, {"object.c2": 0.6}, by_flux=True)
+    bent = with_model_part(rows, 0.03, 0.04, 0.4, {"object.c2": 0.6}, {}, by_flux=True)
     assert [row.status for row in bent] == ["weak", "weak"]
     assert all("changes by 40 % of itself: state `discrepancy`" in row.reason for row in bent)
-    shadow = with_model_part(rows, 0.03, 0.04, 0.4, {"object.c2": 0.6}, by_flux=False)
+    shadow = with_model_part(rows, 0.03, 0.04, 0.4, {"object.c2": 0.6}, {}, by_flux=False)
     assert [row.status for row in shadow] == ["weak", "weak"]
     for row in shadow:
         assert "40 % of itself: most of it is the error of the object's shadow" in row.reason
         assert "`discrepancy`" not in row.reason
-    own = with_model_part(rows, 0.03, 0.04, 0.4, {"object.c2": 0.4}, by_flux=True)
+    own = with_model_part(rows, 0.03, 0.04, 0.4, {"object.c2": 0.4}, {}, by_flux=True)
     assert own[0] == rows[0]
     # it matters only where the model's part does, and nothing becomes better by it
-    assert with_model_part(rows, 0.01, 0.04, 0.7, {"object.c2": 0.6}, by_flux=True)[0] == rows[0]
+    assert with_model_part(rows, 0.01, 0.04, 0.7, {"object.c2": 0.6}, {}, by_flux=True)[0] == rows[0]
     lost = tuple(dataclasses.replace(row, status="not_identified") for row in ROWS)
-    still = with_model_part(lost, 0.03, 0.04, 0.4, {"object.c2": 0.6}, by_flux=True)
+    still = with_model_part(lost, 0.03, 0.04, 0.4, {"object.c2": 0.6}, {}, by_flux=True)
     assert [row.status for row in still] == ["not_identified"] * 2
 
 
