@@ -2,34 +2,62 @@
 
 Few frames that tell little leave long valleys that are flat, and a narrow optimum somewhere beside
 them: curvature there says a width that is a tenth of what the deviance says, and the truth was seen
-19 standard deviations off at a deviance of 2. So from every optimum that is nearly as good as the
-best, each unknown is held away on both sides while everything else follows, for as long as the
-deviance rises by less than curvature foresees, and as far as two standard deviations cost.
+19 standard deviations off at a deviance of 2. Others rise soon and then hardly any more: at ten
+standard deviations by 8, and a sixth of the mass lies out there. So from every optimum that is
+nearly as good as the best, each unknown is held away on both sides while everything else follows,
+for as long as its marginal density falls by less than curvature foresees; a point counts as far out
+as the mass beyond it says.
 """
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
 
 from inference.fits.likelihood.erring import Erring, end_of
 from inference.fits.likelihood.erring_climb import begun, climbed
+from inference.fits.likelihood.evidence import evidence_of
 from inference.fits.likelihood.frame_modes import nearest_modes
 from inference.fits.likelihood.problem import FitProblem
 
 __all__ = ["near", "valleys"]
 
+Array = NDArray[np.float64]
+
 _STEPS = 8  # of a climb with an unknown held
 _FIRST = 2.0  # standard deviations to where an unknown is held first
 _ENOUGH = 4.0  # deviance that two standard deviations cost
-_FLAT = 0.5  # of the deviance that curvature foresees, below which a valley is followed
+_FLAT = 0.7  # of the fall that curvature foresees, below which a valley is followed
+_NOTHING = 12.0  # twice the log by which a density has fallen to where nothing is left
 _DOUBLINGS = 6
 _BASES = 3  # optima whose valleys are followed
 _ONE = 0.1  # standard deviations between two ends that are one
 _APART = 0.1  # of log r of a frame, from which on they are two
 _STRIDE = 1.0  # most that a logarithm is moved at once
 _BETTER = 0.05  # deviance by which another optimum is better
+
+
+class _Step(NamedTuple):
+    """A point of a valley.
+
+    Attributes
+    ----------
+    away : float
+        From the maximum, in its standard deviations of the unknown that is held.
+    cost : float
+        Minus twice the log of that unknown's marginal density, over that at the maximum.
+    end : Erring
+        All else.
+    """
+
+    away: float
+    cost: float
+    end: Erring
 
 
 def valleys(
@@ -89,30 +117,88 @@ def _valley(problem: FitProblem, base: Erring, lowest: float) -> tuple[list[Erri
     of_x, _ = base.whole.factors
     sds = np.linalg.norm(of_x, axis=1)
     for j in np.flatnonzero(np.isfinite(sds) & (sds > 0.0)).tolist() if len(problem) > 1 else []:
+        sides: list[list[_Step]] = []
         for sign in (1.0, -1.0):
-            ahead = sign * of_x @ of_x[j] / sds[j]
-            x, positions, reach, before = base.x, base.positions, _FIRST, 0.0
-            for _ in range(_DOUBLINGS):
-                step = (reach - before) * ahead
-                longest = float(np.abs(step[problem.logarithms]).max(initial=0.0))
-                start = x + step * min(1.0, _STRIDE / max(longest, 1e-300))
-                start = np.clip(start, *problem.bounds(x))
-                ranges = nearest_modes(problem, start, positions)
-                at, _ = climbed(problem, begun(problem, start, ranges), _STEPS, j)
-                cost = at.deviance - base.deviance
-                if not math.isfinite(cost):
-                    break
-                if at.deviance < lowest - _BETTER:
-                    end, remaining = climbed(problem, at, 5 * _STEPS)
-                    if end.deviance < lowest - _BETTER:
-                        return points, end_of(problem, end, remaining)
-                if cost < -_BETTER:  # the valley of a maximum that is known, and counts by itself
-                    break
-                away = abs(float(at.x[j] - base.x[j])) / sds[j]
-                if cost >= _FLAT * away * away:
-                    break
-                points.append(end_of(problem, at, 0.0))
-                if cost >= _ENOUGH:
-                    break
-                x, positions, before, reach = at.x, at.u, reach, 2.0 * reach
+            side, lower = _side(problem, base, j, sign * of_x @ of_x[j] / sds[j], lowest)
+            if lower is not None:
+                return points, lower
+            sides.append(side)
+        points += _as_far_as_mass_says(sides, base.deviance)
     return points, None
+
+
+def _side(
+    problem: FitProblem, base: Erring, j: int, ahead: Array, lowest: float
+) -> tuple[list[_Step], Erring | None]:
+    """Hold an unknown farther and farther away to one side, or come to where a lower one begins."""
+    side: list[_Step] = []
+    sd, middle = float(np.linalg.norm(base.whole.factors[0][j])), evidence_of(base, j)
+    x, positions, reach, before = base.x, base.positions, _FIRST, 0.0
+    for _ in range(_DOUBLINGS):
+        step = (reach - before) * ahead
+        longest = float(np.abs(step[problem.logarithms]).max(initial=0.0))
+        start = x + step * min(1.0, _STRIDE / max(longest, 1e-300))
+        start = np.clip(start, *problem.bounds(x))
+        ranges = nearest_modes(problem, start, positions)
+        at, _ = climbed(problem, begun(problem, start, ranges), _STEPS, j)
+        cost = at.deviance - base.deviance
+        if not math.isfinite(cost):
+            break
+        if at.deviance < lowest - _BETTER:
+            end, remaining = climbed(problem, at, 5 * _STEPS)
+            if end.deviance < lowest - _BETTER:
+                return side, end_of(problem, end, remaining)
+        if cost < -_BETTER:  # the valley of a maximum that is known, and counts by itself
+            break
+        end_here = end_of(problem, at, 0.0)
+        away, cost = abs(float(at.x[j] - base.x[j])) / sd, middle - evidence_of(end_here, j)
+        if not math.isfinite(cost) or (side and not away > side[-1].away):
+            break
+        side.append(_Step(away, cost, end_here))
+        if cost >= min(_FLAT * away * away, _NOTHING):
+            break
+        x, positions, before, reach = at.x, at.u, reach, 2.0 * reach
+    return side, None
+
+
+def _as_far_as_mass_says(sides: Sequence[Sequence[_Step]], deviance: float) -> list[Erring]:
+    """Return points of a valley, each at the deviance of a normal law with as much mass beyond."""
+    masses = [_masses(side) for side in sides]
+    whole = sum(float(mass.sum()) for mass in masses)
+    points: list[Erring] = []
+    for side, mass in zip(sides, masses, strict=True):
+        beyond = np.cumsum(mass[::-1])[::-1][1:] / whole
+        for step, share in zip(side, beyond.tolist(), strict=True):
+            excess = max(float(stats.norm.isf(share)), 0.0) ** 2
+            if not excess < _FLAT * step.away * step.away:
+                continue
+            points.append(dataclasses.replace(step.end, deviance=deviance + excess))
+            if excess >= _ENOUGH:
+                break
+    return points
+
+
+def _masses(side: Sequence[_Step]) -> Array:
+    """Return the mass of one side up to each step, and beyond the last; standard deviations.
+
+    The log density falls as a parabola to the first step, and beyond if that is all, and along
+    straight lines from step to step.
+    """
+    if not side:
+        return np.array([math.sqrt(0.5 * math.pi)])
+    first = side[0]
+    fall = max(first.cost, 1e-3)
+    root = math.sqrt(0.5 * fall)
+    whole = first.away * math.sqrt(0.5 * math.pi / fall)
+    found = [whole * math.erf(root)]
+    if len(side) == 1:
+        return np.array([*found, whole * math.erfc(root)])
+    slope = 0.0
+    for before, after in itertools.pairwise(side):
+        length, bend = after.away - before.away, 0.5 * (after.cost - before.cost)
+        falls = math.exp(-0.5 * before.cost)
+        found.append(length * falls * (-math.expm1(-bend) / bend if abs(bend) > 1e-9 else 1.0))
+        slope = bend / length
+    last = side[-1]
+    found.append(math.exp(-0.5 * last.cost) / max(slope, 1.0 / last.away))
+    return np.array(found)
