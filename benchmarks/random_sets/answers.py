@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from benchmarks.coverage.path_rows import posterior_of
 from benchmarks.coverage.paths import PathSet
 from benchmarks.random_sets.sets import random_set
+from benchmarks.random_sets.wide import wide_set
 from benchmarks.resumable import Row
 from inference.estimate import estimate
 from inference.estimates import TechniqueResult
@@ -175,7 +176,9 @@ WAYS: Mapping[str, Callable[[PathSet, int, float, Held], Row]] = {
 }
 
 
-def answer_row(way: str, seed: int, seconds: float, number: int, version: str = "") -> Row:
+def answer_row(
+    way: str, seed: int, seconds: float, number: int, version: str = "", *, wide: bool = False
+) -> Row:
     """Draw a set, ask one way, and hold what it says without a flag to the truth.
 
     Parameters
@@ -189,8 +192,10 @@ def answer_row(way: str, seed: int, seconds: float, number: int, version: str = 
         Limit of a posterior [s of processor time].
     version : str
         Of the code, for the table.
+    wide : bool
+        Whether it is one of `wide_set`.
     """
-    data = random_set(seed, number)
+    data = wide_set(seed, number) if wide else random_set(seed, number)
     held = Held()
     start = time.process_time()
     told = WAYS[way](data, number, seconds, held)

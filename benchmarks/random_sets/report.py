@@ -10,6 +10,7 @@ __all__ = ["FAR", "TABLES", "report", "summary", "table_of", "wrong"]
 
 TABLES = Path(__file__).with_name("results")
 FAR = 5.0  # standard deviations
+_WIDE = "wide-"  # before the names of tables of wide sets
 Rows = Sequence[dict[str, str]]
 
 HEAD = (
@@ -18,9 +19,9 @@ HEAD = (
 )
 
 
-def table_of(way: str, seed: int) -> Path:
+def table_of(way: str, seed: int, *, wide: bool = False) -> Path:
     """Return where the rows of a way and a seed are."""
-    return TABLES / f"{way}-{seed}.csv"
+    return TABLES / f"{_WIDE if wide else ''}{way}-{seed}.csv"
 
 
 def wrong(rows: Rows) -> list[dict[str, str]]:
@@ -48,7 +49,7 @@ def summary(way: str, rows: Rows) -> str:
 def report(tables: Path) -> str:
     """Return a table over all seeds, and the sets that are far off."""
     lines, far = [HEAD], []
-    for way in WAYS:
+    for way in (*WAYS, *(_WIDE + way for way in WAYS)):
         rows = []
         for table in sorted(tables.glob(f"{way}-*.csv")):
             of_seed = rows_of(table)

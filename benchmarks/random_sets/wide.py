@@ -1,42 +1,56 @@
-"""Wide random sets: sensors, noises, and scenes of all kinds, of which more or less is known."""
+"""Wide random sets: sensors, noises, scenes and numbers of frames far from those of studies.
+
+What is told of a set may be anything between all and nothing, and what it does not tell is drawn
+from the priors that it states or leaves to their defaults, but for c0, which is nearer its middle.
+"""
 
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.coverage.paths import LIGHT, PATHS, PathSet
 from simulator.discrepancy import DISCREPANCY_SD
-from simulator.frames import Frames
 from simulator.model_error import FITTED_SHARE, RANGE_ERROR_SD
 from simulator.object_model import object_flux
 from simulator.scene import parse_scene
-from simulator.sensor import Sensor, parse_sensor
+from simulator.sensor import parse_sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
 
 __all__ = ["wide_set"]
 
-Array = NDArray[np.float64]
-
-_SNR = (3.0, 1e6)
+_LIGHT_SPEED = 299792458.0
+_WIDTHS_S, _FREQUENCIES_HZ = (2e-8, 3e-7), (1e6, 4e7)
+_SNR = (3.0, 1e6)  # in the stroke's middle
 _FRAMES = (2, 120)
 _EMPTY = (0, 0, 1, 5, 20)
+_NEAREST_M, _STROKE = (0.05, 0.8), (1.2, 10.0)
+_GAIN = (1e-3, 1e6)
 _RULED = 0.15  # share of sets in which some ranges are known
-_KNOWN = ("nothing", "nothing", "all", "c2", "shape", "roughly")
+_RULER_M = (1e-3, 2e-2)
+_TOLD_OF_OBJECT = ("nothing", "nothing", "all", "c2", "shape", "roughly")
+_TOLD_OF_CROSSTALK = ("normal", "uniform", "near", "halfnormal", "one known")
 
 
-class _Told(NamedTuple):
-    """A part of a scene: as it is, as it is told, and the truth by scene path."""
+class _Part(NamedTuple):
+    """A part of a scene: as it is, as it is told, and the truth of what is not known of it."""
 
-    is_: dict[str, Any]
-    told: dict[str, Any]
+    is_: Any
+    told: Any
     truth: dict[str, float]
 
 
 def wide_set(seed: int, number: int) -> PathSet:
     """Draw a set of the object model with a smooth error as large as stands by default.
+
+    Pulses of 20 to 300 ns and waves of 1 to 40 MHz; a gain of 1e-3 to 1e6; read noise that differs
+    between the readings, in some sets with shot noise or a relative error; 2 to 120 frames, none to
+    20 empty ones; a path of `benchmarks.coverage.paths` from 5 to 80 cm to 1.2 to 10 times as far;
+    a signal-to-noise ratio of 3 to 1e6 in its middle. The object is known, or not, or its c2, its
+    c0 and c1, or roughly. Crosstalk is up to three times the light in the middle, told by one of
+    five priors; a wall is 1.1 to 6 times as far as the stroke, its distance and strength known or
+    not. In some sets a few ranges are known to 1 to 20 mm.
 
     Parameters
     ----------
@@ -48,164 +62,138 @@ def wide_set(seed: int, number: int) -> PathSet:
     PathSet
     """
     rng = np.random.default_rng([seed, number, 1])
-
-    def between(low: float, high: float) -> float:
-        return math.exp(rng.uniform(math.log(low), math.log(high)))
-
     pulsed = rng.random() < 0.5
     if pulsed:
-        width = between(2e-8, 3e-7)
+        width = _between(_WIDTHS_S, rng)
         kind: dict[str, Any] = {"kind": "pulsed", "pulse_width_s": width}
-        reach = 0.5 * 299792458.0 * width
+        reach = 0.5 * _LIGHT_SPEED * width
     else:
-        frequency = between(1e6, 4e7)
+        frequency = _between(_FREQUENCIES_HZ, rng)
         kind = {"kind": "sine_wave", "frequency_hz": frequency}
-        reach = 0.5 * 299792458.0 / frequency
+        reach = 0.5 * _LIGHT_SPEED / frequency
     path, light = str(rng.choice(list(PATHS))), str(rng.choice(LIGHT))
-    snr = between(*_SNR)
-    count, empty = round(between(*_FRAMES)), int(rng.choice(_EMPTY))
-    low = min(between(0.05, 0.8), 0.25 * reach)
-    high = min(low * between(1.2, 10.0), 0.6 * reach)
+    snr = _between(_SNR, rng)
+    count, empty = round(_between(_FRAMES, rng)), int(rng.choice(_EMPTY))
+    low = min(_between(_NEAREST_M, rng), 0.25 * reach)
+    high = min(low * _between(_STROKE, rng), 0.6 * reach)
     inside = math.exp(1e-3 * math.log(high / low))
     ranges = PATHS[path](low * inside, high / inside, count, rng)
-    middle_m = math.sqrt(low * high)
     thing = _object(rng)
-    c0, c1, c2 = thing.is_["c0"], thing.is_["c1"], thing.is_["c2"]
-    gain = between(1e-3, 1e6)
-    middle = gain * float(object_flux(middle_m, c0 * c2, c0, c1))
-    columns = ("w1", "w2") if pulsed else ("i", "q")
-    parts = [thing]
+    c0, c1, c2 = (thing.is_[name] for name in ("c0", "c1", "c2"))
+    gain = _between(_GAIN, rng)
+    middle = gain * float(object_flux(math.sqrt(low * high), c0 * c2, c0, c1))
+    parts = {"object": thing}
     if light in ("crosstalk", "both"):
-        parts.append(_crosstalk(columns, middle, rng))
+        parts["crosstalk"] = _crosstalk(("w1", "w2") if pulsed else ("i", "q"), middle, rng)
     if light in ("background", "both"):
-        parts.append(_background(middle, high, reach, (c0, c1), rng))
-    known = len(thing.truth) == 0
-    error = DISCREPANCY_SD * (FITTED_SHARE if known else 1.0)
-    made: dict[str, Any] = {"discrepancy": {"flux": error, "range_m": RANGE_ERROR_SD}}
-    told: dict[str, Any] = {}
-    truth: dict[str, float] = {}
-    for name, part in zip(("object", "crosstalk", "background"), _by_name(parts, light), strict=True):
-        if part is None:
-            continue
-        made[name] = part.is_ if name != "crosstalk" else part.is_["values"]
-        if part.told:
-            told[name] = part.told if name != "crosstalk" else part.told["values"]
-        truth |= part.truth
-    sensor, noise = _sensor({**kind, "gain": gain}, middle, snr, rng)
-    ruled = [None] * (count + empty)
-    if rng.random() < _RULED:
-        sd = between(1e-3, 2e-2)
-        which = rng.choice(count, min(count, int(rng.integers(1, 6))), replace=False)
-        for i in which:
-            ruled[empty + int(i)] = sd
+        parts["background"] = _background(middle, high, reach, c0, rng)
+    error = DISCREPANCY_SD * (1.0 if thing.truth else FITTED_SHARE)
+    made = {name: part.is_ for name, part in parts.items()}
+    made["discrepancy"] = {"flux": error, "range_m": RANGE_ERROR_SD}
+    noise = _noise(middle, snr, rng)
     step = max(float(np.sqrt(np.mean(np.diff(np.log(ranges)) ** 2))), 1e-3)
+    ruled = _ruled(count, rng)
     trajectory = SampledTrajectory(
         range_m=[1.0] * empty + ranges.tolist(),
         object_present=[False] * empty + [True] * count,
         time_s=(step * np.arange(count + empty)).tolist(),
-        known_range_sd_m=ruled if any(ruled) else None,
+        known_range_sd_m=[None] * empty + ruled if any(ruled) else None,
     )
+    sensor = parse_sensor({**kind, "gain": gain, "noise": noise})
     seen = simulate(sensor, parse_scene(made), trajectory, rng)
-    saying = "/".join(sorted(thing.truth)) or "known"
+    unknown = ", ".join(name.removeprefix("object.") for name in thing.truth) or "nothing"
     name = (
-        f"{'pulse' if pulsed else 'wave'} reach {reach:.1f} m, {saying.replace('object.', '')} unknown, {light}, {path}, "
-        f"SNR {snr:.3g}, {noise}, {low:.2f}-{high:.2f} m, {count} frames, {empty} empty, {sum(x is not None for x in ruled)} ruled"
+        f"{kind['kind']} to {reach:.1f} m, {unknown} unknown, {light}, {path}, SNR {snr:.3g}, "
+        f"{' + '.join(noise)}, {low:.2f}-{high:.2f} m, {count} frames, {empty} empty, "
+        f"{sum(sd is not None for sd in ruled)} ruled"
     )
+    told = {name: part.told for name, part in parts.items() if part.told}
+    truth = {name: value for part in parts.values() for name, value in part.truth.items()}
     return PathSet(name, sensor, seen.frames, told, seen.range_m, truth)
 
 
-def _by_name(parts: list[_Told], light: str) -> list[_Told | None]:
-    crosstalk = parts[1] if light in ("crosstalk", "both") else None
-    background = parts[-1] if light in ("background", "both") else None
-    return [parts[0], crosstalk, background]
+def _between(ends: tuple[float, float], rng: np.random.Generator) -> float:
+    return math.exp(rng.uniform(math.log(ends[0]), math.log(ends[1])))
 
 
-def _object(rng: np.random.Generator) -> _Told:
-    """Draw an object from the default priors, and how much of it is told."""
-    knowing = str(rng.choice(_KNOWN))
+def _lognormal(value: float, sigma: float, rng: np.random.Generator) -> dict[str, Any]:
+    """Draw a prior that may well have made a value."""
+    median = value * math.exp(sigma * rng.standard_normal())
+    return {"prior": "lognormal", "median": median, "sigma": sigma}
+
+
+def _object(rng: np.random.Generator) -> _Part:
+    knowing = str(rng.choice(_TOLD_OF_OBJECT))
     c0 = 0.1 * math.exp(1.2 * rng.standard_normal())
     c1 = 2 * math.sqrt(c0) * math.expm1(0.4 * rng.standard_normal())
     c2 = 0.1 * math.exp(rng.standard_normal())
     is_ = {"c0": c0, "c1": c1, "c2": c2}
-    told: dict[str, Any]
-    if knowing == "all":
-        told = dict(is_)
-    elif knowing == "c2":
-        told = {"c2": c2}
-    elif knowing == "shape":
-        told = {"c0": c0, "c1": c1}
-    elif knowing == "roughly":
-        told = {
-            "c0": {"prior": "lognormal", "median": c0 * math.exp(0.3 * rng.standard_normal()), "sigma": 0.3},
-            "c2": {"prior": "lognormal", "median": c2 * math.exp(0.1 * rng.standard_normal()), "sigma": 0.1},
-        }
-    else:
-        told = {}
-    truth = {f"object.{k}": v for k, v in is_.items() if not isinstance(told.get(k), float)}
-    return _Told(is_, told, truth)
+    numbers = {"all": ("c0", "c1", "c2"), "c2": ("c2",), "shape": ("c0", "c1")}.get(knowing, ())
+    told: dict[str, Any] = {name: is_[name] for name in numbers}
+    if knowing == "roughly":
+        told = {"c0": _lognormal(c0, 0.3, rng), "c2": _lognormal(c2, 0.1, rng)}
+    return _Part(is_, told, {f"object.{k}": v for k, v in is_.items() if k not in numbers})
 
 
-def _crosstalk(columns: tuple[str, str], middle: float, rng: np.random.Generator) -> _Told:
-    size = middle * math.exp(rng.uniform(math.log(1e-3), math.log(3.0)))
+def _crosstalk(columns: tuple[str, str], middle: float, rng: np.random.Generator) -> _Part:
+    size = middle * _between((1e-3, 3.0), rng)
     values = (size * rng.standard_normal(2)).tolist()
-    told: list[Any] = []
-    for value in values:
-        way = str(rng.choice(["number", "normal", "uniform", "near"])) if False else ""
-        told.append(value)
-    way = str(rng.choice(["normal", "uniform", "near", "halfnormal", "one known"]))
+    way = str(rng.choice(_TOLD_OF_CROSSTALK))
+    normal = {"prior": "normal", "mean": 0.0, "sd": size}
+    told: list[Any] = [normal, normal]
     if way == "halfnormal":
-        values = [abs(v) for v in values]
+        values = [abs(value) for value in values]
         told = [{"prior": "halfnormal", "sd": size}] * 2
-    elif way == "normal":
-        told = [{"prior": "normal", "mean": 0.0, "sd": size}] * 2
     elif way == "uniform":
         values = rng.uniform(-size, size, 2).tolist()
         told = [{"prior": "uniform", "low": -size, "high": size}] * 2
     elif way == "near":
-        told = [{"prior": "normal", "mean": v + 0.05 * size * rng.standard_normal(), "sd": 0.05 * size} for v in values]
-    else:
-        told = [values[0], {"prior": "normal", "mean": 0.0, "sd": size}]
-    truth = {
-        f"crosstalk.{c}": v
-        for c, v, t in zip(columns, values, told, strict=True)
-        if isinstance(t, dict)
-    }
-    return _Told({"values": values}, {"values": told}, truth)
+        sd = 0.05 * size
+        means = [value + sd * rng.standard_normal() for value in values]
+        told = [{"prior": "normal", "mean": mean, "sd": sd} for mean in means]
+    elif way == "one known":
+        told = [values[0], normal]
+    of_each = zip(columns, values, told, strict=True)
+    truth = {f"crosstalk.{name}": value for name, value, t in of_each if isinstance(t, dict)}
+    return _Part(values, told, truth)
 
 
-def _background(middle: float, high: float, reach: float, shape: tuple[float, float], rng: np.random.Generator) -> _Told:
-    c0, _ = shape
-    strength = middle * math.exp(rng.uniform(math.log(0.05), math.log(2.0)))
-    distance = high * math.exp(rng.uniform(math.log(1.1), math.log(6.0)))
-    distance = min(distance, 0.95 * reach)
-    distance = max(distance, 1.02 * high)
+def _background(
+    middle: float, high: float, reach: float, c0: float, rng: np.random.Generator
+) -> _Part:
+    strength = middle * _between((0.05, 2.0), rng)
+    distance = max(min(high * _between((1.1, 6.0), rng), 0.95 * reach), 1.02 * high)
     shadow = {
         "c0": c0 * 0.75 * math.exp(0.5 * rng.standard_normal()),
         "c1": 0.3 * math.sqrt(c0) * abs(float(rng.standard_normal())),
     }
     is_ = {"strength": strength, "distance_m": distance, "shadow": shadow}
     told: dict[str, Any] = {"strength": strength, "distance_m": distance}
-    truth = {f"background.shadow.{k}": v for k, v in shadow.items()}
+    truth = {f"background.shadow.{name}": value for name, value in shadow.items()}
     if rng.random() < 0.7:
-        median = strength * math.exp(0.5 * rng.standard_normal())
-        told["strength"] = {"prior": "lognormal", "median": median, "sigma": 0.5}
+        told["strength"] = _lognormal(strength, 0.5, rng)
         truth["background.strength"] = strength
     if rng.random() < 0.5:
-        mean = distance * math.exp(0.02 * rng.standard_normal())
-        told["distance_m"] = {"prior": "lognormal", "median": mean, "sigma": 0.02}
+        told["distance_m"] = _lognormal(distance, 0.02, rng)
         truth["background.distance_m"] = distance
-    return _Told(is_, told, truth)
+    return _Part(is_, told, truth)
 
 
-def _sensor(kind: dict[str, Any], middle: float, snr: float, rng: np.random.Generator) -> tuple[Sensor, str]:
-    noise = middle / snr
-    read = [noise, noise * math.exp(rng.uniform(math.log(0.3), math.log(3.0)))]
-    law: dict[str, Any] = {"read": read}
-    said = "read"
+def _noise(middle: float, snr: float, rng: np.random.Generator) -> dict[str, Any]:
+    read = middle / snr
+    law: dict[str, Any] = {"read": [read, read * _between((0.3, 3.0), rng)]}
     if rng.random() < 0.4:
-        law["shot"] = noise * noise / middle * math.exp(rng.uniform(math.log(0.1), math.log(10.0)))
-        said += "+shot"
+        law["shot"] = read * read / middle * _between((0.1, 10.0), rng)
     if rng.random() < 0.25:
-        law["relative"] = math.exp(rng.uniform(math.log(1e-4), math.log(0.03)))
-        said += "+relative"
-    return parse_sensor({**kind, "noise": law}), said
+        law["relative"] = _between((1e-4, 0.03), rng)
+    return law
+
+
+def _ruled(count: int, rng: np.random.Generator) -> list[float | None]:
+    """Draw which ranges are known, and how well."""
+    ruled: list[float | None] = [None] * count
+    if rng.random() < _RULED:
+        sd = _between(_RULER_M, rng)
+        for i in rng.choice(count, min(count, int(rng.integers(1, 6))), replace=False).tolist():
+            ruled[i] = sd
+    return ruled

@@ -1,10 +1,12 @@
 """Random sets under what stands by default: the study's sets, rows and tables, and a small run."""
 
 import numpy as np
+import pytest
 
 from benchmarks.random_sets.answers import COLUMNS, answer_row
 from benchmarks.random_sets.report import summary, wrong
 from benchmarks.random_sets.sets import random_set
+from benchmarks.random_sets.wide import wide_set
 from simulator.scene import parse_scene
 from simulator.scene_checks import check_scene
 
@@ -26,6 +28,23 @@ def test_sets_differ_come_again_and_state_nothing_of_ranges_and_errors() -> None
     assert len(kinds) > 5
     again = random_set(SEED, 3).frames.readings
     np.testing.assert_array_equal(random_set(SEED, 3).frames.readings, again)
+
+
+def test_wide_sets_are_what_they_say() -> None:
+    kinds, told = set(), set()
+    for number in range(40):
+        data = wide_set(SEED, number)
+        scene = parse_scene(data.scene)
+        check_scene(data.sensor, scene)
+        assert len(data.frames) == data.range_m.size
+        assert np.isfinite(data.range_m[data.frames.present]).all()
+        noise = data.sensor.noise
+        kinds.add((data.sensor.kind, noise.shot > 0, noise.relative > 0))
+        told.add(tuple(sorted(data.parameters)))
+    assert len(kinds) > 6
+    assert len(told) > 15
+    again = wide_set(SEED, 3).frames.readings
+    np.testing.assert_array_equal(wide_set(SEED, 3).frames.readings, again)
 
 
 def test_no_technique_is_far_off_without_a_flag() -> None:
@@ -62,3 +81,18 @@ def test_no_window_of_a_derivative_is_bias_for_the_most_part() -> None:
     row = answer_row("estimate", 20_261_125, 1.0, 415, "v")
     assert int(row["answered"]) > 40
     assert float(row["worst"]) < 3.5
+
+
+@pytest.mark.parametrize("number", [359, 367, 537])
+def test_two_frames_tell_no_derivative(number: int) -> None:
+    """Both had the range of the chord between them, and were up to 13.6 sd off."""
+    row = answer_row("estimate", 4242, 1.0, number, "v", wide=True)
+    assert float(row["worst"]) < 3.0
+
+
+def test_a_valley_that_falls_slowly_holds_mass() -> None:
+    """The distance of a wall was 3.0 sd off and `identified`: its profile falls by half of what
+    curvature foresees, and no valley was followed there."""
+    row = answer_row("fits", 4242, 1.0, 88, "v", wide=True)
+    assert row["answered"] == row["held"] == 69
+    assert float(row["worst"]) < 2.0

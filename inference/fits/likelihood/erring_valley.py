@@ -25,7 +25,7 @@ from inference.fits.likelihood.evidence import evidence_of
 from inference.fits.likelihood.frame_modes import nearest_modes
 from inference.fits.likelihood.problem import FitProblem
 
-__all__ = ["near", "valleys"]
+__all__ = ["Step", "as_far_as_mass_says", "masses", "near", "valleys"]
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ _STRIDE = 1.0  # most that a logarithm is moved at once
 _BETTER = 0.05  # deviance by which another optimum is better
 
 
-class _Step(NamedTuple):
+class Step(NamedTuple):
     """A point of a valley.
 
     Attributes
@@ -117,21 +117,21 @@ def _valley(problem: FitProblem, base: Erring, lowest: float) -> tuple[list[Erri
     of_x, _ = base.whole.factors
     sds = np.linalg.norm(of_x, axis=1)
     for j in np.flatnonzero(np.isfinite(sds) & (sds > 0.0)).tolist() if len(problem) > 1 else []:
-        sides: list[list[_Step]] = []
+        sides: list[list[Step]] = []
         for sign in (1.0, -1.0):
             side, lower = _side(problem, base, j, sign * of_x @ of_x[j] / sds[j], lowest)
             if lower is not None:
                 return points, lower
             sides.append(side)
-        points += _as_far_as_mass_says(sides, base.deviance)
+        points += as_far_as_mass_says(sides, base.deviance)
     return points, None
 
 
 def _side(
     problem: FitProblem, base: Erring, j: int, ahead: Array, lowest: float
-) -> tuple[list[_Step], Erring | None]:
+) -> tuple[list[Step], Erring | None]:
     """Hold an unknown farther and farther away to one side, or come to where a lower one begins."""
-    side: list[_Step] = []
+    side: list[Step] = []
     sd, middle = float(np.linalg.norm(base.whole.factors[0][j])), evidence_of(base, j)
     x, positions, reach, before = base.x, base.positions, _FIRST, 0.0
     for _ in range(_DOUBLINGS):
@@ -154,19 +154,33 @@ def _side(
         away, cost = abs(float(at.x[j] - base.x[j])) / sd, middle - evidence_of(end_here, j)
         if not math.isfinite(cost) or (side and not away > side[-1].away):
             break
-        side.append(_Step(away, cost, end_here))
-        if cost >= min(_FLAT * away * away, _NOTHING):
+        side.append(Step(away, cost, end_here))
+        if _is_followed(side[-1]):
             break
         x, positions, before, reach = at.x, at.u, reach, 2.0 * reach
     return side, None
 
 
-def _as_far_as_mass_says(sides: Sequence[Sequence[_Step]], deviance: float) -> list[Erring]:
-    """Return points of a valley, each at the deviance of a normal law with as much mass beyond."""
-    masses = [_masses(side) for side in sides]
-    whole = sum(float(mass.sum()) for mass in masses)
+def as_far_as_mass_says(sides: Sequence[Sequence[Step]], deviance: float) -> list[Erring]:
+    """Return points of a valley, each at the deviance of a normal law with as much mass beyond.
+
+    Parameters
+    ----------
+    sides : sequence of sequence of Step
+        Both sides of a maximum, outwards.
+    deviance : float
+        Of the maximum.
+
+    Returns
+    -------
+    list of Erring
+        Where that is less than curvature foresees; of each side up to the first beyond two
+        standard deviations.
+    """
+    each = [masses(side) for side in sides]
+    whole = sum(float(mass.sum()) for mass in each)
     points: list[Erring] = []
-    for side, mass in zip(sides, masses, strict=True):
+    for side, mass in zip(sides, each, strict=True):
         beyond = np.cumsum(mass[::-1])[::-1][1:] / whole
         for step, share in zip(side, beyond.tolist(), strict=True):
             excess = max(float(stats.norm.isf(share)), 0.0) ** 2
@@ -178,27 +192,28 @@ def _as_far_as_mass_says(sides: Sequence[Sequence[_Step]], deviance: float) -> l
     return points
 
 
-def _masses(side: Sequence[_Step]) -> Array:
-    """Return the mass of one side up to each step, and beyond the last; standard deviations.
+def masses(side: Sequence[Step]) -> Array:
+    """Return the mass of one side up to each step and beyond the last, shape (steps + 1,).
 
-    The log density falls as a parabola to the first step, and beyond if that is all, and along
-    straight lines from step to step.
+    In standard deviations times the density at the maximum. The log density falls as a parabola to
+    the first step, and along straight lines from step to step; beyond it goes on as before. Beyond
+    an end of what is possible, or where a climb fails, half of what the last step holds.
     """
     if not side:
         return np.array([math.sqrt(0.5 * math.pi)])
-    first = side[0]
+    first, last = side[0], side[-1]
     fall = max(first.cost, 1e-3)
     root = math.sqrt(0.5 * fall)
     whole = first.away * math.sqrt(0.5 * math.pi / fall)
-    found = [whole * math.erf(root)]
-    if len(side) == 1:
-        return np.array([*found, whole * math.erfc(root)])
-    slope = 0.0
+    found, beyond = [whole * math.erf(root)], whole * math.erfc(root)
     for before, after in itertools.pairwise(side):
         length, bend = after.away - before.away, 0.5 * (after.cost - before.cost)
         falls = math.exp(-0.5 * before.cost)
         found.append(length * falls * (-math.expm1(-bend) / bend if abs(bend) > 1e-9 else 1.0))
-        slope = bend / length
-    last = side[-1]
-    found.append(math.exp(-0.5 * last.cost) / max(slope, 1.0 / last.away))
-    return np.array(found)
+        beyond = math.exp(-0.5 * last.cost) / max(bend / length, 1.0 / last.away)
+    return np.array([*found, beyond if _is_followed(last) else 0.5 * found[-1]])
+
+
+def _is_followed(last: Step) -> bool:
+    """Return whether a valley need not be followed beyond a step."""
+    return last.cost >= min(_FLAT * last.away * last.away, _NOTHING)

@@ -16,6 +16,7 @@ from inference.posterior.criticism.discrepancy_check import (
     LargerDiscrepancy,
     judge_fit,
     larger_discrepancy,
+    misses,
     with_model_part,
 )
 from simulator.scene import parse_scene
@@ -149,10 +150,24 @@ def test_what_is_mostly_told_by_a_bent_response_is_weak() -> None:
     own = with_model_part(rows, 0.03, 0.04, 0.4, {"object.c2": 0.4}, {}, by_flux=True)
     assert own[0] == rows[0]
     # it matters only where the model's part does, and nothing becomes better by it
-    assert with_model_part(rows, 0.01, 0.04, 0.7, {"object.c2": 0.6}, {}, by_flux=True)[0] == rows[0]
+    assert (
+        with_model_part(rows, 0.01, 0.04, 0.7, {"object.c2": 0.6}, {}, by_flux=True)[0] == rows[0]
+    )
     lost = tuple(dataclasses.replace(row, status="not_identified") for row in ROWS)
     still = with_model_part(lost, 0.03, 0.04, 0.4, {"object.c2": 0.6}, {}, by_flux=True)
     assert [row.status for row in still] == ["not_identified"] * 2
+
+
+def test_what_the_response_misses_is_weak_however_straight_the_scale_is() -> None:
+    """Crosstalk that empty frames tell to 2e-8 was 25 sd off, the scale's response straight."""
+    rows = tuple(dataclasses.replace(row, status="identified") for row in ROWS)
+    missed = {"object.c2": 1.1}
+    found = with_model_part(rows, 1e-3, 0.04, 0.1, {"object.c2": 0.1}, missed, by_flux=True)
+    assert [row.status for row in found] == ["weak", "identified"]
+    small = with_model_part(rows, 1e-3, 0.04, 0.1, {}, {"object.c2": 0.9}, by_flux=True)
+    assert [row.status for row in small] == ["identified", "identified"]
+    assert misses(np.array([0.2, 1.1]))
+    assert not misses(np.array([0.2, 0.9]))
 
 
 def test_a_misfit_that_was_seen_stays() -> None:
