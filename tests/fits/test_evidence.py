@@ -124,6 +124,14 @@ def test_the_priors_as_a_mode_have_their_evidence(told_by_frames: Erring) -> Non
     assert evidence_of(as_mode) == pytest.approx(evidence_of(told_by_frames), abs=1e-9)
 
 
+def test_an_unknown_that_is_held_has_the_density_of_its_marginal(told_by_frames: Erring) -> None:
+    """At its top a normal law is 1 / sd of what it holds as a whole."""
+    sds = np.linalg.norm(told_by_frames.whole.factors[0], axis=1)
+    for j, sd in enumerate(sds):
+        more = evidence_of(told_by_frames, j) - evidence_of(told_by_frames)
+        assert more == pytest.approx(-2.0 * math.log(sd), abs=1e-6)
+
+
 def test_an_object_of_which_nothing_is_said_has_a_glossy_mode() -> None:
     scene = parse_scene({"crosstalk": UNKNOWN_CROSSTALK})
     parameters = parameters_of(sensor_of("pulsed"), scene)

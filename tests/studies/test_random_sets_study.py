@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from benchmarks.random_sets import wide
 from benchmarks.random_sets.answers import COLUMNS, answer_row
 from benchmarks.random_sets.report import summary, wrong
 from benchmarks.random_sets.sets import random_set
@@ -88,6 +89,16 @@ def test_two_frames_tell_no_derivative(number: int) -> None:
     """Both had the range of the chord between them, and were up to 13.6 sd off."""
     row = answer_row("estimate", 4242, 1.0, number, "v", wide=True)
     assert float(row["worst"]) < 3.0
+
+
+@pytest.mark.parametrize(("count", "number"), [(3, 966), (3, 1204), (3, 1401), (4, 966)])
+def test_a_few_frames_do_not_tell_more_of_a_derivative_than_they_can(
+    monkeypatch: pytest.MonkeyPatch, count: int, number: int
+) -> None:
+    """Light grows a hundredfold within them: ranges were 5.1 to 19 sd off."""
+    monkeypatch.setattr(wide, "_FRAMES", (count - 0.4, count + 0.4))
+    row = answer_row("estimate", 99, 1.0, number, "v", wide=True)
+    assert float(row["worst"]) < 4.0
 
 
 def test_a_valley_that_falls_slowly_holds_mass() -> None:

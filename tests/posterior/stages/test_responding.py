@@ -8,6 +8,8 @@ standard deviations off and `identified`, and none of 21 ranges was held.
 import dataclasses
 import functools
 import math
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,9 +17,11 @@ import pytest
 from benchmarks.coverage.path_rows import posterior_of
 from benchmarks.coverage.paths import PathSet
 from benchmarks.random_sets.sets import random_set
+from benchmarks.random_sets.wide import wide_set
 from inference.posterior import fold
 from inference.posterior.answer import responses
 from inference.posterior.answer.posterior import Posterior
+from inference.posterior.answer.responses import Responses
 from inference.posterior.criticism.discrepancy_check import is_bent, may_be_bent
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages import responding
@@ -189,6 +193,30 @@ def test_ranges_that_are_all_model_are_not_told_by_a_response_that_bends_by_a_th
     for path, value in one.parameters.items():
         told = found.parameters[path]
         assert abs(told.mean - value) < 3.0 * told.sd, path
+
+
+def test_what_is_missed_is_the_next_order_of_the_whole_way() -> None:
+    """Of a hundred draws moved by 3 and by 200 widths, a tenth of which the next order changes."""
+    rng = np.random.default_rng(5)
+    z, by = rng.standard_normal((100, 2)), np.zeros((2, 1))
+    by[0, 0] = 2.0
+    each = [SimpleNamespace(shift=(np.array([3.0, 200.0]), np.zeros(4)), parameters=by) for _ in z]
+    found = Responses(z, np.zeros((100, 4)), (), cast(Any, tuple(each)), z, 0.1, repeated=True)
+    sd = z.std(axis=0)
+    stretched = 2.0 * math.hypot(1.0, 0.1)
+    wanted = [0.3 / math.hypot(sd[0], stretched), 20.0 / sd[1]]
+    np.testing.assert_allclose(found.missed, wanted)
+
+
+@pytest.mark.thorough
+def test_crosstalk_far_from_where_an_exact_model_has_it_is_not_told_by_a_response() -> None:
+    """Five empty frames tell it to 2e-8, at a signal-to-noise ratio of 1.6e5: by linear response it
+    was 25 sd off and `identified`. The scale of the ranges knows nothing of it, and is straight."""
+    one = wide_set(4242, 76)
+    found = posterior_of(one, SamplerSettings(method="auto", seed=76))
+    for path, value in one.parameters.items():
+        told = found.parameters[path]
+        assert abs(told.mean - value) < 4.0 * told.sd, path
 
 
 @pytest.mark.thorough
