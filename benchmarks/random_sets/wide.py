@@ -92,12 +92,12 @@ def wide_set(seed: int, number: int) -> PathSet:
     made["discrepancy"] = {"flux": error, "range_m": RANGE_ERROR_SD}
     noise = _noise(middle, snr, rng)
     step = max(float(np.sqrt(np.mean(np.diff(np.log(ranges)) ** 2))), 1e-3)
-    ruled = _ruled(count, rng)
+    ruled, no_object = _ruled(count, rng), list[float | None]([None] * empty)
     trajectory = SampledTrajectory(
         range_m=[1.0] * empty + ranges.tolist(),
         object_present=[False] * empty + [True] * count,
         time_s=(step * np.arange(count + empty)).tolist(),
-        known_range_sd_m=[None] * empty + ruled if any(ruled) else None,
+        known_range_sd_m=no_object + ruled if any(ruled) else None,
     )
     sensor = parse_sensor({**kind, "gain": gain, "noise": noise})
     seen = simulate(sensor, parse_scene(made), trajectory, rng)

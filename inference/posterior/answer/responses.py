@@ -98,7 +98,8 @@ class Responses:
         there = self.z + moved[:, :, 0]
         spread = there.var(axis=0) + np.square(moved[:, :, 1:]).sum(axis=2).mean(axis=0)
         off = self.curvature * np.abs(moved[:, :, 0].mean(axis=0))
-        return np.divide(off, np.sqrt(spread), out=np.zeros_like(off), where=spread > 0)
+        sd = np.sqrt(spread)
+        return np.asarray(np.divide(off, sd, out=np.zeros_like(off), where=sd > 0))
 
     def _beside(self, shift: Array, moved: Array) -> Array:
         stretch = np.hypot(1.0, min(self.curvature, 1.0))  # the next order makes nothing narrower
