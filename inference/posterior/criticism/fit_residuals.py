@@ -1,6 +1,7 @@
 """Residuals of frames across the curve that the range draws, the parameters fitted once more."""
 
 import dataclasses
+import math
 
 import numpy as np
 import scipy
@@ -15,10 +16,13 @@ from inference.frame.shadow_error import shadow_at
 from inference.frame.warmth import gains_of
 from inference.posterior.answer.replicate import replicate_frames
 from inference.posterior.job import Job
+from simulator.discrepancy import NEGLECTED, discrepancy_basis
 
-__all__ = ["FitResiduals", "fit_residuals", "followed_part"]
+__all__ = ["FitResiduals", "fit_residuals", "followed_part", "left_out"]
 
 _AT_END = 1e-6  # log range between the best range and an end of its prior
+_SEEN = 0.3  # standard deviations of a frame's noise by which what is left out may move it
+_NEXT_TO_NOTHING = 1e-10  # share of the variance
 
 Array = NDArray[np.float64]
 
@@ -95,6 +99,37 @@ def _off_known(at: Whitened, columns: Array | None = None) -> Array:
     return free_of_range(at.along[:n], at.beside.along[:n], columns, other)
 
 
+def left_out(
+    density: DiscrepantDensity,
+    log_r: Array,
+    light: Array,
+    replicates: int,
+    rng: np.random.Generator,
+) -> Array:
+    """Draw what the functions of the flux's error leave out of it, shape (replicates, n).
+
+    Those that are fitted leave out a hundredth of the error's size, which frames show that are so
+    much brighter than their noise: the frames have it, and replicates of them do too.
+
+    Parameters
+    ----------
+    log_r, light : ndarray, shape (n,)
+        Range of each frame, and by how many standard deviations its light alone moves it across.
+
+    Returns
+    -------
+    ndarray
+        In standard deviations; zero where no frame would show it.
+    """
+    size = density.discrepancy * np.abs(light)
+    if not size.max(initial=0.0) * math.sqrt(NEGLECTED) > _SEEN:
+        return np.zeros((replicates, log_r.size))
+    all_of_it = discrepancy_basis(*density.parameters.reach_m, _NEXT_TO_NOTHING)
+    rest = all_of_it.values(log_r)[:, density.basis.size :]
+    normal = rng.standard_normal((replicates, rest.shape[1]))
+    return np.asarray(density.discrepancy * light * (normal @ rest.T))
+
+
 def fit_residuals(
     job: Job, density: CollapsedDensity, z: Array, replicates: int, rng: np.random.Generator
 ) -> FitResiduals:
@@ -130,12 +165,17 @@ def fit_residuals(
     present = np.isfinite(seen)
     told = present & _known_beside(density)
     known = _off_known(at)[:, :, 0].reshape(sets, n, 2)[:, told].reshape(sets, -1)
+    # what is left along a curve, at the ends of the prior, stays as it is; that of a range which is
+    # known beside the readings is among the rows
+    along = np.where(told, 0.0, square - across**2)[:, present]
     # rows of the frames themselves stand for those of the replicates: only noise lies between
     own, of_z = at.jacobian[:n], d
     if isinstance(density, DiscrepantDensity):
         # the error's coefficients, whose prior has unit scale too, are fitted like parameters
         functions = density.functions_at(seen)[0]
         own = np.concatenate([own, at.signal[:n, :, None] * functions[:, None, :]], axis=2)
+        light = np.einsum("ni,ni->n", at.across[:n], at.signal[:n])
+        across[1:, present] += left_out(density, seen[present], light[present], replicates, rng)
     of_flux = own.shape[2]
     shadow = job.scene.model_error.shadow
     if density.parameters.has_background and shadow > 0:
@@ -157,9 +197,6 @@ def fit_residuals(
     fitted = before - followed
     count = int(present.sum())
     squared = np.empty((sets, n))
-    # what is left along a curve, at the ends of the prior, stays as it is; that of a range which is
-    # known beside the readings is among the rows
-    along = np.where(told, 0.0, square - across**2)[:, present]
     squared[:, present] = fitted[:, :count] ** 2 + np.maximum(along, 0.0)
     rest = np.sum(fitted[:, count:].reshape(sets, -1, 2) ** 2, axis=2)
     squared[:, ~present] = rest[:, : n - count]
