@@ -2,9 +2,9 @@
 
 Few frames that tell little leave long valleys that are flat, and a narrow optimum somewhere beside
 them: curvature there says a width that is a tenth of what the deviance says, and the truth was seen
-19 standard deviations off at a deviance of 2. Others rise soon and then hardly any more: what is far
-out then has more mass than its deviance says. So from every optimum that is nearly as good as the
-best, each unknown is held away on both sides while everything else follows, for as long as its
+19 standard deviations off at a deviance of 2. Others rise soon and then hardly any more: what is
+far out then has more mass than its deviance says. So from every optimum that is nearly as good as
+the best, each unknown is held away on both sides while everything else follows, for as long as its
 marginal density falls by less than curvature foresees; a point counts as far out as the mass beyond
 it says.
 """

@@ -29,7 +29,14 @@ from simulator.model_error import ModelError
 from simulator.priors import Distribution, NormalDistribution, UniformDistribution
 from simulator.scene import Reference, Stroke
 
-__all__ = ["parameter_conflicts", "prior_conflicts", "range_conflicts", "ranges_beyond", "scores"]
+__all__ = [
+    "are_far_out",
+    "parameter_conflicts",
+    "prior_conflicts",
+    "range_conflicts",
+    "ranges_beyond",
+    "scores",
+]
 
 Array = NDArray[np.float64]
 
@@ -40,6 +47,12 @@ _GAIN = 15.0  # nats a frame may gain: half of a chi-square of 30 with at most 2
 _DRAWS = 15
 _BEYOND = 100.0  # factor by which the ranges are widened
 _WIDER = 1.5  # at least
+
+
+def are_far_out(density: CollapsedDensity, z: Array) -> bool:
+    """Tell whether most draws of an unknown, shape (n, d), lie where its prior has no mass left."""
+    off = np.median(density.parameters.deviations(z), axis=0)
+    return bool(np.any(off > _TAIL))
 
 
 def prior_conflicts(

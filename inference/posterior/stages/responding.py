@@ -24,6 +24,7 @@ from inference.posterior.answer.responses import (
     repeated,
 )
 from inference.posterior.criticism.discrepancy_check import is_bent, may_be_bent, misses
+from inference.posterior.criticism.prior_conflict import are_far_out
 from inference.posterior.job import Job
 from inference.posterior.sample import Sample, sample_of
 from inference.posterior.sampling.population import arrived_at
@@ -79,10 +80,12 @@ class RespondTask:
             return stands
         by_noise = float(log_r[:, np.isfinite(log_r[0])].mean(axis=1).std())
         found = first_responses(job, density, chosen, log_r, rng)
-        if not _bent(may_be_bent, found, by_noise):
+        # a prior that the readings contradict is to be named, not explained by errors of the model
+        may_miss = not are_far_out(density, sample.flat)
+        if not _bent(may_be_bent, found, by_noise, may_miss):
             return stands
         found = repeated(job, found, rng)
-        if not _bent(is_bent, found, by_noise):
+        if not _bent(is_bent, found, by_noise, may_miss):
             return stands
         if not flux_leads(found):  # a shadow's is not integrated
             return stands
@@ -95,10 +98,13 @@ class RespondTask:
         return Checkpoint(stage, _MEMBERS, integrated=True, exact=self.stage)
 
 
-def _bent(test: Callable[[float, float, float], bool], found: Responses, by_noise: float) -> bool:
+def _bent(
+    test: Callable[[float, float, float], bool], found: Responses, by_noise: float, may_miss: bool
+) -> bool:
     """Tell whether the response bends, of the scale or by what it misses of an unknown."""
     model = found.of_scale
-    return test(model, math.hypot(model, by_noise), found.curvature) or misses(found.missed)
+    bent = test(model, math.hypot(model, by_noise), found.curvature)
+    return bent or (may_miss and misses(found.missed))
 
 
 def tasks(job: Job, checkpoint: Checkpoint) -> tuple[RespondTask, ...]:
