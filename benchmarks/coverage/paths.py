@@ -5,6 +5,7 @@ interval misses is the doing of how ranges are spread.
 """
 
 import dataclasses
+import math
 import zlib
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -22,7 +23,16 @@ from simulator.sensor import Sensor, parse_sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
 
-__all__ = ["LIGHT", "PATHS", "TOLD", "PathSet", "draw_path", "random_scene"]
+__all__ = [
+    "LIGHT",
+    "PATHS",
+    "TOLD",
+    "PathSet",
+    "draw_path",
+    "lognormal_about",
+    "random_scene",
+    "shadow_of",
+]
 
 Array = NDArray[np.float64]
 Path = Callable[[float, float, int, np.random.Generator], Array]
@@ -126,6 +136,20 @@ class PathSet:
     parameters: dict[str, float]
 
 
+def shadow_of(c0: float, rng: np.random.Generator) -> dict[str, float]:
+    """Draw c0' and c1' of a shadow from their default priors, of an object of that c0 [m^2]."""
+    return {
+        "c0": c0 * 0.75 * math.exp(0.5 * rng.standard_normal()),
+        "c1": 0.3 * math.sqrt(c0) * abs(float(rng.standard_normal())),
+    }
+
+
+def lognormal_about(value: float, sigma: float, rng: np.random.Generator) -> dict[str, Any]:
+    """Draw a lognormal prior that may well have made a value."""
+    median = value * math.exp(sigma * rng.standard_normal())
+    return {"prior": "lognormal", "median": median, "sigma": sigma}
+
+
 def draw_path(path: str, light: str, told: str, number: int, snr: float = SNR) -> PathSet:
     """Draw a data set of a class of paths.
 
@@ -200,13 +224,9 @@ def _data(
             truth[f"crosstalk.{column}"] = value
     if light in ("background", "both"):
         strength, distance = float(middle * rng.uniform(0.3, 1.0)), float(rng.uniform(3.0, 6.0))
-        shadow = {
-            "c0": c0 * 0.75 * float(np.exp(0.5 * rng.standard_normal())),
-            "c1": 0.3 * np.sqrt(c0) * abs(float(rng.standard_normal())),
-        }
+        shadow = shadow_of(c0, rng)
         made["background"] = {"strength": strength, "distance_m": distance, "shadow": shadow}
-        median = strength * float(np.exp(0.5 * rng.standard_normal()))
-        prior = {"prior": "lognormal", "median": median, "sigma": 0.5}
+        prior = lognormal_about(strength, 0.5, rng)
         told["background"] = {"strength": prior, "distance_m": distance}
         truth["background.strength"] = strength
         truth |= {f"background.shadow.{name}": value for name, value in shadow.items()}

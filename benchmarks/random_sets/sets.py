@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from benchmarks.coverage.calibrated_object import calibrated_object
 from benchmarks.coverage.classes import CLASSES, KINDS, SHADOW, at, surface
-from benchmarks.coverage.paths import LIGHT, PATHS, PathSet
+from benchmarks.coverage.paths import LIGHT, PATHS, PathSet, lognormal_about, shadow_of
 from simulator.discrepancy import DISCREPANCY_SD
 from simulator.frames import Frames
 from simulator.model_error import FITTED_SHARE, RANGE_ERROR_SD
@@ -118,11 +118,6 @@ def _crosstalk(wanted: _Wanted, middle: float, rng: np.random.Generator) -> _Cro
     return _Crosstalk(values, {"crosstalk": [prior] * 2}, truth)
 
 
-def _strength_prior(strength: float, rng: np.random.Generator) -> dict[str, Any]:
-    median = strength * math.exp(0.5 * rng.standard_normal())
-    return {"prior": "lognormal", "median": median, "sigma": 0.5}
-
-
 def _sensor(kind: Mapping[str, Any], noise: float) -> Sensor:
     return parse_sensor({**kind, "noise": {"read": [noise, noise]}})
 
@@ -148,13 +143,10 @@ def _of_model(wanted: _Wanted, rng: np.random.Generator) -> PathSet:
         made["crosstalk"] = other.values
     if light in ("background", "both"):
         strength, distance = float(middle * rng.uniform(0.3, 1.0)), float(rng.uniform(3.0, 6.0))
-        shadow = {
-            "c0": c0 * 0.75 * math.exp(0.5 * rng.standard_normal()),
-            "c1": 0.3 * math.sqrt(c0) * abs(float(rng.standard_normal())),
-        }
+        shadow = shadow_of(c0, rng)
         wall = {"strength": strength, "distance_m": distance, "shadow": shadow}
         made["background"] = wall
-        prior = _strength_prior(strength, rng)
+        prior = lognormal_about(strength, 0.5, rng)
         whole = known and rng.random() < 0.5
         told["background"] = wall if whole else {"strength": prior, "distance_m": distance}
         truth |= {"background.strength": strength}
@@ -193,7 +185,7 @@ def _through_optics(wanted: _Wanted, rng: np.random.Generator) -> PathSet:
         scene = scene.model_copy(update={"background": Shell(radius_m=distance)})
         wall = read(OpticalScene(background=Shell(radius_m=distance)), silent, tolerance=1e-6).mean
         strength = wall[1] if kind["kind"] == "pulsed" else float(np.hypot(*wall))
-        prior = _strength_prior(strength, rng)
+        prior = lognormal_about(strength, 0.5, rng)
         told["background"] = {"strength": prior, "distance_m": distance, "shadow": SHADOW}
         truth["background.strength"] = strength
     seen = series(scene, lambda d: at(plate, radius, d).pose, ranges, sensor, rng)

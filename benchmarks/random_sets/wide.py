@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.coverage.paths import LIGHT, PATHS, PathSet
+from benchmarks.coverage.paths import LIGHT, PATHS, PathSet, lognormal_about, shadow_of
 from simulator.discrepancy import DISCREPANCY_SD
 from simulator.model_error import FITTED_SHARE, RANGE_ERROR_SD
 from simulator.object_model import object_flux
@@ -116,12 +116,6 @@ def _between(ends: tuple[float, float], rng: np.random.Generator) -> float:
     return math.exp(rng.uniform(math.log(ends[0]), math.log(ends[1])))
 
 
-def _lognormal(value: float, sigma: float, rng: np.random.Generator) -> dict[str, Any]:
-    """Draw a prior that may well have made a value."""
-    median = value * math.exp(sigma * rng.standard_normal())
-    return {"prior": "lognormal", "median": median, "sigma": sigma}
-
-
 def _object(rng: np.random.Generator) -> _Part:
     knowing = str(rng.choice(_TOLD_OF_OBJECT))
     c0 = 0.1 * math.exp(1.2 * rng.standard_normal())
@@ -131,7 +125,7 @@ def _object(rng: np.random.Generator) -> _Part:
     numbers = {"all": ("c0", "c1", "c2"), "c2": ("c2",), "shape": ("c0", "c1")}.get(knowing, ())
     told: dict[str, Any] = {name: is_[name] for name in numbers}
     if knowing == "roughly":
-        told = {"c0": _lognormal(c0, 0.3, rng), "c2": _lognormal(c2, 0.1, rng)}
+        told = {"c0": lognormal_about(c0, 0.3, rng), "c2": lognormal_about(c2, 0.1, rng)}
     return _Part(is_, told, {f"object.{k}": v for k, v in is_.items() if k not in numbers})
 
 
@@ -163,18 +157,15 @@ def _background(
 ) -> _Part:
     strength = middle * _between((0.05, 2.0), rng)
     distance = max(min(high * _between((1.1, 6.0), rng), 0.95 * reach), 1.02 * high)
-    shadow = {
-        "c0": c0 * 0.75 * math.exp(0.5 * rng.standard_normal()),
-        "c1": 0.3 * math.sqrt(c0) * abs(float(rng.standard_normal())),
-    }
+    shadow = shadow_of(c0, rng)
     is_ = {"strength": strength, "distance_m": distance, "shadow": shadow}
     told: dict[str, Any] = {"strength": strength, "distance_m": distance}
     truth = {f"background.shadow.{name}": value for name, value in shadow.items()}
     if rng.random() < 0.7:
-        told["strength"] = _lognormal(strength, 0.5, rng)
+        told["strength"] = lognormal_about(strength, 0.5, rng)
         truth["background.strength"] = strength
     if rng.random() < 0.5:
-        told["distance_m"] = _lognormal(distance, 0.02, rng)
+        told["distance_m"] = lognormal_about(distance, 0.02, rng)
         truth["background.distance_m"] = distance
     return _Part(is_, told, truth)
 
