@@ -153,10 +153,8 @@ def test_it_is_looked_at_once_and_where_it_can_be_followed() -> None:
         fold.merge(_job(), dataclasses.replace(exact, linear=True), [])
 
 
-def test_what_is_straight_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A bright object without anything else: its answer is that of the exact model's draws, and
-    one step at them says so."""
-    monkeypatch.setattr(responding, "repeated", None)
+def _stays_as_it_is() -> None:
+    """A bright object without anything else: one step at the exact model's draws says so."""
     data = _set(9)
     job = fold.prepare(
         data.sensor, parse_scene(data.scene), data.frames, SamplerSettings(method="auto", seed=1)
@@ -169,6 +167,22 @@ def test_what_is_straight_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> Non
     assert after.linear
     assert after.stage is checkpoint.stage
     assert fold.tasks(job, after) == ()
+
+
+def test_what_is_straight_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its answer is that of the exact model's draws."""
+    monkeypatch.setattr(responding, "repeated", None)
+    _stays_as_it_is()
+
+
+def test_a_prior_that_is_contradicted_is_not_explained_by_errors(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Whatever the response misses: where the draws have left a prior, that is to be said."""
+    monkeypatch.setattr(responding, "repeated", None)
+    monkeypatch.setattr(responding, "misses", lambda *_: True)
+    monkeypatch.setattr(responding, "are_far_out", lambda *_: True)
+    _stays_as_it_is()
 
 
 @pytest.mark.parametrize("off", [1.0, 1.6, 1 / 1.6])
