@@ -235,9 +235,11 @@ def with_model_part(
         scale = row.parameter == "range_m"
         said = row.reason + text if scale else row.reason
         most = bent and (scale or shares.get(row.parameter, 0.0) > _MOST)
-        most |= missed.get(row.parameter, 0.0) > _MISSED
+        off = missed.get(row.parameter, 0.0) > _MISSED
         if most:
             said += f", {further}" if scale else f"; most of that is the model's error, {further}"
-        status = "weak" if most and row.status == "identified" else row.status
+        elif off:
+            said += f"; the model's error moves it by more than that, {further}"
+        status = "weak" if (most or off) and row.status == "identified" else row.status
         found.append(dataclasses.replace(row, status=status, reason=said))
     return tuple(found)

@@ -51,8 +51,11 @@ _WIDER = 1.5  # at least
 
 def are_far_out(density: CollapsedDensity, z: Array) -> bool:
     """Tell whether most draws of an unknown, shape (n, d), lie where its prior has no mass left."""
-    off = np.median(density.parameters.deviations(z), axis=0)
-    return bool(np.any(off > _TAIL))
+    return bool(np.any(_middle_deviations(density, z) > _TAIL))
+
+
+def _middle_deviations(density: CollapsedDensity, z: Array) -> Array:
+    return np.asarray(np.median(density.parameters.deviations(z), axis=0))
 
 
 def prior_conflicts(
@@ -88,8 +91,7 @@ def prior_conflicts(
         line = linearise(sampled, x, best, errors_left(sampled, x, best, error))
         return line.residual.ravel(), line.jacobian.reshape(-1, len(names))
 
-    off = np.median(density.parameters.deviations(z), axis=0)
-    found = parameter_conflicts(names, z, linearised, off)
+    found = parameter_conflicts(names, z, linearised, _middle_deviations(density, z))
     return (*found, *range_conflicts(density, z, log_r))
 
 

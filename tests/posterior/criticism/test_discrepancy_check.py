@@ -164,6 +164,7 @@ def test_what_the_response_misses_is_weak_however_straight_the_scale_is() -> Non
     missed = {"object.c2": 1.1}
     found = with_model_part(rows, 1e-3, 0.04, 0.1, {"object.c2": 0.1}, missed, by_flux=True)
     assert [row.status for row in found] == ["weak", "identified"]
+    assert "moves it by more than that, by a linear response that the next" in found[0].reason
     small = with_model_part(rows, 1e-3, 0.04, 0.1, {}, {"object.c2": 0.9}, by_flux=True)
     assert [row.status for row in small] == ["identified", "identified"]
     assert misses(np.array([0.2, 1.1]))

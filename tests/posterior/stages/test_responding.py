@@ -153,8 +153,8 @@ def test_it_is_looked_at_once_and_where_it_can_be_followed() -> None:
         fold.merge(_job(), dataclasses.replace(exact, linear=True), [])
 
 
-def _stays_as_it_is() -> None:
-    """A bright object without anything else: one step at the exact model's draws says so."""
+def _looked_at() -> tuple[fold.Job, Checkpoint, Checkpoint]:
+    """A bright object without anything else, before its response is looked at and behind."""
     data = _set(9)
     job = fold.prepare(
         data.sensor, parse_scene(data.scene), data.frames, SamplerSettings(method="auto", seed=1)
@@ -163,16 +163,16 @@ def _stays_as_it_is() -> None:
     while isinstance(checkpoint.stage, Starting):
         checkpoint = fold.merge(job, checkpoint, [fold.run(t) for t in fold.tasks(job, checkpoint)])
     (task,) = fold.tasks(job, checkpoint)
-    after = fold.merge(job, checkpoint, [fold.run(task)])
-    assert after.linear
-    assert after.stage is checkpoint.stage
-    assert fold.tasks(job, after) == ()
+    return job, checkpoint, fold.merge(job, checkpoint, [fold.run(task)])
 
 
 def test_what_is_straight_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its answer is that of the exact model's draws."""
+    """Its answer is that of the exact model's draws, and one step at them says so."""
     monkeypatch.setattr(responding, "repeated", None)
-    _stays_as_it_is()
+    job, before, after = _looked_at()
+    assert after.linear
+    assert after.stage is before.stage
+    assert fold.tasks(job, after) == ()
 
 
 def test_a_prior_that_is_contradicted_is_not_explained_by_errors(
@@ -182,7 +182,9 @@ def test_a_prior_that_is_contradicted_is_not_explained_by_errors(
     monkeypatch.setattr(responding, "repeated", None)
     monkeypatch.setattr(responding, "misses", lambda *_: True)
     monkeypatch.setattr(responding, "are_far_out", lambda *_: True)
-    _stays_as_it_is()
+    _, before, after = _looked_at()
+    assert after.linear
+    assert after.stage is before.stage
 
 
 @pytest.mark.parametrize("off", [1.0, 1.6, 1 / 1.6])
