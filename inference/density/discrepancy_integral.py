@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.density.dark_slope import add_dark_slope
 from inference.density.flux_expansion import FluxFunctions, add_mode, add_row, expand
 from inference.density.joint_maximum import best_positions, climb_jointly, with_error
 from inference.density.range_integral import integrate_range
@@ -73,7 +74,7 @@ def _round(
     n, size = values.size, coefficients.size
     rows = np.empty((size, n))
     row = np.empty(size)
-    count, total = 0, 0.0
+    count, total, darkness = 0, 0.0, 0.0
     factor[:] = 0.0
     for k in range(size):
         factor[k, k] = 1.0
@@ -99,7 +100,7 @@ def _round(
             weight = math.exp(modes[m, LOG_MASS] - highest) / mass
             if weight < _FEW:
                 continue
-            add_mode(gradient, row, weight, modes[m], block, scene, functions)
+            darkness += add_mode(gradient, row, weight, modes[m], block, scene, functions)
             for k in range(size):
                 rows[k, count] = row[k]
             count += 1
@@ -107,6 +108,7 @@ def _round(
                 update_factor(factor, rows, count)
                 count = 0
     update_factor(factor, rows, count)
+    add_dark_slope(gradient, darkness, table, data.strongest, scene, functions)
     return total
 
 
@@ -128,15 +130,18 @@ def _newton(
     trial = coefficients.copy()
     trial_values, trial_factor = np.empty(values.size), np.empty((size, size))
     best, gain = -math.inf, 0.0
-    last = np.zeros(size)
+    part, last = 0.0, np.zeros(size)
     curve = np.empty((functions.basis.shape[0], 2))
     for _ in range(_ROUNDS):
         value = _round(trial_values, step, trial_factor, trial, data, scene, functions)
         if not value > best - 1e-9 * (1.0 + abs(best)):
             if best == -math.inf:
                 return -math.inf
-            if gain < _SMALL:
+            # along a parabola that turns back so soon no more than this is left to be gained
+            if 0.25 * part * part * gain < _SMALL:
+                gain, last = 0.0, 0.0 * last
                 break
+            part *= 0.3
             last *= 0.3
             assign(trial, coefficients + last)
             continue
@@ -149,7 +154,8 @@ def _newton(
         longest = np.abs(curve[:, 0]).max()
         if not math.isfinite(longest):
             return -math.inf
-        last = step * min(1.0, _LONGEST / max(longest, _LONGEST))
+        part = min(1.0, _LONGEST / max(longest, _LONGEST))
+        last = part * step
         if gain < _DONE or gain > _LOST:
             break
         assign(trial, coefficients + last)
@@ -189,7 +195,7 @@ def _laplace(
             values[j] = empty_log_likelihood(block, scene) if is_empty(data, j) else -math.inf
             total += values[j]
             continue
-        density, _, bend, _, _, stiff, free, _ = expand(positions[j], block, scene)
+        density, _, bend, _, _, stiff, free, _, _ = expand(positions[j], block, scene)
         # where nothing bends the range does not follow, and its prior is as wide as it can be
         values[j] = density + log_top(scene.instrument.read)
         if bend > 0.0:

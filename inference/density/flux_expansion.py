@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.range_integral import falls_off
-from inference.frame.arguments import FluxError, FrameScene
+from inference.frame.arguments import FluxError, FrameScene, Pair
 from inference.frame.blocks import Block, frame_of
 from inference.frame.flux_error import cubic_weights, slope_weights
 from inference.frame.gaussian import (
@@ -28,7 +28,15 @@ from inference.frame.range_prior import (
 )
 from simulator.compiled import compiled
 
-__all__ = ["Expansion", "FluxFunctions", "add_mode", "add_row", "expand"]
+__all__ = [
+    "Expansion",
+    "FluxFunctions",
+    "add_mode",
+    "add_row",
+    "add_slopes",
+    "expand",
+    "information_slopes",
+]
 
 Array = NDArray[np.float64]
 
@@ -73,6 +81,8 @@ class Expansion(NamedTuple):
         Curvature along log flux with log r free to follow.
     turn : float
         Slope along the slope of log flux, which only a reference prior of the range feels.
+    darkness : float
+        Slope along the log of a reference prior's law in the dark.
     """
 
     density: float
@@ -83,6 +93,7 @@ class Expansion(NamedTuple):
     stiff: float
     free: float
     turn: float
+    darkness: float
 
 
 @compiled
@@ -117,24 +128,37 @@ def expand(u: float, block: Block, scene: FrameScene) -> Expansion:
     if bend > 0.0:
         cross = squared_cross(slope, signal, mean, signal, instrument)
         free = (cross + held * stiff) / bend
-    resolved, pushed, turn = _resolution(
-        told_by_light + told, Along(signal, signal_slope, mean, slope), scene
-    )
-    return Expansion(density + resolved, along, bend, flux + pushed, mixed, stiff, free, turn)
+    along_flux = Along(signal, signal_slope, mean, slope)
+    resolved, pushed, turn, darkness = _resolution(told_by_light + told, along_flux, scene)
+    density, flux = density + resolved, flux + pushed
+    return Expansion(density, along, bend, flux, mixed, stiff, free, turn, darkness)
 
 
 @compiled
-def _resolution(information: float, along: Along, scene: FrameScene) -> tuple[float, float, float]:
-    """Return what a reference prior adds to density, slope along log flux, and turn."""
+def _resolution(
+    information: float, along: Along, scene: FrameScene
+) -> tuple[float, float, float, float]:
+    """Return what a reference prior adds to density, slope along log flux, turn and darkness."""
     if not scene.range_prior.resolves:
-        return 0.0, 0.0, 0.0
-    signal, signal_slope, mean, slope = along
-    pushed = precision_product(signal_slope, slope, mean, signal, scene.instrument)
-    turned = precision_product(signal, slope, mean, signal, scene.instrument)
+        return 0.0, 0.0, 0.0, 0.0
+    pushed, turned = information_slopes(along, scene)
     dark = scene.range_prior.dark
     whole, lit = LEAST_INFORMATION + information, dark * LEAST_INFORMATION + information
     rate = 2.0 / lit - 1.0 / whole
-    return log_resolved(information / LEAST_INFORMATION, dark), rate * pushed, rate * turned
+    density = log_resolved(information / LEAST_INFORMATION, dark)
+    return density, rate * pushed, rate * turned, dark * LEAST_INFORMATION / lit
+
+
+@compiled
+def information_slopes(along: Along, scene: FrameScene) -> Pair:
+    """Return half the slopes of a frame's information on log r along log flux, and its slope."""
+    signal, signal_slope, mean, slope = along
+    instrument = scene.instrument
+    pushed = precision_product(signal_slope, slope, mean, signal, instrument)
+    # shot and relative noise grow with the flux: the same curve then tells less
+    pushed -= covariance_slope(slope, mean, signal, signal, signal, instrument)
+    pushed += covariance_slope((0.0, 0.0), mean, signal, signal, signal, instrument)
+    return pushed, precision_product(signal, slope, mean, signal, instrument)
 
 
 @compiled
@@ -153,7 +177,7 @@ def add_row(out: Array, functions: FluxFunctions, u: float, scale: float) -> Non
 
 
 @compiled
-def _add_slopes(out: Array, functions: FluxFunctions, u: float, scale: float) -> None:
+def add_slopes(out: Array, functions: FluxFunctions, u: float, scale: float) -> None:
     """Add scale times the slopes of all basis functions at u."""
     basis, error = functions
     i, a, b, c = slope_weights(u, error.first, error.rate, basis.shape[0])
@@ -172,7 +196,7 @@ def add_mode(
     block: Block,
     scene: FrameScene,
     functions: FluxFunctions,
-) -> None:
+) -> float:
     """Add what one mode of a frame says of the coefficients of the flux error.
 
     Parameters
@@ -189,11 +213,16 @@ def add_mode(
         As for `expand`.
     functions : FluxFunctions
         Of which the scene's flux error is made.
+
+    Returns
+    -------
+    float
+        The mode's share of the slope along the log of a reference prior's law in the dark.
     """
     u, top, sd = mode[POSITION], mode[TOP], mode[SD]
     row[:] = 0.0
     if sd < _NARROW and falls_off(mode, block, scene):
-        total, pull, turn = 0.0, 0.0, 0.0
+        total, pull, turn, darkness = 0.0, 0.0, 0.0, 0.0
         half = _NODES.size // 2 if sd < _NEARLY_GAUSSIAN else _HALF
         for j in range(-half, half + 1):
             x = _NODES[j + half] if sd < _NEARLY_GAUSSIAN else j * _STEP
@@ -206,12 +235,13 @@ def add_mode(
             pull += share * found.flux
             # the functions are straight over so narrow a mode
             turn += share * (found.flux * x * sd + found.turn)
+            darkness += share * found.darkness
         free = expand(u, block, scene).free
         add_row(gradient, functions, u, weight * pull / total)
-        _add_slopes(gradient, functions, u, weight * turn / total)
+        add_slopes(gradient, functions, u, weight * turn / total)
         add_row(row, functions, u, math.sqrt(weight * free))
-        return
-    total, mean, square, stiff = 0.0, 0.0, 0.0, 0.0
+        return weight * darkness / total
+    total, mean, square, stiff, darkness = 0.0, 0.0, 0.0, 0.0, 0.0
     for repeat in range(2):  # the total first: shares of it go into the gradient
         whole = total
         for side in range(2):
@@ -234,12 +264,14 @@ def add_mode(
                     mean += share * found.flux
                     square += share * found.flux * found.flux
                     stiff += share * found.stiff
+                    darkness += share * found.darkness
                 elif share > 0.0:
                     add_row(gradient, functions, at, weight * share / whole * found.flux)
                     if found.turn != 0.0:
-                        _add_slopes(gradient, functions, at, weight * share / whole * found.turn)
+                        add_slopes(gradient, functions, at, weight * share / whole * found.turn)
         if not total > 0.0:
-            return
+            return 0.0
     mean, square, stiff = mean / total, square / total, stiff / total
     left = max(stiff - (square - mean * mean), 0.0)
     add_row(row, functions, u, math.sqrt(weight * left))
+    return weight * darkness / total

@@ -143,7 +143,7 @@ def _prepare(
             continue
         block = block_of(data, j)
         at[j] = _follow(at[j], block, bounds, scene)
-        density, along, bend, flux, mixed, stiff, free, _ = expand(at[j], block, scene)
+        density, along, bend, flux, mixed, stiff, free, _, _ = expand(at[j], block, scene)
         value += density
         # at an end of the support, or where nothing bends, the range cannot follow
         stuck = (at[j] <= bounds[0] and along < 0.0) or (at[j] >= bounds[1] and along > 0.0)
