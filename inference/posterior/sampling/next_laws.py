@@ -29,6 +29,7 @@ _NEIGHBOURS = 10  # for every unknown, that a law around a place is fitted to; o
 _NEAR = 0.05  # of all draws
 _FITTED = 2000  # draws that a map is fitted to
 _LEAST_ESS = 150.0  # of them, and
+_ALONE = 1e-6  # of how far neighbours lie: a law so much narrower stands for one point
 _PER_PAIR = 4.0  # times the square of the unknowns: weights are flattened until there are as many
 
 
@@ -115,13 +116,23 @@ def _around(proposal: Proposal, z: Array, values: Array) -> Local:
         raise ValueError("a proposal without a map")
     finite = np.isfinite(values)
     x, values = transport.unbend(z[finite])[0], values[finite]
+    # what a map has beyond all numbers has no neighbours in its coordinates
+    near = np.isfinite(x).all(axis=1)
+    x, values = x[near], values[near]
     d, centre = x.shape[1], x[np.argmax(values)]
     apart = x - centre
     count = max(_NEIGHBOURS * d, round(_NEAR * len(x)))
     nearest = np.argsort(np.einsum("ni,ni->n", apart, apart))[:count]
     rows = np.sqrt(special.softmax(values[nearest]))[:, None] * apart[nearest]
-    scale = math.sqrt(float(np.mean(rows**2)))
+    scale, alone = _size(rows), _size(apart[nearest])
+    if not scale > _ALONE * alone:
+        # the one point has all weight: its neighbours lie as they do without
+        rows, scale = apart[nearest] / math.sqrt(len(nearest)), alone or 1.0
     rows = np.concatenate([rows, 1e-6 * scale * np.eye(d)])
     factor = linalg.qr(rows, mode="r")[0][:d].T
     factor = factor * np.sign(np.diagonal(factor))
     return Local(transport, Mixture(centre[None], factor[None], np.ones(1)))
+
+
+def _size(rows: Array) -> float:
+    return math.sqrt(float(np.mean(rows**2)))
