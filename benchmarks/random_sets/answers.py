@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from benchmarks.coverage.path_rows import posterior_of
 from benchmarks.coverage.paths import PathSet
 from benchmarks.random_sets.sets import random_set
+from benchmarks.random_sets.spoiled import spoiled_set
 from benchmarks.random_sets.wide import wide_set
 from benchmarks.resumable import Row
 from inference.estimate import estimate
@@ -22,7 +23,7 @@ from inference.tracking.track import track
 from simulator.errors import RefusedError
 from simulator.scene import parse_scene
 
-__all__ = ["COLUMNS", "WAYS", "Held", "answer_row"]
+__all__ = ["COLUMNS", "SETS", "WAYS", "Held", "answer_row"]
 
 Array = NDArray[np.float64]
 
@@ -176,8 +177,15 @@ WAYS: Mapping[str, Callable[[PathSet, int, float, Held], Row]] = {
 }
 
 
+SETS: Mapping[str, Callable[[int, int], PathSet]] = {
+    "random": random_set,
+    "wide": wide_set,
+    "spoiled": spoiled_set,
+}
+
+
 def answer_row(
-    way: str, seed: int, seconds: float, number: int, version: str = "", *, wide: bool = False
+    way: str, seed: int, seconds: float, number: int, version: str = "", *, of: str = "random"
 ) -> Row:
     """Draw a set, ask one way, and hold what it says without a flag to the truth.
 
@@ -192,10 +200,10 @@ def answer_row(
         Limit of a posterior [s of processor time].
     version : str
         Of the code, for the table.
-    wide : bool
-        Whether it is one of `wide_set`.
+    of : str
+        Which sets, of `SETS`.
     """
-    data = wide_set(seed, number) if wide else random_set(seed, number)
+    data = SETS[of](seed, number)
     held = Held()
     start = time.process_time()
     told = WAYS[way](data, number, seconds, held)

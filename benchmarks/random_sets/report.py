@@ -3,25 +3,28 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.random_sets.answers import WAYS
+from benchmarks.random_sets.answers import SETS, WAYS
 from benchmarks.resumable import rows_of
 
 __all__ = ["FAR", "TABLES", "report", "summary", "table_of", "wrong"]
 
 TABLES = Path(__file__).with_name("results")
 FAR = 5.0  # standard deviations
-_WIDE = "wide-"  # before the names of tables of wide sets
 Rows = Sequence[dict[str, str]]
 
 HEAD = (
     "| way | sets | that answer | ranges told | held | parameters identified | held "
-    f"| sets beyond {FAR:g} sd |\n|---|---|---|---|---|---|---|---|"
+    f"| sets beyond {FAR:g} sd | that say misfit |\n|---|---|---|---|---|---|---|---|---|"
 )
 
 
-def table_of(way: str, seed: int, *, wide: bool = False) -> Path:
-    """Return where the rows of a way and a seed are."""
-    return TABLES / f"{_WIDE if wide else ''}{way}-{seed}.csv"
+def _named(way: str, of: str) -> str:
+    return way if of == "random" else f"{of}-{way}"
+
+
+def table_of(way: str, seed: int, *, of: str = "random") -> Path:
+    """Return where the rows of a way and a seed are; ``of`` is which sets."""
+    return TABLES / f"{_named(way, of)}-{seed}.csv"
 
 
 def wrong(rows: Rows) -> list[dict[str, str]]:
@@ -39,17 +42,19 @@ def summary(way: str, rows: Rows) -> str:
         return f"{part / whole:.0%}" if whole else ""
 
     answering = sum(int(row["answered"]) > 0 for row in rows)
+    misfits = sum("misfit" in row["flags"] for row in rows)
     return (
         f"| {way} | {len(rows)} | {answering} | {share(total('answered'), total('asked'))} "
         f"| {share(total('held'), total('answered'))} | {total('parameters')} "
-        f"| {share(total('parameters_held'), total('parameters'))} | {len(wrong(rows))} |"
+        f"| {share(total('parameters_held'), total('parameters'))} | {len(wrong(rows))} "
+        f"| {misfits} |"
     )
 
 
 def report(tables: Path) -> str:
     """Return a table over all seeds, and the sets that are far off."""
     lines, far = [HEAD], []
-    for way in (*WAYS, *(_WIDE + way for way in WAYS)):
+    for way in (_named(way, of) for of in SETS for way in WAYS):
         rows = []
         for table in sorted(tables.glob(f"{way}-*.csv")):
             of_seed = rows_of(table)

@@ -35,6 +35,7 @@ from inference.posterior.criticism.discrepancy_check import (
 from inference.posterior.criticism.many_frames import bias_of_many_frames
 from inference.posterior.criticism.model_check import (
     asked_for,
+    is_explained,
     model_check,
     with_room,
 )
@@ -149,6 +150,7 @@ class _Drawn:
     draws: Draws
     whole: Whole | None
     checked: tuple[Fit, LargerDiscrepancy | None] | None
+    explained: bool  # readings that refute the model, by errors that there is room for
     bias: Array | None
 
 
@@ -168,7 +170,7 @@ def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
     sample, parts = sample_of(density, stage, rng), job.parts()
     own = density if job.representatives is None else parts[0].density()
     draws, whole = draws_of(own, parts[0], sample, rng, len(parts)), None
-    every, bias, checked = None, None, None
+    every, bias, checked, explained = None, None, None, True
     if sample.drawn and job.representatives is not None:
         every = dataclasses.replace(job, representatives=None).density()
         bias = bias_of_many_frames(every, sample.flat, job.stream(Stream.PARTS))
@@ -182,9 +184,23 @@ def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
                 for part in parts
             )
             whole = with_model_error(parts[0], own, sample, draws, density, bias)
+        if checked[0].misfit:
+            explained = is_explained(parts[0], own, whole, rng, parts[1:])
         draws = whole.draws
     return _Drawn(
-        job, density, every, parts, own, stage, calls, sample, draws, whole, checked, bias
+        job,
+        density,
+        every,
+        parts,
+        own,
+        stage,
+        calls,
+        sample,
+        draws,
+        whole,
+        checked,
+        explained,
+        bias,
     )
 
 
@@ -312,6 +328,8 @@ def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
         if larger.bayes_factor > MISFIT and rates_of(drawn.own.frames) is not None:
             # known ranges and readings contradict each other: a widened answer is no certain one
             judged = weak_at_best(judged, "by errors of the model that are larger than stated")
+    if not drawn.explained:
+        judged = weak_at_best(judged, "by readings that no larger noise or smooth error explains")
     found = prior_conflicts(drawn.own, sample.flat, log_r, density, job.model_error)
     fit, judged = contradicted(fit, judged, found)
     reasons = (*reasons, *_unfinished(drawn.own, chosen, job.stream(Stream.INTEGRALS)))

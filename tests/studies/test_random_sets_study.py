@@ -87,7 +87,7 @@ def test_no_window_of_a_derivative_is_bias_for_the_most_part() -> None:
 @pytest.mark.parametrize("number", [359, 367, 537])
 def test_two_frames_tell_no_derivative(number: int) -> None:
     """Both had the range of the chord between them, and were up to 13.6 sd off."""
-    row = answer_row("estimate", 4242, 1.0, number, "v", wide=True)
+    row = answer_row("estimate", 4242, 1.0, number, "v", of="wide")
     assert float(row["worst"]) < 3.0
 
 
@@ -97,13 +97,13 @@ def test_a_few_frames_do_not_tell_more_of_a_derivative_than_they_can(
 ) -> None:
     """Light grows a hundredfold within them: ranges were 5.1 to 19 sd off."""
     monkeypatch.setattr(wide, "_FRAMES", (count - 0.4, count + 0.4))
-    row = answer_row("estimate", 99, 1.0, number, "v", wide=True)
+    row = answer_row("estimate", 99, 1.0, number, "v", of="wide")
     assert float(row["worst"]) < 4.0
 
 
 def test_a_valley_that_falls_slowly_holds_mass() -> None:
     """The distance of a wall was 3.0 sd off and `identified`: its profile falls by half of what
     curvature foresees, and no valley was followed there."""
-    row = answer_row("fits", 4242, 1.0, 88, "v", wide=True)
+    row = answer_row("fits", 4242, 1.0, 88, "v", of="wide")
     assert row["answered"] == row["held"] == 69
     assert float(row["worst"]) < 2.0

@@ -53,7 +53,7 @@ class FitResiduals:
 
 def _with_flux_error(job: Job, density: CollapsedDensity) -> CollapsedDensity:
     """Return the density with all that the flux may err by, sampled or not."""
-    error = job.scene.model_error
+    error = job.model_error
     if isinstance(density, DiscrepantDensity | StaticDensity) or error.flux == 0:
         return density  # at rest it is no different from another c2
     return with_discrepancy(density, error.flux)

@@ -27,6 +27,7 @@ __all__ = [
     "LARGEST",
     "asked_for",
     "flux_error_asked_for",
+    "is_explained",
     "model_check",
     "noise_asked_for",
     "with_room",
@@ -62,7 +63,7 @@ def model_check(
     demands = larger is not None and larger.bayes_factor > MISFIT
     if others or not (fit.misfit or demands):
         return fit, larger
-    log_r, error = np.log(whole.draws.range_m[..., job.usable]), job.scene.model_error
+    log_r, error = np.log(whole.draws.range_m[..., job.usable]), job.model_error
     answered = log_r.reshape(-1, log_r.shape[-1])
     best = best_point(density, whole.chosen, whole.log_r, error, answered)
     if best is None:
@@ -70,6 +71,34 @@ def model_check(
     if larger is not None:
         larger = beside_shadow(larger, best)
     return predictive_check(job, density, whole.chosen, rng, best=best), larger
+
+
+def is_explained(
+    job: Job,
+    density: CollapsedDensity,
+    whole: Whole,
+    rng: np.random.Generator,
+    others: tuple[Job, ...],
+) -> bool:
+    """Tell whether readings that refute the model are such as larger errors make.
+
+    Noise that is larger than stated, or a larger smooth error of the flux, may explain all that
+    was seen: intervals with room for it are honest then. One frame far off, or light that drifts,
+    is neither, and answers that rest on such frames have no size.
+
+    Parameters
+    ----------
+    job, density, whole, rng, others
+        As for `model_check`, with the room that the readings ask for.
+
+    Returns
+    -------
+    bool
+        False where they ask for none.
+    """
+    if not max(job.flux_times, job.noise_times) > 1:
+        return False
+    return not model_check(job, density, whole, rng, others)[0].misfit
 
 
 def flux_error_asked_for(job: Job, fit: Fit) -> float:

@@ -25,6 +25,7 @@ _FEWEST = 40  # of the frames of each part, where they were dealt out
 _TAIL = 0.1  # share of the replicates that tell how the tail falls
 _LENGTH = 0.5  # in log r, of a smooth error
 TOTAL, FLUX_ERROR = "total", "flux_error"
+_NEIGHBOURS = "neighbours"
 
 
 def _total(of: FitResiduals) -> Array:
@@ -61,14 +62,14 @@ def _flux_error(of: FitResiduals) -> Array:
 _CHECKS: dict[str, Callable[[FitResiduals], Array]] = {
     TOTAL: _total,
     "worst_frame": _worst,
-    "neighbours": _neighbours,
+    _NEIGHBOURS: _neighbours,
     "wander": _wander,
     FLUX_ERROR: _flux_error,
 }
 
 
 # how a statistic of all frames is made from those of parts; others are sums
-_TOGETHER: dict[str, Callable[..., Array]] = {"worst_frame": np.max, "neighbours": np.mean}
+_TOGETHER: dict[str, Callable[..., Array]] = {"worst_frame": np.max, _NEIGHBOURS: np.mean}
 
 
 def _survival(anew: Array, seen: Array) -> float:
@@ -115,6 +116,11 @@ def predictive_check(
     best : BestPoint, optional
         Where readings before a background are met best with errors of the model: where draws of an
         exact model are no place to follow them from.
+
+    Notes
+    -----
+    Of a job whose readings ask for larger errors (`Job.flux_times`, `Job.noise_times`) frames are
+    compared with replicates that err by as much.
     """
     chosen = np.linspace(0, len(z) - 1, min(_DRAWS, len(z))).astype(np.intp)
     replicates = max(_REPLICATES // (1 + len(others)), _FEWEST)
@@ -129,7 +135,8 @@ def predictive_check(
     checks = []
     for name in _CHECKS:
         values = _TOGETHER.get(name, np.sum)([of[name] for of in found], axis=0)
-        p = _survival(values[:, 1:].ravel(), values[:, 0])
+        noisier = 1.0 if name == _NEIGHBOURS else job.noise_times  # a correlation has no size
+        p = _survival(values[:, 1:].ravel(), values[:, 0] / noisier)
         mean = float(values[:, 1:].mean())
         checks.append(FitCheck(name, float(np.median(values[:, 0])), mean, p))
     least = min(check.p_value for check in checks)
@@ -172,7 +179,7 @@ def _words(check: FitCheck, outliers: tuple[int, ...]) -> str:
         more = f" and {len(outliers) - 10} more" if len(outliers) > 10 else ""
         named = f" (frames {which}{more}, counted from 0)" if outliers else ""
         return f"the worst frame lies {size:.3g} standard deviations off the model{named}"
-    if check.name == "neighbours":
+    if check.name == _NEIGHBOURS:
         return (
             f"residuals of neighbouring ranges go together (correlation {check.statistic:.2g}): "
             "the model has a smooth error along the range beyond what `discrepancy` allows"
