@@ -52,7 +52,7 @@ def sampled(data: PathSet, seed: int, max_seconds: float) -> tuple[Job, Checkpoi
 def answers(job: Job, checkpoint: Checkpoint) -> tuple[Posterior, Posterior]:
     """Return what is answered, and what would be without room for larger errors."""
     found = fold.summarise(job, checkpoint, 0.0, 0.0)
-    with mock.patch("inference.posterior.summary.asked_for", return_value=(1.0, 1.0)):
+    with mock.patch("inference.posterior.criticism.room.asked_for", return_value=(1.0, 1.0)):
         return found, fold.summarise(job, checkpoint, 0.0, 0.0)
 
 

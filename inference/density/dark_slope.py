@@ -1,6 +1,6 @@
 """How the law of ranges in the dark follows an error of the flux.
 
-A brighter curve leaves less room in the dark, and the law there grows (`inference.frame.dark_mass`).
+A brighter curve leaves less room in the dark, where the law grows (`inference.frame.dark_mass`).
 """
 
 import math

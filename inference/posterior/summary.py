@@ -33,17 +33,13 @@ from inference.posterior.criticism.discrepancy_check import (
     with_model_part,
 )
 from inference.posterior.criticism.many_frames import bias_of_many_frames
-from inference.posterior.criticism.model_check import (
-    asked_for,
-    is_explained,
-    model_check,
-    with_room,
-)
+from inference.posterior.criticism.model_check import model_check
 from inference.posterior.criticism.other_optima import Stated, mark_other_optima
 from inference.posterior.criticism.prior_conflict import prior_conflicts
 from inference.posterior.criticism.prior_contradiction import contradicted
 from inference.posterior.criticism.prior_dark import mark_dark
 from inference.posterior.criticism.prior_sensitivity import mark_sensitive
+from inference.posterior.criticism.room import Room, room_for, with_room
 from inference.posterior.findings import Findings
 from inference.posterior.job import Job
 from inference.posterior.sample import Sample, sample_of
@@ -175,17 +171,15 @@ def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
         every = dataclasses.replace(job, representatives=None).density()
         bias = bias_of_many_frames(every, sample.flat, job.stream(Stream.PARTS))
     if sample.drawn:
-        whole = with_model_error(parts[0], own, sample, draws, density, bias)
+
+        def moved(part: Job) -> Whole:
+            return with_model_error(part, own, sample, draws, density, bias)
+
+        whole = moved(parts[0])
         checked = model_check(parts[0], own, whole, rng, parts[1:])
-        of_flux, of_noise = asked_for(given, own, *checked)
-        if max(of_flux, of_noise) > 1:
-            parts = tuple(
-                dataclasses.replace(part, flux_times=of_flux, noise_times=of_noise)
-                for part in parts
-            )
-            whole = with_model_error(parts[0], own, sample, draws, density, bias)
-        if checked[0].misfit:
-            explained = is_explained(parts[0], own, whole, rng, parts[1:])
+        stated = Room(parts, whole, not checked[0].misfit)
+        room = room_for(given, own, stated, checked, moved, rng)
+        parts, whole, explained = room.parts, room.whole, room.explained
         draws = whole.draws
     return _Drawn(
         job,

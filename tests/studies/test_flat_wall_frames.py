@@ -47,7 +47,7 @@ def test_a_posterior_before_a_flat_wall_holds_only_with_the_error_of_its_shadow(
     assert exact.flagged
     # a misfit has room for noise, which is all that an exact model may err by
     assert exact.off.max() < 5.0
-    with mock.patch("inference.posterior.summary.asked_for", return_value=(1.0, 1.0)):
+    with mock.patch("inference.posterior.criticism.room.asked_for", return_value=(1.0, 1.0)):
         without = answered(stating(given, 0), "infer", 2)
     assert without is not None
     assert without.flagged

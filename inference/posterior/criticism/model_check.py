@@ -1,6 +1,5 @@
 """Whether the model can make such readings, and errors of what size they would ask for."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -27,10 +26,8 @@ __all__ = [
     "LARGEST",
     "asked_for",
     "flux_error_asked_for",
-    "is_explained",
     "model_check",
     "noise_asked_for",
-    "with_room",
 ]
 
 LARGEST = 1.0  # standard deviation of the logarithm of the flux: a factor e
@@ -71,34 +68,6 @@ def model_check(
     if larger is not None:
         larger = beside_shadow(larger, best)
     return predictive_check(job, density, whole.chosen, rng, best=best), larger
-
-
-def is_explained(
-    job: Job,
-    density: CollapsedDensity,
-    whole: Whole,
-    rng: np.random.Generator,
-    others: tuple[Job, ...],
-) -> bool:
-    """Tell whether readings that refute the model are such as larger errors make.
-
-    Noise that is larger than stated, or a larger smooth error of the flux, may explain all that
-    was seen: intervals with room for it are honest then. One frame far off, or light that drifts,
-    is neither, and answers that rest on such frames have no size.
-
-    Parameters
-    ----------
-    job, density, whole, rng, others
-        As for `model_check`, with the room that the readings ask for.
-
-    Returns
-    -------
-    bool
-        False where they ask for none.
-    """
-    if not max(job.flux_times, job.noise_times) > 1:
-        return False
-    return not model_check(job, density, whole, rng, others)[0].misfit
 
 
 def flux_error_asked_for(job: Job, fit: Fit) -> float:
@@ -169,22 +138,6 @@ def noise_asked_for(fit: Fit) -> float:
     if not fit.p_value < MISFIT_P or total.p_value > _BY_CHANCE or not total.expected > 0:
         return 1.0
     return max(1.0, total.statistic / total.expected)
-
-
-def with_room(fit: Fit, job: Job) -> Fit:
-    """Say for what an answer was given room."""
-    reasons = fit.reasons
-    if job.flux_times > 1:
-        reasons += (
-            f"every interval has room for errors of the object's flux {job.flux_times:.2g} times "
-            "what `discrepancy` allows",
-        )
-    if job.noise_times > 1:
-        reasons += (
-            f"every interval is as wide as noise {math.sqrt(job.noise_times):.2g} times what is "
-            "stated makes it",
-        )
-    return dataclasses.replace(fit, reasons=reasons)
 
 
 def _check(fit: Fit, name: str) -> FitCheck:
