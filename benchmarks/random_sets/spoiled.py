@@ -27,7 +27,9 @@ def _between(low: float, high: float, rng: np.random.Generator) -> float:
     return math.exp(rng.uniform(math.log(low), math.log(high)))
 
 
-def _kicked(count: int, y: Array, read: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+def _kicked(
+    count: int, y: Array, read: Array, rng: np.random.Generator
+) -> tuple[Array, NDArray[np.intp]]:
     """Return readings with some frames of something else: brighter, darker, or anywhere."""
     which, y = rng.choice(len(y), size=min(count, len(y)), replace=False), y.copy()
     if rng.random() < 0.5:
