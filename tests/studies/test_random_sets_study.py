@@ -7,6 +7,7 @@ from benchmarks.random_sets import wide
 from benchmarks.random_sets.answers import COLUMNS, answer_row
 from benchmarks.random_sets.report import summary, wrong
 from benchmarks.random_sets.sets import random_set
+from benchmarks.random_sets.spoiled import SPOILED, spoiled_set
 from benchmarks.random_sets.wide import wide_set
 from simulator.scene import parse_scene
 from simulator.scene_checks import check_scene
@@ -46,6 +47,27 @@ def test_wide_sets_are_what_they_say() -> None:
     assert len(told) > 15
     again = wide_set(SEED, 3).frames.readings
     np.testing.assert_array_equal(wide_set(SEED, 3).frames.readings, again)
+
+
+def test_spoiled_sets_are_random_sets_with_other_readings() -> None:
+    seen = set()
+    for number in range(60):
+        data, before = spoiled_set(SEED, number), random_set(SEED, number)
+        way = next(way for way in SPOILED if data.name.startswith(way))
+        assert data.name.endswith(before.name)
+        seen.add(way)
+        assert data.scene == before.scene
+        gone = np.isfinite(before.range_m) & np.isnan(data.range_m)
+        np.testing.assert_array_equal(data.range_m[~gone], before.range_m[~gone])
+        new, old = data.frames.readings, before.frames.readings
+        # a sensor may be stuck from the last frame on
+        assert way == "stuck for" or not np.array_equal(new, old)
+        changed = np.any(new != old, axis=1)
+        assert changed[gone].all()
+        if way in ("one outlier", "a tenth outliers", "clipped at", "stuck for"):
+            held = np.isfinite(data.range_m)
+            np.testing.assert_array_equal(new[held], old[held])
+    assert seen == set(SPOILED)
 
 
 def test_no_technique_is_far_off_without_a_flag() -> None:

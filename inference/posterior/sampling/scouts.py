@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 MOST_FRAMES = 200  # at most; the walkers then start the wider, the more frames there are
 _SCOUTS = 2 * WALKERS
 _HOT = 0.003  # power of the likelihood, from which on places are remembered
-# temperatures: of wide random sets up to a signal-to-noise ratio of 1e6 none took half as many;
+# temperatures: of 75 wide random sets up to a signal-to-noise ratio of 1e6 none took half as many;
 # readings that no parameters explain are a million nats apart from member to member
 _MOST = 200
 

@@ -113,3 +113,18 @@ def test_many_frames_are_thinned_over_all_of_them() -> None:
     np.testing.assert_array_equal(thin.present, present[places])
     few = collapsed_density(*example("pulsed", False, frames=200))
     assert thinned(few) is few
+
+
+def test_scouts_end_on_their_way_after_so_many_temperatures(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Readings that nothing explains kept them for 800, which took 73 s where 2 were allowed."""
+    density = collapsed_density(*example("pulsed", crosstalk=True))
+    arrived, whole = send_scouts(density, np.random.default_rng(1))
+    monkeypatch.setattr(scouts, "_MOST", 3)
+    found, calls = send_scouts(density, np.random.default_rng(1))
+    assert calls < whole
+    # the screen, and two sweeps at each temperature
+    assert calls <= 4 * scouts._SCOUTS + 3 * 2 * scouts._SCOUTS
+    assert np.isfinite(density(found.z)).all()
+    assert found.z.std(axis=0).max() > 3.0 * arrived.z.std(axis=0).max()
