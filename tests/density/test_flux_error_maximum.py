@@ -16,9 +16,9 @@ Array = NDArray[np.float64]
 
 CASES: dict[str, tuple[str, float, tuple[float, float], dict[str, float]]] = {
     # kind, SNR at 1 m, how far frames go: in the dark the law of ranges follows the curve
-    "lit": ("pulsed", 30.0, (0.3, 1.0), {"shot": 2e-5, "relative": 0.02}),
-    "dark": ("sine_wave", 10.0, (0.3, 2.5), {"relative": 0.02}),
-    "read noise": ("pulsed", 10.0, (0.3, 2.5), {}),
+    "noise that grows with the light": ("pulsed", 30.0, (0.3, 1.0), {"relative": 0.3}),
+    "a pulse in the dark": ("pulsed", 1.0, (0.5, 3.0), {}),
+    "a wave in the dark": ("sine_wave", 1.0, (0.5, 3.0), {}),
 }
 
 
@@ -39,15 +39,15 @@ def test_the_integral_is_laplaces_at_the_maximum(case: str) -> None:
     """A curve changes what noise, and the law of ranges in the dark, are: slopes know of both."""
     kind, snr, span, noise = CASES[case]
     sensor, crosstalk = sensor_of(kind, snr, **noise), [0.002, 0.01]
-    frames = data(sensor, {"crosstalk": crosstalk}, 40, seed=3, span=span).frames
+    frames = data(sensor, {"crosstalk": crosstalk}, 80, seed=3, span=span).frames
     scene: dict[str, Any] = {"object": OBJECT, "crosstalk": crosstalk}
     density = with_discrepancy(collapsed_density(sensor, parse_scene(scene), frames), 0.05)
     z = np.empty(0)
     (centre,), (factor,), values = density.expansions(np.empty((1, 0)))
     top = of_coefficients(density, z, centre)
     logdet = float(np.log(np.abs(np.diagonal(factor))).sum())
-    # what is left of a climb is 1e-3 nats, ten times for where it ends at a rejected step
-    assert float(values.sum()) == pytest.approx(top - logdet, abs=1e-2)
+    # of a climb 1e-3 nats may be left, and the integral counts them
+    assert float(values.sum()) == pytest.approx(top - logdet, abs=2e-3)
     steps = 1e-3 * np.eye(centre.size)
     slopes = [
         (of_coefficients(density, z, centre + step) - of_coefficients(density, z, centre - step))
@@ -55,4 +55,4 @@ def test_the_integral_is_laplaces_at_the_maximum(case: str) -> None:
         for step in steps
     ]
     gain = 0.5 * float(np.sum(np.linalg.solve(factor.T, np.array(slopes)) ** 2))
-    assert gain < 1e-2
+    assert gain < 1e-3
