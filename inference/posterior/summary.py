@@ -319,8 +319,8 @@ def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
     judged = _judged(drawn, whole)
     if larger is not None:
         fit = judge_fit(fit, larger)
-        if larger.bayes_factor > MISFIT and rates_of(drawn.own.frames) is not None:
-            # known ranges and readings contradict each other: a widened answer is no certain one
+        if larger.bayes_factor > MISFIT:
+            # also one that was widened, as where ranges are known, is no certain answer
             judged = weak_at_best(judged, "by errors of the model that are larger than stated")
     if not drawn.explained:
         judged = weak_at_best(judged, "by readings that no larger noise or smooth error explains")

@@ -12,7 +12,7 @@ from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
 from simulator.frames import Frames
 from simulator.scene import parse_scene
-from tests.posterior.scenes import data, sensor_of
+from tests.posterior.scenes import OBJECT, data, sensor_of
 
 FRAMES, SPAN = 30, (0.2, 1.2)
 WHY = "that no larger noise or smooth error explains"
@@ -69,3 +69,17 @@ def test_noise_that_is_larger_than_stated_explains_itself(times: float, seed: in
     assert not any(WHY in row.reason for row in rows.values())
     assert any("is as wide as noise" in reason for reason in found.fit.reasons)
     assert np.abs((found.range_m.mean - truth) / found.range_m.sd).max() < 4.0
+
+
+def test_an_error_far_above_the_one_that_is_integrated_leaves_nothing_identified() -> None:
+    """What is stated in numbers gets no room: intervals are as narrow as it makes them."""
+    sensor, truth = sensor_of("pulsed"), {"crosstalk": [0.002, 0.01], "discrepancy": 0.3}
+    frames = data(sensor, truth, 10, seed=3, span=(0.4, 1.2)).frames
+    amplitude = {"prior": "lognormal", "median": OBJECT["c2"], "sigma": 0.3}
+    scene = {"object": {**OBJECT, "c2": amplitude}, "crosstalk": [0.002, 0.01]}
+    settings = SamplerSettings(method="auto", seed=1, max_seconds=30.0)
+    found = infer(sensor, parse_scene({**scene, "discrepancy": 0.01}), frames, settings)
+    assert found.fit.misfit
+    rows = {row.parameter: row for row in found.identifiability}
+    assert "identified" not in {row.status for row in rows.values()}
+    assert "larger than stated" in rows["range_m"].reason
