@@ -14,17 +14,20 @@ from numpy.typing import NDArray
 
 from benchmarks.coverage.paths import PathSet
 from benchmarks.random_sets.sets import random_set
+from benchmarks.random_sets.wide import between
 
 __all__ = ["SPOILED", "spoiled_set"]
 
 Array = NDArray[np.float64]
-# readings, shape (n, 2), their read noise, a source of randomness: readings anew, whether a frame
-# no longer tells the range that it had, and a size for the name
-Spoil = Callable[[Array, Array, np.random.Generator], tuple[Array, NDArray[np.bool_], float]]
+Flags = NDArray[np.bool_]
+# readings anew, whether a frame no longer tells the range that it had, and a size for the name
+Spoiled = tuple[Array, Flags, float]
+# of readings, shape (n, 2), their read noise, and a source of randomness
+Spoil = Callable[[Array, Array, np.random.Generator], Spoiled]
 
 
-def _between(low: float, high: float, rng: np.random.Generator) -> float:
-    return math.exp(rng.uniform(math.log(low), math.log(high)))
+def _none(y: Array) -> Flags:
+    return np.zeros(len(y), dtype=bool)
 
 
 def _kicked(
@@ -33,74 +36,58 @@ def _kicked(
     """Return readings with some frames of something else: brighter, darker, or anywhere."""
     which, y = rng.choice(len(y), size=min(count, len(y)), replace=False), y.copy()
     if rng.random() < 0.5:
-        y[which] *= _between(0.3, 3.3, rng)
+        y[which] *= between((0.3, 3.3), rng)
     else:
-        y[which] += _between(5.0, 1e4, rng) * read * rng.standard_normal((len(which), 2))
+        y[which] += between((5.0, 1e4), rng) * read * rng.standard_normal((len(which), 2))
     return y, which
 
 
-def _outlier(
-    y: Array, read: Array, rng: np.random.Generator
-) -> tuple[Array, NDArray[np.bool_], float]:
+def _outlier(y: Array, read: Array, rng: np.random.Generator) -> Spoiled:
     new, which = _kicked(1, y, read, rng)
     return new, np.isin(np.arange(len(y)), which), 1.0
 
 
-def _outliers(
-    y: Array, read: Array, rng: np.random.Generator
-) -> tuple[Array, NDArray[np.bool_], float]:
+def _outliers(y: Array, read: Array, rng: np.random.Generator) -> Spoiled:
     count = max(2, round(0.1 * len(y)))
     new, which = _kicked(count, y, read, rng)
     return new, np.isin(np.arange(len(y)), which), float(count)
 
 
-def _noise(
-    y: Array, read: Array, rng: np.random.Generator
-) -> tuple[Array, NDArray[np.bool_], float]:
-    times = _between(1.3, 6.0, rng)
+def _noise(y: Array, read: Array, rng: np.random.Generator) -> Spoiled:
+    times = between((1.3, 6.0), rng)
     more = math.sqrt(times**2 - 1.0) * read * rng.standard_normal(y.shape)
-    return y + more, np.zeros(len(y), dtype=bool), times
+    return y + more, _none(y), times
 
 
-def _tails(
-    y: Array, read: Array, rng: np.random.Generator
-) -> tuple[Array, NDArray[np.bool_], float]:
-    return y + read * rng.standard_t(2, size=y.shape), np.zeros(len(y), dtype=bool), 2.0
+def _tails(y: Array, read: Array, rng: np.random.Generator) -> Spoiled:
+    return y + read * rng.standard_t(2, size=y.shape), _none(y), 2.0
 
 
-def _crosstalk_drift(
-    y: Array, read: Array, rng: np.random.Generator
-) -> tuple[Array, NDArray[np.bool_], float]:
-    size = _between(3.0, 300.0, rng)
+def _crosstalk_drift(y: Array, read: Array, rng: np.random.Generator) -> Spoiled:
+    size = between((3.0, 300.0), rng)
     way = size * read * rng.standard_normal(2)
-    return y + np.linspace(0.0, 1.0, len(y))[:, None] * way, np.zeros(len(y), dtype=bool), size
+    return y + np.linspace(0.0, 1.0, len(y))[:, None] * way, _none(y), size
 
 
-def _gain_drift(
-    y: Array, _: Array, rng: np.random.Generator
-) -> tuple[Array, NDArray[np.bool_], float]:
+def _gain_drift(y: Array, _: Array, rng: np.random.Generator) -> Spoiled:
     size = rng.uniform(-0.3, 0.3)
-    return y * np.linspace(1.0, 1.0 + size, len(y))[:, None], np.zeros(len(y), dtype=bool), size
+    return y * np.linspace(1.0, 1.0 + size, len(y))[:, None], _none(y), size
 
 
-def _clipped(
-    y: Array, _: Array, rng: np.random.Generator
-) -> tuple[Array, NDArray[np.bool_], float]:
+def _clipped(y: Array, _: Array, rng: np.random.Generator) -> Spoiled:
     share = rng.uniform(0.4, 0.95)
     most = share * np.abs(y).max(axis=0)
     return np.clip(y, -most, most), np.asarray((np.abs(y) > most).any(axis=1)), share
 
 
-def _coarse(
-    y: Array, read: Array, rng: np.random.Generator
-) -> tuple[Array, NDArray[np.bool_], float]:
-    step = _between(1.0, 30.0, rng)
-    return np.round(y / (step * read)) * step * read, np.zeros(len(y), dtype=bool), step
+def _coarse(y: Array, read: Array, rng: np.random.Generator) -> Spoiled:
+    step = between((1.0, 30.0), rng)
+    return np.round(y / (step * read)) * step * read, _none(y), step
 
 
-def _stuck(y: Array, _: Array, rng: np.random.Generator) -> tuple[Array, NDArray[np.bool_], float]:
+def _stuck(y: Array, _: Array, rng: np.random.Generator) -> Spoiled:
     first, count = int(rng.integers(len(y))), max(2, len(y) // 4)
-    after = np.zeros(len(y), dtype=bool)
+    after = _none(y)
     after[first + 1 : first + count] = True
     return np.where(after[:, None], y[first], y), after, float(after.sum())
 

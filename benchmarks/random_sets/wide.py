@@ -18,7 +18,7 @@ from simulator.sensor import parse_sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
 
-__all__ = ["wide_set"]
+__all__ = ["between", "wide_set"]
 
 _LIGHT_SPEED = 299792458.0
 _WIDTHS_S, _FREQUENCIES_HZ = (2e-8, 3e-7), (1e6, 4e7)
@@ -64,23 +64,23 @@ def wide_set(seed: int, number: int) -> PathSet:
     rng = np.random.default_rng([seed, number, 1])
     pulsed = rng.random() < 0.5
     if pulsed:
-        width = _between(_WIDTHS_S, rng)
+        width = between(_WIDTHS_S, rng)
         kind: dict[str, Any] = {"kind": "pulsed", "pulse_width_s": width}
         reach = 0.5 * _LIGHT_SPEED * width
     else:
-        frequency = _between(_FREQUENCIES_HZ, rng)
+        frequency = between(_FREQUENCIES_HZ, rng)
         kind = {"kind": "sine_wave", "frequency_hz": frequency}
         reach = 0.5 * _LIGHT_SPEED / frequency
     path, light = str(rng.choice(list(PATHS))), str(rng.choice(LIGHT))
-    snr = _between(_SNR, rng)
-    count, empty = round(_between(_FRAMES, rng)), int(rng.choice(_EMPTY))
-    low = min(_between(_NEAREST_M, rng), 0.25 * reach)
-    high = min(low * _between(_STROKE, rng), 0.6 * reach)
+    snr = between(_SNR, rng)
+    count, empty = round(between(_FRAMES, rng)), int(rng.choice(_EMPTY))
+    low = min(between(_NEAREST_M, rng), 0.25 * reach)
+    high = min(low * between(_STROKE, rng), 0.6 * reach)
     inside = math.exp(1e-3 * math.log(high / low))
     ranges = PATHS[path](low * inside, high / inside, count, rng)
     thing = _object(rng)
     c0, c1, c2 = (thing.is_[name] for name in ("c0", "c1", "c2"))
-    gain = _between(_GAIN, rng)
+    gain = between(_GAIN, rng)
     middle = gain * float(object_flux(math.sqrt(low * high), c0 * c2, c0, c1))
     parts = {"object": thing}
     if light in ("crosstalk", "both"):
@@ -112,7 +112,8 @@ def wide_set(seed: int, number: int) -> PathSet:
     return PathSet(name, sensor, seen.frames, told, seen.range_m, truth)
 
 
-def _between(ends: tuple[float, float], rng: np.random.Generator) -> float:
+def between(ends: tuple[float, float], rng: np.random.Generator) -> float:
+    """Draw a number whose logarithm is uniform between two ends."""
     return math.exp(rng.uniform(math.log(ends[0]), math.log(ends[1])))
 
 
@@ -130,7 +131,7 @@ def _object(rng: np.random.Generator) -> _Part:
 
 
 def _crosstalk(columns: tuple[str, str], middle: float, rng: np.random.Generator) -> _Part:
-    size = middle * _between((1e-3, 3.0), rng)
+    size = middle * between((1e-3, 3.0), rng)
     values = (size * rng.standard_normal(2)).tolist()
     way = str(rng.choice(_TOLD_OF_CROSSTALK))
     normal = {"prior": "normal", "mean": 0.0, "sd": size}
@@ -155,8 +156,8 @@ def _crosstalk(columns: tuple[str, str], middle: float, rng: np.random.Generator
 def _background(
     middle: float, high: float, reach: float, c0: float, rng: np.random.Generator
 ) -> _Part:
-    strength = middle * _between((0.05, 2.0), rng)
-    distance = max(min(high * _between((1.1, 6.0), rng), 0.95 * reach), 1.02 * high)
+    strength = middle * between((0.05, 2.0), rng)
+    distance = max(min(high * between((1.1, 6.0), rng), 0.95 * reach), 1.02 * high)
     shadow = shadow_of(c0, rng)
     is_ = {"strength": strength, "distance_m": distance, "shadow": shadow}
     told: dict[str, Any] = {"strength": strength, "distance_m": distance}
@@ -172,11 +173,11 @@ def _background(
 
 def _noise(middle: float, snr: float, rng: np.random.Generator) -> dict[str, Any]:
     read = middle / snr
-    law: dict[str, Any] = {"read": [read, read * _between((0.3, 3.0), rng)]}
+    law: dict[str, Any] = {"read": [read, read * between((0.3, 3.0), rng)]}
     if rng.random() < 0.4:
-        law["shot"] = read * read / middle * _between((0.1, 10.0), rng)
+        law["shot"] = read * read / middle * between((0.1, 10.0), rng)
     if rng.random() < 0.25:
-        law["relative"] = _between((1e-4, 0.03), rng)
+        law["relative"] = between((1e-4, 0.03), rng)
     return law
 
 
@@ -184,7 +185,7 @@ def _ruled(count: int, rng: np.random.Generator) -> list[float | None]:
     """Draw which ranges are known, and how well."""
     ruled: list[float | None] = [None] * count
     if rng.random() < _RULED:
-        sd = _between(_RULER_M, rng)
+        sd = between(_RULER_M, rng)
         for i in rng.choice(count, min(count, int(rng.integers(1, 6))), replace=False).tolist():
             ruled[i] = sd
     return ruled
