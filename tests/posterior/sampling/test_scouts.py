@@ -118,7 +118,7 @@ def test_many_frames_are_thinned_over_all_of_them() -> None:
 def test_scouts_end_on_their_way_after_so_many_temperatures(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Readings that nothing explains kept them for 800, which took 73 s where 2 were allowed."""
+    """Readings that nothing explains kept them for 800."""
     density = collapsed_density(*example("pulsed", crosstalk=True))
     arrived, whole = send_scouts(density, np.random.default_rng(1))
     monkeypatch.setattr(scouts, "_MOST", 3)
