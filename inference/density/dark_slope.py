@@ -14,7 +14,7 @@ from inference.density.flux_expansion import (
     add_slopes,
     information_slopes,
 )
-from inference.frame.arguments import FrameScene
+from inference.frame.arguments import FrameScene, Instrument
 from inference.frame.dark_mass import DARK_MASS
 from inference.frame.gaussian import precision_product
 from inference.frame.mean_readings import readings_along
@@ -61,16 +61,16 @@ def add_dark_slope(
     dark = scene.range_prior.dark
     if not (weight > 0.0 and dark < 1.0):
         return
+    r0, wave, read, shot, _ = scene.instrument
+    instrument = Instrument(r0, wave, read, shot, None)  # that of the table's law
     n = table.shape[1]
     whole = weight * dark / (DARK_MASS * math.sqrt(LEAST_INFORMATION))
     for k in range(n):
         u = table[LOG_RANGE, k]
         width = 0.5 * (table[LOG_RANGE, min(k + 1, n - 1)] - table[LOG_RANGE, max(k - 1, 0)])
         along = readings_along(u, math.exp(u), strongest, scene)
-        told = precision_product(
-            along.slope, along.slope, along.mean, along.signal, scene.instrument
-        )
-        pushed, turned = information_slopes(along, scene)
+        told = precision_product(along.slope, along.slope, along.mean, along.signal, instrument)
+        pushed, turned = information_slopes(along, instrument)
         share = whole * width * (1.0 + told / LEAST_INFORMATION) ** -1.5
         add_row(gradient, functions, u, share * pushed)
         add_slopes(gradient, functions, u, share * turned)

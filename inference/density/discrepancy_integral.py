@@ -40,7 +40,7 @@ __all__ = ["integrate_flux_error"]
 Array = NDArray[np.float64]
 
 _ROUNDS = 8
-_SMALL = 1e-2  # nats; the slope of wide modes is not exact
+_SMALL = 1e-2  # nats that may be left to be gained where a step gains nothing
 _DONE = 1e-3  # nats below the maximum at which the expansion is good
 # nats that are still to be gained after the climb: parameters that fit nothing, where more would
 # decide nothing; at optima of the coverage study it was seen to end within a nat

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.range_integral import falls_off
-from inference.frame.arguments import FluxError, FrameScene, Pair
+from inference.frame.arguments import FluxError, FrameScene, Instrument, Pair
 from inference.frame.blocks import Block, frame_of
 from inference.frame.flux_error import cubic_weights, slope_weights
 from inference.frame.gaussian import (
@@ -141,7 +141,7 @@ def _resolution(
     """Return what a reference prior adds to density, slope along log flux, turn and darkness."""
     if not scene.range_prior.resolves:
         return 0.0, 0.0, 0.0, 0.0
-    pushed, turned = information_slopes(along, scene)
+    pushed, turned = information_slopes(along, scene.instrument)
     dark = scene.range_prior.dark
     whole, lit = LEAST_INFORMATION + information, dark * LEAST_INFORMATION + information
     rate = 2.0 / lit - 1.0 / whole
@@ -150,10 +150,9 @@ def _resolution(
 
 
 @compiled
-def information_slopes(along: Along, scene: FrameScene) -> Pair:
+def information_slopes(along: Along, instrument: Instrument) -> Pair:
     """Return half the slopes of a frame's information on log r along log flux, and its slope."""
     signal, signal_slope, mean, slope = along
-    instrument = scene.instrument
     pushed = precision_product(signal_slope, slope, mean, signal, instrument)
     # shot and relative noise grow with the flux: the same curve then tells less
     pushed -= covariance_slope(slope, mean, signal, signal, signal, instrument)

@@ -19,6 +19,7 @@ CASES: dict[str, tuple[str, float, tuple[float, float], dict[str, float]]] = {
     "noise that grows with the light": ("pulsed", 30.0, (0.3, 1.0), {"relative": 0.3}),
     "a pulse in the dark": ("pulsed", 1.0, (0.5, 3.0), {}),
     "a wave in the dark": ("sine_wave", 1.0, (0.5, 3.0), {}),
+    "both": ("sine_wave", 3.0, (0.3, 2.5), {"relative": 0.2}),
 }
 
 
