@@ -58,7 +58,7 @@ from inference.posterior.stages.stage import (
     optima_of,
 )
 from inference.posterior.stages.standing import standing
-from inference.posterior.stages.starting import begin
+from inference.posterior.stages.stopped import stopped
 from inference.posterior.streams import Stream
 from inference.posterior.undrawn import without_draws
 from simulator.one_thread import one_thread
@@ -150,13 +150,12 @@ class _Drawn:
     bias: Array | None
 
 
-def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
+def _drawn(job: Job, checkpoint: Checkpoint, cpu_s: float) -> _Drawn:
     """Draw what the answer of a job is made of: the one place where its stream is begun."""
     given, checkpoint = job, checkpoint.answering
     job, stage, calls = sampled(job, checkpoint), checkpoint.stage, checkpoint.calls
     if isinstance(stage, Selecting | Starting):  # there was no time for more
-        # of the choices the last keeps all optional terms
-        begun = begin(job, stage if isinstance(stage, Starting) else stage.starts[-1])
+        begun = stopped(job, stage, cpu_s)
         stage, calls = begun.stage, calls + begun.calls
         job = job.with_error_integrated() if begun.integrated else job
         job = dataclasses.replace(job, representatives=begun.representatives)
@@ -202,6 +201,8 @@ def _drawn(job: Job, checkpoint: Checkpoint) -> _Drawn:
 def draw(job: Job, checkpoint: Checkpoint) -> tuple[Job, Draws]:
     """Return the draws behind the answer of a job, the same as `summarise` makes it from.
 
+    Also where it makes none because the job's time ended before sampling began.
+
     Parameters
     ----------
     job, checkpoint : Job, Checkpoint
@@ -213,7 +214,7 @@ def draw(job: Job, checkpoint: Checkpoint) -> tuple[Job, Draws]:
         The job with the terms that were kept, and its draws; of a job with more frames than are
         judged at once that of a random part of them.
     """
-    drawn = _drawn(job, checkpoint)
+    drawn = _drawn(job, checkpoint, 0.0)
     return drawn.parts[0], drawn.draws
 
 
@@ -253,7 +254,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
     -------
     Posterior
     """
-    drawn = _drawn(job, checkpoint)
+    drawn = _drawn(job, checkpoint, cpu_s)
     stage, sample = drawn.stage, drawn.sample
     if drawn.whole is None:
         assert isinstance(stage, Tempering | Walking)  # noqa: S101  # all others have drawn
