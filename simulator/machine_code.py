@@ -1,16 +1,16 @@
 """Kernels as machine code: what is used of numba, imported when it is first needed."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 from numba import extending, types
-from numba.core import caching, sigutils
+from numba.core import sigutils
 
 from simulator.closed import CLOSED
 from simulator.compile_lock import turn
-from simulator.inner_code import ClosedCompiler, InnerCompiler, rebuilt
+from simulator.inner_code import ClosedCompiler, InnerCompiler
+from simulator.kept_code import KeptCode
 from simulator.kernel_cache import CacheFolder, base_folder
 from simulator.quick_compiler import quicken, rare_collections
 
@@ -19,9 +19,6 @@ __all__ = ["dispatcher", "is_none", "is_number", "overload", "unliteral"]
 F = TypeVar("F", bound=Callable[..., Any])
 # numba's classes carry no types, and its stubs know a part of its options
 _njit: Any = numba.njit
-_FunctionCache: Any = caching.FunctionCache
-_CacheLocator: Any = caching._CacheLocator
-_CacheImpl: Any = caching.CompileResultCacheImpl
 _normalized: Any = sigutils.normalize_signature
 
 _overload: Any = extending.overload
@@ -44,53 +41,6 @@ def is_none(kind: object) -> bool:
 def is_number(kind: object) -> bool:
     """Tell whether a type is that of a number."""
     return isinstance(kind, types.Number)
-
-
-class _Locator(_CacheLocator):  # type: ignore[misc]
-    """Names files by function and line: the folder is that of exactly these sources."""
-
-    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
-        self._folder, self._line = folder, function.__code__.co_firstlineno
-
-    def ensure_cache_path(self) -> None:
-        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-
-    def get_cache_path(self) -> str:
-        return str(self._folder)
-
-    def get_source_stamp(self) -> str:
-        return ""  # the folder says it all: no times, so that a copy is as good
-
-    def get_disambiguator(self) -> str:
-        return str(self._line)
-
-
-class _Impl(_CacheImpl):  # type: ignore[misc]
-    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
-        self._lineno = function.__code__.co_firstlineno
-        self._locator = _Locator(function, folder)
-        self._filename_base = self.get_filename_base(
-            f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}", ""
-        )
-
-
-class _InnerImpl(_Impl):
-    def rebuild(self, target_context: Any, payload: Any) -> Any:
-        return rebuilt(target_context, payload)
-
-
-class _Cache(_FunctionCache):  # type: ignore[misc]
-    """numba's cache of a function, in a folder that may be read-only."""
-
-    def __init__(self, function: Callable[..., Any], folder: CacheFolder, inner: bool) -> None:
-        self._writable = folder.writable
-        impl = _InnerImpl if inner else _Impl
-        self._impl_class = lambda one: impl(one, folder.path)
-        super().__init__(function)
-
-    def save_overload(self, signature: Any, result: Any) -> None:
-        if self._writable:
-            super().save_overload(signature, result)
 
 
 def dispatcher(
@@ -122,7 +72,7 @@ def dispatcher(
     made.targetoptions.update(hidden)
     made.compile = rare_collections()(made.compile)
     if folder is not None:
-        made._cache = _Cache(function, folder, inner)
+        made._cache = KeptCode(function, folder, inner)
         if folder.writable:
             _in_turn(made, f"{folder.path.name}/{function.__qualname__}")
     return made
