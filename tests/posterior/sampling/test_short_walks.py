@@ -13,7 +13,8 @@ WALKERS, STEPS, RUNS = 256, 20, 400
 
 def _walk(rng: np.random.Generator, memory: float, pool: int) -> np.ndarray:
     """Walk from draws that were drawn again from a pool of so many: shape (4, 64, steps)."""
-    x = rng.choice(rng.standard_normal(pool), WALKERS)
+    _, which = np.unique(rng.integers(pool, size=WALKERS), return_inverse=True)
+    x = rng.standard_normal(which.max() + 1)[which]  # of the pool those that are drawn at all
     steps = []
     for _ in range(STEPS):
         x = memory * x + math.sqrt(1.0 - memory**2) * rng.standard_normal(WALKERS)
