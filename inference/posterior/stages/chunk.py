@@ -5,9 +5,17 @@ from typing import Literal
 
 from inference.posterior.job import Job
 from inference.posterior.sampling.rounds import STEP
+from inference.posterior.sampling.scouts import MOST_FRAMES
 from inference.posterior.stages.stage import MOST_STEPS
 
-__all__ = ["Began", "draws_of_rounds", "evaluations", "parts_of_a_step", "steps_from"]
+__all__ = [
+    "Began",
+    "draws_of_rounds",
+    "evaluations",
+    "is_short_for_scouts",
+    "parts_of_a_step",
+    "steps_from",
+]
 
 Began = Literal["at draws", "warm", "cold"]
 
@@ -19,6 +27,8 @@ _FIRST: Mapping[Began, int] = {"at draws": 12, "warm": _EASIEST, "cold": 2 * _EA
 _GROWTH = 0.25
 _DRAW_S = 2e-4  # of rounds, beside its evaluation: maps are fitted, and other laws are asked
 _PARTS = 2  # of a step of rounds that takes long: more would each fit its maps anew
+_SCOUTS = 6_000  # density evaluations that scouts take, about
+_SHORT = 0.25  # of the time, beyond which they wait
 _STEP_S = 5e-4  # of an ensemble, beside its evaluations
 
 
@@ -27,6 +37,15 @@ def _evaluation_s(job: Job) -> float:
     seconds = job.sampled_frames * _EVALUATION_S
     error = job.scene.model_error
     return seconds * _WITH_DISCREPANCY if error.integrated and error.flux > 0 else seconds
+
+
+def is_short_for_scouts(job: Job) -> bool:
+    """Tell whether scouts may take a large part of the time that there is: they set out last then.
+
+    Otherwise they set out beside other ways of looking for optima.
+    """
+    frames = min(job.sampled_frames, MOST_FRAMES) / job.sampled_frames
+    return _SCOUTS * frames * _evaluation_s(job) > _SHORT * job.settings.max_seconds
 
 
 def evaluations(job: Job) -> int:

@@ -13,6 +13,7 @@ from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
 from inference.posterior.sampling.scouts import send_scouts, thinned
 from inference.posterior.sampling.start import find_optima
+from inference.posterior.stages.chunk import is_short_for_scouts
 from inference.posterior.stages.stage import Starting
 from inference.posterior.streams import Stream
 
@@ -76,8 +77,11 @@ def ways_left(start: Starting, *, scouts: bool) -> tuple[Way, ...]:
 
 
 def looking(job: Job, start: Starting, *, scouts: bool) -> tuple[LookTask, ...]:
-    """Return a task for each of the ways that are left."""
-    return tuple(LookTask(job, way) for way in ways_left(start, scouts=scouts))
+    """Return a task for each of the ways that are left; scouts set out last where time is short."""
+    ways = ways_left(start, scouts=scouts)
+    if len(ways) > 1 and is_short_for_scouts(job):
+        ways = tuple(way for way in ways if way != "scouts")
+    return tuple(LookTask(job, way) for way in ways)
 
 
 def taken_in(start: Starting, found: Sequence[Looked]) -> tuple[Starting, int]:

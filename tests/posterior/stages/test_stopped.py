@@ -7,6 +7,7 @@ import pytest
 
 from inference.posterior import fold
 from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages.looking import LookTask
 from inference.posterior.stages.stage import Starting
 from inference.posterior.stages.stopped import stopped
 from tests.posterior.scenes import example
@@ -65,3 +66,22 @@ def test_where_no_optimum_is_known_one_is_looked_for() -> None:
     assert not isinstance(found.stage, Starting)
     assert found.calls > 0
     assert fold.summarise(_job(), fold.start(_job()), 2 * LIMIT, 2 * LIMIT).drawn
+
+
+def test_scouts_set_out_last_where_time_is_short() -> None:
+    """What is found is the same; where time ends before them, there are optima to tell of."""
+    hurried = fold.prepare(
+        *example("pulsed", crosstalk=False), SamplerSettings(seed=7, max_seconds=0.5)
+    )
+    begun = fold.start(hurried)
+    ways = [task.way for task in fold.tasks(hurried, begun) if isinstance(task, LookTask)]
+    assert ways == ["fitted", "climbed"]
+    pieces = [fold.run(task) for task in fold.tasks(hurried, begun)]
+    found = fold.merge(hurried, begun, pieces)
+    assert isinstance(found.stage, Starting)
+    assert found.stage.optima
+    assert not fold.summarise(hurried, found, 5.0, 5.0).drawn
+    pieces = [fold.run(task) for task in fold.tasks(hurried, found)]
+    assert len(pieces) == 1
+    (other, _), now = _looked(), fold.merge(hurried, found, pieces)
+    assert now.to_bytes() == other.to_bytes()
