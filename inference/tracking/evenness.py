@@ -47,14 +47,19 @@ ROUGH = 0.15
 Of such motion the mean is 0.52, and over the last four frames below this in about one of a hundred.
 """
 
+_LEARNT = 0.5  # share of the widths that counts of motion as rough as its law, crosstalk learnt
 _HIDDEN = 10.0  # variance of a reading by crosstalk, in that of the noise: light may be of either
 _LOG_RESTING = math.log(0.25)  # least weight of an object that may rest, against the empty scene's
 
 
 @compiled
-def counted_widths(roughness: float) -> float:
-    """Return the share of the widths that counts, from the running surprise of late."""
-    return min(1.0, roughness / ROUGH)
+def counted_widths(roughness: float, learns: bool) -> float:
+    """Return the share of the widths that counts, from the running surprise of late.
+
+    Where crosstalk is learnt motion is mostly far smoother than its law, which is wide
+    (`inference.tracking.turning`): as far as it is, widths say nothing of the curve.
+    """
+    return _LEARNT * roughness if learns else min(1.0, roughness / ROUGH)
 
 
 @compiled

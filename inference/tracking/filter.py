@@ -92,8 +92,10 @@ def run_filter(
     room = room_for(of, model.places)
     rules, numbers = model.rules, of.numbers
     for i in range(times.size):
+        seconds = 0.0
         if math.isfinite(numbers[TIME]):
-            predict(times[i] - numbers[TIME], of, rules, room.scratch.work)
+            seconds = times[i] - numbers[TIME]
+            predict(seconds, of, rules, room.scratch.work)
         numbers[TIME] = times[i]
         known_m, known_rate = 0.0, 0.0
         if frames.shape[1] > _KNOWN_M:
@@ -104,7 +106,7 @@ def run_filter(
         take_readings(numbers, frames[i, _FIRST], frames[i, _SECOND])
         outlier, surprise = 0.0, math.nan
         if kinds[i] == USABLE:
-            outlier, surprise = weigh_frame(frame, of, model, room, full)
+            outlier, surprise = weigh_frame(frame, seconds, of, model, room, full)
         elif kinds[i] == SATURATED:
             if known_rate > 0.0:
                 weigh_known(frame, of, model, room)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from inference.tracking.roots import Root
 from simulator.compiled import compiled
 
-__all__ = ["Motion", "Presence", "Rules", "motion_over", "presence_over"]
+__all__ = ["Motion", "Presence", "Rules", "motion_over", "presence_over", "wider"]
 
 
 class Rules(NamedTuple):
@@ -127,3 +127,11 @@ def motion_over(seconds: float, rules: Rules) -> Motion:
         rules.drift1 * root,
         rules.drift2 * root,
     )
+
+
+@compiled
+def wider(motion: Motion, times: float) -> Motion:
+    """Return the motion of a rate whose standard deviation is so many times as large."""
+    carry, decay, noise, drift1, drift2 = motion
+    more = Root(times * noise.r11, times * noise.r21, times * noise.r22)
+    return Motion(carry, decay, more, drift1, drift2)

@@ -21,12 +21,13 @@ from inference.tracking.hypotheses import (
     variance_of,
 )
 from inference.tracking.merging import merge
-from inference.tracking.motion import Motion, Rules, motion_over, presence_over
+from inference.tracking.motion import Motion, Rules, motion_over, presence_over, wider
 from inference.tracking.readings_table import ReadingsTable, mean_at
 from inference.tracking.roots import Root, add_factor
 from inference.tracking.second_order import add_products
 from inference.tracking.shared_error import certainty, shared_part
 from inference.tracking.square_root import move
+from inference.tracking.turning import widening
 from simulator.compiled import compiled
 
 __all__ = ["born_prior", "own_prior", "predict", "prior_of"]
@@ -83,7 +84,7 @@ def predict(seconds: float, of: Hypotheses, rules: Rules, work: Array) -> None:
             born += weight[j]
             continue
         along = motion.carry * x[j, V]
-        move(of, j, motion, work)
+        move(of, j, wider(motion, widening(of, j)) if learns else motion, work)
         if learns:
             x[j, ANCHOR] += certainty(of, j) * along
     numbers[LOST] = 1.0 if lost else 0.0

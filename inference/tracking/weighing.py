@@ -52,6 +52,7 @@ from inference.tracking.places import Places, mass_bound
 from inference.tracking.prediction import born_prior, own_prior, prior_of
 from inference.tracking.readings_table import ReadingsTable
 from inference.tracking.too_faint import MOST_EMPTY, doubt_the_faint
+from inference.tracking.turning import may_turn
 from inference.tracking.unread import add_unread, learn_unread, odd_weight
 from simulator.compiled import compiled
 
@@ -106,21 +107,28 @@ def room_for(of: Hypotheses, places: Places) -> Room:
 
 @compiled
 def _of_followed(
-    frame: TrackedFrame, of: Hypotheses, model: Model, room: Room, empty: Empty
+    frame: TrackedFrame, seconds: float, of: Hypotheses, model: Model, room: Room, empty: Empty
 ) -> int:
     """List the modes of the frame under every hypothesis; their number."""
     log_usual = math.log1p(-model.rules.outlier)
     table, scan = model.table, model.places.scan
     candidates, followed = room.candidates, int(of.numbers[COUNT])
-    counted = counted_widths(of.numbers[ROUGHNESS])
-    found, log_before = 0, -math.inf
     learns, at_rest = learns_crosstalk(of), room.at_rest
+    counted = counted_widths(of.numbers[ROUGHNESS], learns)
+    found, log_before = 0, -math.inf
     for h in range(at_rest.size if learns else 0):
         at_rest[h] = -math.inf
     for h in range(1, followed + 1):
         old, log_weight = found, log_of(of.weight[h])
         prior = prior_of(of, h, frame.gain, log_weight + log_usual, table)
         found = find_candidates(candidates, found, h, frame, prior, table, scan, room.scanned)
+        if learns and model.rules.rate_sd > 0.0 and found > old:
+            part = old, found
+            step = may_turn(of, h, candidates, part, prior, seconds, room.scratch.work)
+            if step > 0.0:
+                turned = log_weight + log_usual - math.log(step)
+                prior = prior_of(of, h, frame.gain, turned, table)
+                found = find_candidates(candidates, old, h, frame, prior, table, scan, room.scanned)
         hidden, smooth = learns and hides(of, h), followed > 1 and counted < 1.0
         if found == old or not (hidden or smooth):
             continue
@@ -258,7 +266,7 @@ def _came(frame: TrackedFrame, of: Hypotheses, model: Model, best: float) -> flo
 @borrowed
 @compiled
 def weigh_frame(
-    frame: TrackedFrame, of: Hypotheses, model: Model, room: Room, full: bool
+    frame: TrackedFrame, seconds: float, of: Hypotheses, model: Model, room: Room, full: bool
 ) -> tuple[float, float]:
     """Weigh every hypothesis by a frame.
 
@@ -266,6 +274,8 @@ def weigh_frame(
     ----------
     frame : TrackedFrame
         The frame.
+    seconds : float
+        Since the frame before [s]; 0 where there is none.
     of : Hypotheses
         As predicted; changed in place.
     model : Model
@@ -283,7 +293,7 @@ def weigh_frame(
     """
     rules, candidates = model.rules, room.candidates
     empty = weigh_empty(frame, of, model.table, model.places.empty, rules, room.scratch)
-    found = _of_followed(frame, of, model, room, empty)
+    found = _of_followed(frame, seconds, of, model, room, empty)
     best = max(empty.usual, empty.odd, empty.odd_born)
     best = log_mass_of(candidates, 0, found, best)
     # what is too light to be looked for is kept at an upper bound of its weight until it is not

@@ -1,0 +1,88 @@
+"""Motion that the rate's law does not foresee, where crosstalk is learnt.
+
+Range and crosstalk are told apart by how an object moves, so that motion which is unlikely as it is
+stated is rather taken for another crosstalk, a little more with every stop and every start. There
+the law of the rate is wider than it is stated. A step that even this finds surprising may be a
+turn: the hypothesis is then as unsure of its motion as the step is long, and as much less likely as
+the step is surprising, which is the tail of a Cauchy law.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inference.tracking.borrowed import borrowed
+from inference.tracking.candidates import TrackCandidates
+from inference.tracking.frame_density import Prior
+from inference.tracking.hypotheses import CROSSTALK1, CROSSTALK2, Hypotheses, variance_of
+from inference.tracking.motion import Motion
+from inference.tracking.roots import Root
+from inference.tracking.square_root import move
+from simulator.compiled import compiled
+
+__all__ = ["may_turn", "widening"]
+
+Array = NDArray[np.float64]
+
+_WIDER = 3.0  # times that is stated: the rate's standard deviation, where crosstalk is not known
+_UNKNOWN = 1.0  # variance of a reading by crosstalk, in that of the noise: half of the way to that
+_SURPRISING = 2.5  # standard deviations of a step from which on it may be a turn
+
+
+@compiled
+def widening(of: Hypotheses, row: int) -> float:
+    """Return how many times as wide as stated the law of the rate is for one hypothesis.
+
+    Crosstalk that is known better than a frame's noise cannot take up what motion does.
+    """
+    variance = max(variance_of(of, row, CROSSTALK1), variance_of(of, row, CROSSTALK2))
+    return 1.0 + (_WIDER - 1.0) * variance / (variance + _UNKNOWN)
+
+
+@borrowed
+@compiled
+def may_turn(
+    of: Hypotheses,
+    row: int,
+    found: TrackCandidates,
+    part: tuple[int, int],
+    prior: Prior,
+    seconds: float,
+    work: Array,
+) -> float:
+    """Make a hypothesis as unsure of its motion as the step to its heaviest candidate is long.
+
+    Parameters
+    ----------
+    of, row : Hypotheses, int
+        The hypothesis as it was predicted; changed in place where the step is surprising.
+    found, part : TrackCandidates, (int, int)
+        Modes of the frame, and which of them are the hypothesis's: the first, and one past the
+        last.
+    prior : Prior
+        What it says of the frame.
+    seconds : float
+        Since the frame before [s].
+    work : ndarray
+        As in `Scratch`.
+
+    Returns
+    -------
+    float
+        The step in standard deviations, where it is surprising: a turn is as much less likely.
+        Otherwise 0.
+    """
+    top = part[0]
+    for j in range(part[0], part[1]):
+        if found.log_mass[j] > found.log_mass[top]:
+            top = j
+    # what it errs with the crosstalk is no motion
+    own = 1.0 - prior.share
+    away = own * (found.mode[top] - prior.position.centre)
+    variance = own / prior.position.precision
+    if not (seconds > 0.0 and away * away > _SURPRISING * _SURPRISING * variance > 0.0):
+        return 0.0
+    noise = math.sqrt(away * away - variance)
+    move(of, row, Motion(0.0, 1.0, Root(noise, 0.0, noise / seconds), 0.0, 0.0), work)
+    return abs(away) / math.sqrt(variance)
