@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 _WIDER = 3.0  # times that is stated: the rate's standard deviation, where crosstalk is not known
 _UNKNOWN = 1.0  # variance of a reading by crosstalk, in that of the noise: half of the way to that
-_SURPRISING = 2.5  # standard deviations of a step from which on it may be a turn
+_SURPRISING = 1.5  # standard deviations of a step from which on it may be a turn
 
 
 @compiled
