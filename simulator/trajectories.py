@@ -130,8 +130,11 @@ class RadialTrajectory(Validated):
 
 
 def _kind(value: object) -> str:
-    named = isinstance(value, dict) and "kind" in value
-    return "radial" if named or isinstance(value, RadialTrajectory) else "sampled"
+    """Tell which form a trajectory has: its members do, where no `kind` is stated."""
+    if isinstance(value, dict):
+        ends = "from_m" in value or "to_m" in value
+        return "radial" if "kind" in value or (ends and "range_m" not in value) else "sampled"
+    return "radial" if isinstance(value, RadialTrajectory) else "sampled"
 
 
 Trajectory = Annotated[

@@ -21,7 +21,8 @@ class TrackingSettings(Validated):
         "readings": both readings. "w1", "w2": one window of a pulse alone. "derivatives": the
         sensor's derivative columns, which neither crosstalk nor anything else that is still enters.
     rate_sd : float
-        Standard deviation of d log r / dt [1/s]: 1 is a speed of r a second.
+        Standard deviation of d log r / dt [1/s]: 1 is a speed of r a second. While crosstalk is
+        learnt, and not yet known, the law is up to three times as wide.
     rate_time_s : float
         Time over which that rate forgets itself [s].
     visit_s, absence_s : float

@@ -85,4 +85,4 @@ def may_turn(
         return 0.0
     noise = math.sqrt(away * away - variance)
     move(of, row, Motion(0.0, 1.0, Root(noise, 0.0, noise / seconds), 0.0, 0.0), work)
-    return abs(away) / math.sqrt(variance)
+    return float(abs(away) / math.sqrt(variance))

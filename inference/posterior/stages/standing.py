@@ -8,6 +8,7 @@ on stand before what these began at, where there are enough rounds and the popul
 """
 
 import dataclasses
+import math
 
 import numpy as np
 import scipy
@@ -48,7 +49,7 @@ def standing(stage: Drawing) -> Drawing:
     if found is None:
         return stage
     draws, what = found
-    said = f"{what}: effective sample size {draws.worth:.0f}, Pareto k-hat {draws.k_hat:.2f}"
+    said = f"{what}: effective sample size {draws.worth:.0f}, {_tail(draws.k_hat)}"
     if not _trusted(draws):
         reasons = (*stage.verdict.reasons, f"there are {said}: too few, or not to be trusted")
         return dataclasses.replace(stage, verdict=Verdict(False, reasons))
@@ -77,6 +78,13 @@ def best_known(stage: Tempering | Walking) -> tuple[WeightedDraws, str] | None:
         found.append((members, "weighted members of populations on their way"))
     known = [(draws, what) for draws, what in found if draws is not None]
     return max(known, key=lambda each: (_trusted(each[0]), each[0].worth), default=None)
+
+
+def _tail(k_hat: float) -> str:
+    """Say how heavy the tail of weights is."""
+    if math.isinf(k_hat):
+        return "weights too few to be trusted" if k_hat > 0 else "weights without a tail"
+    return f"Pareto k-hat {k_hat:.2f}"
 
 
 def _trusted(draws: WeightedDraws) -> bool:

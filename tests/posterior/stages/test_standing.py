@@ -1,6 +1,7 @@
 """What stands as an answer before any ensemble has walked."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages import walking
 from inference.posterior.stages.ensembles import from_draws
 from inference.posterior.stages.stage import Starting, Tempering, Walking, Weighted
-from inference.posterior.stages.standing import _weighted, standing
+from inference.posterior.stages.standing import _tail, _weighted, standing
 from inference.posterior.stages.starting import begin
 from tests.posterior.scenes import example
 
@@ -164,3 +165,15 @@ def test_trusted_draws_of_rounds_stand_before_what_these_began_at(
         assert isinstance(found, Weighted)
         assert len(found.draws.z) == size
         assert not found.verdict.converged
+
+
+@pytest.mark.parametrize(
+    ("k_hat", "said"),
+    [
+        (0.254, "Pareto k-hat 0.25"),
+        (-math.inf, "weights without a tail"),
+        (math.inf, "weights too few to be trusted"),
+    ],
+)
+def test_no_number_is_said_of_weights_that_have_no_tail(k_hat: float, said: str) -> None:
+    assert _tail(k_hat) == said
