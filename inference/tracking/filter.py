@@ -95,7 +95,7 @@ def run_filter(
         seconds = 0.0
         if math.isfinite(numbers[TIME]):
             seconds = times[i] - numbers[TIME]
-            predict(seconds, of, rules, room.scratch.work)
+            predict(seconds, of, rules, model.table, room.scratch.work)
         numbers[TIME] = times[i]
         known_m, known_rate = 0.0, 0.0
         if frames.shape[1] > _KNOWN_M:

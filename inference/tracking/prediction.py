@@ -40,7 +40,9 @@ _LOG_2PI = math.log(2.0 * math.pi)
 
 @borrowed
 @compiled
-def predict(seconds: float, of: Hypotheses, rules: Rules, work: Array) -> None:
+def predict(
+    seconds: float, of: Hypotheses, rules: Rules, table: ReadingsTable, work: Array
+) -> None:
     """Predict everything to the time of the next frame.
 
     Parameters
@@ -51,6 +53,8 @@ def predict(seconds: float, of: Hypotheses, rules: Rules, work: Array) -> None:
         Changed in place.
     rules : Rules
         How objects move, come and go.
+    table : ReadingsTable
+        The scene.
     work : ndarray
         As in `Scratch`.
     """
@@ -84,7 +88,10 @@ def predict(seconds: float, of: Hypotheses, rules: Rules, work: Array) -> None:
             born += weight[j]
             continue
         along = motion.carry * x[j, V]
-        move(of, j, wider(motion, widening(of, j)) if learns else motion, work)
+        own = motion
+        if learns:
+            own = wider(motion, widening(of, j, reach, table))
+        move(of, j, own, work)
         if learns:
             x[j, ANCHOR] += certainty(of, j) * along
     numbers[LOST] = 1.0 if lost else 0.0

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from inference.tracking.borrowed import borrowed
 from inference.tracking.candidates import TrackCandidates
 from inference.tracking.frame_density import Prior
-from inference.tracking.hypotheses import CROSSTALK1, CROSSTALK2, Hypotheses, variance_of
+from inference.tracking.hypotheses import CROSSTALK1, CROSSTALK2, Hypotheses, U, variance_of
 from inference.tracking.motion import Motion
+from inference.tracking.readings_table import ReadingsTable, mean_at
 from inference.tracking.roots import Root
 from inference.tracking.square_root import move
 from simulator.compiled import compiled
@@ -26,18 +27,32 @@ __all__ = ["may_turn", "widening"]
 Array = NDArray[np.float64]
 
 _WIDER = 3.0  # times that is stated: the rate's standard deviation, where crosstalk is not known
-_UNKNOWN = 1.0  # variance of a reading by crosstalk, in that of the noise: half of the way to that
+# variances of a reading by crosstalk, and by the motion until the next frame, in that of the noise,
+# at which either is half of the way to that
+_HALF = 1.0
 _SURPRISING = 1.5  # standard deviations of a step from which on it may be a turn
 
 
 @compiled
-def widening(of: Hypotheses, row: int) -> float:
+def widening(of: Hypotheses, row: int, reach: float, table: ReadingsTable) -> float:
     """Return how many times as wide as stated the law of the rate is for one hypothesis.
 
-    Crosstalk that is known better than a frame's noise cannot take up what motion does.
+    Crosstalk that is known better than a frame's noise cannot take up what motion does, and where
+    frames tell no more of the range than the motion before them it is the motion that holds it.
+
+    Parameters
+    ----------
+    of, row : Hypotheses, int
+        The hypothesis.
+    reach : float
+        Standard deviation of the change of log r until the next frame, by the rate as stated.
+    table : ReadingsTable
+        Mean readings.
     """
-    variance = max(variance_of(of, row, CROSSTALK1), variance_of(of, row, CROSSTALK2))
-    return 1.0 + (_WIDER - 1.0) * variance / (variance + _UNKNOWN)
+    unknown = max(variance_of(of, row, CROSSTALK1), variance_of(of, row, CROSSTALK2))
+    _, _, slope1, slope2 = mean_at(of.x[row, U], table)
+    seen = (slope1 * slope1 + slope2 * slope2) * reach * reach
+    return 1.0 + (_WIDER - 1.0) * unknown / (unknown + _HALF) * seen / (seen + _HALF)
 
 
 @borrowed
