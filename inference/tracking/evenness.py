@@ -19,8 +19,10 @@ from inference.tracking.borrowed import borrowed
 from inference.tracking.candidates import TrackCandidates
 from inference.tracking.frame_density import Prior, TrackedFrame, log_density
 from inference.tracking.hypotheses import (
+    COUNT,
     CROSSTALK1,
     CROSSTALK2,
+    ROUGHNESS,
     Hypotheses,
     variance_of,
 )
@@ -53,13 +55,22 @@ _LOG_RESTING = math.log(0.25)  # least weight of an object that may rest, agains
 
 
 @compiled
-def counted_widths(roughness: float, learns: bool) -> float:
+def counted_widths(of: Hypotheses, learns: bool) -> float:
     """Return the share of the widths that counts, from the running surprise of late.
 
-    Where crosstalk is learnt motion is mostly far smoother than its law, which is wide
-    (`inference.tracking.turning`): as far as it is, widths say nothing of the curve.
+    While crosstalk is learnt and not known to the noise of a frame, by the heaviest hypothesis, the
+    law of the motion is wide (`inference.tracking.turning`), and motion mostly far smoother: as far
+    as it is, widths say nothing of the curve.
     """
-    return _LEARNT * roughness if learns else min(1.0, roughness / ROUGH)
+    roughness, row = of.numbers[ROUGHNESS], 1
+    counted = float(min(1.0, roughness / ROUGH))
+    if not learns:
+        return counted
+    for h in range(2, int(of.numbers[COUNT]) + 1):
+        if of.weight[h] > of.weight[row]:
+            row = h
+    unknown = max(variance_of(of, row, CROSSTALK1), variance_of(of, row, CROSSTALK2))
+    return float((counted + unknown * _LEARNT * roughness) / (1.0 + unknown))
 
 
 @compiled

@@ -36,7 +36,6 @@ from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import (
     COUNT,
     PENDING,
-    ROUGHNESS,
     Hypotheses,
     Scratch,
     copy,
@@ -114,7 +113,7 @@ def _of_followed(
     table, scan = model.table, model.places.scan
     candidates, followed = room.candidates, int(of.numbers[COUNT])
     learns, at_rest = learns_crosstalk(of), room.at_rest
-    counted = counted_widths(of.numbers[ROUGHNESS], learns)
+    counted = counted_widths(of, learns)
     found, log_before = 0, -math.inf
     for h in range(at_rest.size if learns else 0):
         at_rest[h] = -math.inf
