@@ -44,8 +44,8 @@ def is_short_for_scouts(job: Job) -> bool:
 
     Otherwise they set out beside other ways of looking for optima.
     """
-    frames = min(job.sampled_frames, MOST_FRAMES) / job.sampled_frames
-    return _SCOUTS * frames * _evaluation_s(job) > _SHORT * job.settings.max_seconds
+    seen = min(1.0, MOST_FRAMES / max(job.sampled_frames, 1))
+    return _SCOUTS * seen * _evaluation_s(job) > _SHORT * job.settings.max_seconds
 
 
 def evaluations(job: Job) -> int:
