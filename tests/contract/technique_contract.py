@@ -47,7 +47,7 @@ _TRIALS, _SETS = 4000, 40  # frames, and sets of frames, whose scatter is compar
 # scenes of a fit over many frames in which this is done: a set is a whole fit
 _MONTE_CARLO = 2 if THOROUGH else 1
 _ERRORS = (1e-4, 1e-5)  # of flux and effective distance [m]: small enough to be linear
-_ERRING = 20  # sets of frames whose model errs
+_ERRING = 12  # sets of frames whose model errs
 _MISFITS = 3  # of 40 sets of a fit that is right
 _ALARM = 1e-6  # of one comparison of scatter and sd
 
@@ -190,8 +190,8 @@ def model_errors_are_right(technique: Technique, kind: str) -> None:
 def model_errors_of_many_frames_are_right(technique: Technique, kind: str) -> None:
     """Check the model's part against random smooth errors that the frames of a set share.
 
-    Readings nearly without noise, in the first scene, 20 sets: the mean square of the misses in the
-    band of a chi-square with 20 degrees of freedom, as in `errors_are_right`; no set reads as a
+    Readings nearly without noise, in the first scene, 12 sets: the mean square of the misses in the
+    band of a chi-square with 12 degrees of freedom, as in `errors_are_right`; no set reads as a
     misfit, and the squares of the parts sum to the whole's.
     """
     sensor, ranges = sensor_of(kind, _QUIET), span(_MANY)

@@ -60,7 +60,7 @@ def wall_problem(number: int) -> FitProblem:
 NEAR_A_WALL = (0.035, 0.11, 0.051, -1.5e-4, 9.6e-3, 8.1e-3, 0.035)
 
 
-@pytest.mark.parametrize("c1", [-0.1445, -0.15, -0.18])
+@pytest.mark.parametrize("c1", [-0.1445, pytest.param(-0.15, marks=pytest.mark.thorough), -0.18])
 def test_a_climb_goes_on_where_a_range_is_the_nearest_that_a_shadow_allows(c1: float) -> None:
     """Nearer than -c1' a wall would have negative light; ranges stayed there, at 0.02 m.
 
