@@ -88,10 +88,10 @@ def log_mass_of(of: TrackCandidates, first: int, last: int, least: float) -> flo
 
 
 @compiled
-def heaviest_of(of: TrackCandidates, count: int) -> int:
-    """Return the place of the heaviest candidate; there must be one."""
-    top = 0
-    for j in range(1, count):
+def heaviest_of(of: TrackCandidates, first: int, last: int) -> int:
+    """Return the place of the heaviest candidate from one place to before another."""
+    top = first
+    for j in range(first + 1, last):
         if of.log_mass[j] > of.log_mass[top]:
             top = j
     return top

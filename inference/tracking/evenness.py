@@ -20,11 +20,10 @@ from inference.tracking.candidates import TrackCandidates
 from inference.tracking.frame_density import Prior, TrackedFrame, log_density
 from inference.tracking.hypotheses import (
     COUNT,
-    CROSSTALK1,
-    CROSSTALK2,
     ROUGHNESS,
     Hypotheses,
-    variance_of,
+    learns_crosstalk,
+    unknown_crosstalk,
 )
 from inference.tracking.readings_table import ReadingsTable
 from inference.tracking.roots import UNIT, add_root
@@ -55,7 +54,7 @@ _LOG_RESTING = math.log(0.25)  # least weight of an object that may rest, agains
 
 
 @compiled
-def counted_widths(of: Hypotheses, learns: bool) -> float:
+def counted_widths(of: Hypotheses) -> float:
     """Return the share of the widths that counts, from the running surprise of late.
 
     While crosstalk is learnt and not known to the noise of a frame, by the heaviest hypothesis, the
@@ -64,12 +63,12 @@ def counted_widths(of: Hypotheses, learns: bool) -> float:
     """
     roughness, row = of.numbers[ROUGHNESS], 1
     counted = float(min(1.0, roughness / ROUGH))
-    if not learns:
+    if not learns_crosstalk(of):
         return counted
     for h in range(2, int(of.numbers[COUNT]) + 1):
         if of.weight[h] > of.weight[row]:
             row = h
-    unknown = max(variance_of(of, row, CROSSTALK1), variance_of(of, row, CROSSTALK2))
+    unknown = unknown_crosstalk(of, row)
     return float((counted + unknown * _LEARNT * roughness) / (1.0 + unknown))
 
 
@@ -89,7 +88,7 @@ def log_total(of: TrackCandidates, first: int, last: int) -> float:
 @compiled
 def hides(of: Hypotheses, row: int) -> bool:
     """Tell whether learnt crosstalk is so little known that its light may be the object's."""
-    return max(variance_of(of, row, CROSSTALK1), variance_of(of, row, CROSSTALK2)) > _HIDDEN
+    return unknown_crosstalk(of, row) > _HIDDEN
 
 
 @borrowed

@@ -37,6 +37,7 @@ __all__ = [
     "scratch_for",
     "stuck_for",
     "take_readings",
+    "unknown_crosstalk",
     "variance_of",
 ]
 
@@ -120,6 +121,12 @@ def variance_of(of: Hypotheses, row: int, state: int) -> float:
     for j in range(of.X.shape[1]):
         variance += of.X[row, state, j] * of.X[row, state, j]
     return variance
+
+
+@compiled
+def unknown_crosstalk(of: Hypotheses, row: int) -> float:
+    """Return the larger variance of a reading by crosstalk, in that of the noise."""
+    return float(max(variance_of(of, row, CROSSTALK1), variance_of(of, row, CROSSTALK2)))
 
 
 @compiled

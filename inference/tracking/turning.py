@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.tracking.borrowed import borrowed
-from inference.tracking.candidates import TrackCandidates
 from inference.tracking.frame_density import Prior
-from inference.tracking.hypotheses import CROSSTALK1, CROSSTALK2, Hypotheses, U, variance_of
+from inference.tracking.hypotheses import Hypotheses, U, unknown_crosstalk
 from inference.tracking.motion import Motion
 from inference.tracking.readings_table import ReadingsTable, mean_at
 from inference.tracking.roots import Root
@@ -49,7 +48,7 @@ def widening(of: Hypotheses, row: int, reach: float, table: ReadingsTable) -> fl
     table : ReadingsTable
         Mean readings.
     """
-    unknown = max(variance_of(of, row, CROSSTALK1), variance_of(of, row, CROSSTALK2))
+    unknown = unknown_crosstalk(of, row)
     _, _, slope1, slope2 = mean_at(of.x[row, U], table)
     seen = (slope1 * slope1 + slope2 * slope2) * reach * reach
     return 1.0 + (_WIDER - 1.0) * unknown / (unknown + _HALF) * seen / (seen + _HALF)
@@ -58,23 +57,16 @@ def widening(of: Hypotheses, row: int, reach: float, table: ReadingsTable) -> fl
 @borrowed
 @compiled
 def may_turn(
-    of: Hypotheses,
-    row: int,
-    found: TrackCandidates,
-    part: tuple[int, int],
-    prior: Prior,
-    seconds: float,
-    work: Array,
+    of: Hypotheses, row: int, mode: float, prior: Prior, seconds: float, work: Array
 ) -> float:
-    """Make a hypothesis as unsure of its motion as the step to its heaviest candidate is long.
+    """Make a hypothesis as unsure of its motion as the step to a mode is long.
 
     Parameters
     ----------
     of, row : Hypotheses, int
         The hypothesis as it was predicted; changed in place where the step is surprising.
-    found, part : TrackCandidates, (int, int)
-        Modes of the frame, and which of them are the hypothesis's: the first, and one past the
-        last.
+    mode : float
+        log r of its heaviest candidate.
     prior : Prior
         What it says of the frame.
     seconds : float
@@ -88,13 +80,9 @@ def may_turn(
         The step in standard deviations, where it is surprising: a turn is as much less likely.
         Otherwise 0.
     """
-    top = part[0]
-    for j in range(part[0], part[1]):
-        if found.log_mass[j] > found.log_mass[top]:
-            top = j
     # what it errs with the crosstalk is no motion
     own = 1.0 - prior.share
-    away = own * (found.mode[top] - prior.position.centre)
+    away = own * (mode - prior.position.centre)
     variance = own / prior.position.precision
     if not (seconds > 0.0 and away * away > _SURPRISING * _SURPRISING * variance > 0.0):
         return 0.0

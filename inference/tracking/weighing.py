@@ -113,7 +113,7 @@ def _of_followed(
     table, scan = model.table, model.places.scan
     candidates, followed = room.candidates, int(of.numbers[COUNT])
     learns, at_rest = learns_crosstalk(of), room.at_rest
-    counted = counted_widths(of, learns)
+    counted = counted_widths(of)
     found, log_before = 0, -math.inf
     for h in range(at_rest.size if learns else 0):
         at_rest[h] = -math.inf
@@ -122,8 +122,8 @@ def _of_followed(
         prior = prior_of(of, h, frame.gain, log_weight + log_usual, table)
         found = find_candidates(candidates, found, h, frame, prior, table, scan, room.scanned)
         if learns and model.rules.rate_sd > 0.0 and found > old:
-            part = old, found
-            step = may_turn(of, h, candidates, part, prior, seconds, room.scratch.work)
+            mode = candidates.mode[heaviest_of(candidates, old, found)]
+            step = may_turn(of, h, mode, prior, seconds, room.scratch.work)
             if step > 0.0:
                 turned = log_weight + log_usual - math.log(step)
                 prior = prior_of(of, h, frame.gain, turned, table)
@@ -193,7 +193,7 @@ def _keep(
         heaviest, surprise = outlying, rules.most_surprise
     count, total = 0, usual + odd
     while found > 0 and count < after.weight.size - 1:
-        top = heaviest_of(candidates, found)
+        top = heaviest_of(candidates, 0, found)
         if not candidates.log_mass[top] > best + rules.log_negligible:
             break
         count += 1
