@@ -46,7 +46,7 @@ RUN /opt/build/bin/pip --python /opt/hybridtof/bin/python install --no-deps --no
     && chown tester /build
 USER tester
 # with the processor time, which tells more than the clock of a busy machine
-RUN python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "${MARKS}" && times
+RUN python -m pytest -n 2 --dist loadscope --no-loadscope-reorder -m "${MARKS}" && times
 
 FROM base AS runtime
 RUN useradd --uid 10001 --no-create-home --shell /usr/sbin/nologin hybridtof \

@@ -79,13 +79,13 @@ unexport PYTHONDONTWRITEBYTECODE
 notebook-seeds calibrate coverage stress test thorough fast: export OPENBLAS_NUM_THREADS = 1
 
 test: $(READY) ## Run the tests
-	$(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder
+	$(BIN)/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder
 
 thorough: $(READY) ## Run all tests, with those and all data sets that `make test` leaves out
-	TESTS_THOROUGH=1 $(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder
+	TESTS_THOROUGH=1 $(BIN)/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder
 
 fast: $(READY) ## Run the tests that take seconds
-	$(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder -m "not slow"
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -108,7 +108,7 @@ lowest: ## Run the tests that take seconds with the lowest versions that pyproje
 	uv pip compile pyproject.toml --python out/lowest/bin/python --all-extras --resolution lowest-direct --quiet --no-header --no-annotate --output-file out/lowest.txt
 	uv pip install --quiet --python out/lowest/bin/python --requirements out/lowest.txt
 	uv pip install --quiet --python out/lowest/bin/python --no-deps --no-build-isolation --editable .
-	NUMBA_CACHE_DIR=$(CURDIR)/out/lowest/kernels out/lowest/bin/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow" $(LOWEST)
+	NUMBA_CACHE_DIR=$(CURDIR)/out/lowest/kernels out/lowest/bin/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder -m "not slow" $(LOWEST)
 
 versions: ## Run the tests that take seconds on Python 3.11 to 3.14 (needs uv, and finds or fetches these)
 	for version in 3.11 3.12 3.13 3.14; do \
@@ -116,7 +116,7 @@ versions: ## Run the tests that take seconds on Python 3.11 to 3.14 (needs uv, a
 		uv venv --quiet --clear --python $$version $$made && \
 		uv pip install --quiet --python $$python --require-hashes --requirements requirements/dev.txt && \
 		uv pip install --quiet --python $$python --no-deps --no-build-isolation --editable . && \
-		NUMBA_CACHE_DIR=$(CURDIR)/$$made/kernels $$python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not slow" || exit 1; \
+		NUMBA_CACHE_DIR=$(CURDIR)/$$made/kernels $$python -m pytest -n 2 --dist loadscope --no-loadscope-reorder -m "not slow" || exit 1; \
 	done
 
 package: ## Build wheel and sdist, install each where nothing else is, and answer from another folder (needs uv)

@@ -16,13 +16,18 @@ os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="hybridtof-tests-")
 
 import sys
 import uuid
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.chunk_clock import timed
+from tests.groups import TOGETHER, group_of
 from tests.thorough import THOROUGH
+
+if TYPE_CHECKING:
+    from xdist.remote import Producer
+    from xdist.scheduler import LoadScopeScheduling
 
 _STATE = os.environ["XDG_STATE_HOME"]
 
@@ -32,43 +37,29 @@ settings.register_profile(
 )
 settings.load_profile("busy")
 
-# folders whose tests compile the same kernels, and the group that they make
-_TOGETHER = {
-    "density": "density",
-    "frame": "density",
-    "contract": "fits",
-    "fits": "fits",
-    "identifiability": "fits",
-    "realtime": "fits",
-    "optics": "optics",
-    "tracking": "tracking",
-}
-
 
 @pytest.fixture
 def anyio_backend() -> str:
     return "asyncio"
 
 
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Let one process run what compiles the same kernels, and begin with what takes long.
-
-    Without groups both of two processes compile nearly every kernel. What is thorough is left out
-    of all but `make thorough`.
-    """
+    """Begin with what takes long, and leave out what is thorough, but in `make thorough`."""
     if not THOROUGH:
         left_out = [item for item in items if item.get_closest_marker("thorough")]
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if not item.get_closest_marker("thorough")]
-    slow = set()
-    for item in items:
-        folder, *rest = item.path.relative_to(Path(__file__).parent).parts
-        group = _TOGETHER.get(folder, "/".join((folder, *rest)))
-        item.add_marker(pytest.mark.xdist_group(group))
-        if item.get_closest_marker("slow") or folder in _TOGETHER:
-            slow.add(group)
-    items.sort(key=lambda item: next(item.iter_markers("xdist_group")).args[0] not in slow)
+    slow = {group_of(item.nodeid) for item in items if item.get_closest_marker("slow")}
+    slow.update(TOGETHER.values())
+    items.sort(key=lambda item: group_of(item.nodeid) not in slow)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: "Producer") -> "LoadScopeScheduling":
+    """Let one process run what compiles the same kernels."""
+    from tests.grouped_scheduling import GroupedScheduling
+
+    return GroupedScheduling(config, log)
 
 
 def pytest_unconfigure() -> None:
