@@ -18,6 +18,8 @@ __all__ = ["DiedError", "Watch", "WorkerProcess"]
 _LOOK_S = 0.5
 # what a process may take until it has a task: it imports what the task needs
 _IMPORTS_S = 15.0
+# what one that has answered may take to end, before it is ended
+_GOODBYE_S = 10.0
 _environment_lock = threading.Lock()
 
 
@@ -175,4 +177,7 @@ class WorkerProcess:
         if kill:
             self.process.kill()
         self.pipe.close()
-        self.process.join()
+        self.process.join(_GOODBYE_S)
+        if self.process.exitcode is None:  # what it computed with has left something that runs on
+            self.process.kill()
+            self.process.join()

@@ -66,8 +66,9 @@ def running_service() -> Iterator[str]:
             process.kill()
             process.wait()
         if drain.is_alive():
-            drain.join()
-        process.stderr.close()
+            drain.join(timeout=15)
+        if not drain.is_alive():  # what somebody else still writes to cannot be closed
+            process.stderr.close()
 
 
 @dataclasses.dataclass(frozen=True)

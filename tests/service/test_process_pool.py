@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+import threading
 import time
 from collections.abc import Generator
 from concurrent.futures import CancelledError
@@ -10,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from service import process_pool
+from service import process_pool, worker_process
 from service.errors import OverdueError, WorkerDiedError
 from service.process_pool import ProcessPool
 from service.process_watch import ended_by_itself
@@ -203,6 +204,19 @@ def test_end_does_not_wait_for_a_task() -> None:
         waiting.result()
     with pytest.raises(RuntimeError):
         pool.submit(_pid, 0)
+    assert not multiprocessing.active_children()
+
+
+def _leave_a_thread() -> int:
+    """Leave what goes on for longer than anybody waits, and would keep the process."""
+    threading.Thread(target=time.sleep, args=(3600,)).start()
+    return os.getpid()
+
+
+def test_process_that_does_not_end_by_itself_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker_process, "_GOODBYE_S", 0.2)
+    with ProcessPool(1) as pool:
+        assert pool.submit(_leave_a_thread).result() in pool.pids
     assert not multiprocessing.active_children()
 
 
