@@ -23,6 +23,7 @@ from inference.fits.likelihood.erring_point import (
     point_at,
     slopes_of_priors,
 )
+from inference.fits.likelihood.pairs import solved_by_root
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import eliminated
 from inference.identifiability.elimination import moving
@@ -90,7 +91,7 @@ def rows_of(problem: FitProblem, top: Erring) -> Rows:
     whitener = linearised(problem, top.x, top.positions)[-1]
     # crosstalk moves the readings themselves
     known = [i for i, slot in enumerate(CROSSTALK) if slot not in problem.slots]
-    columns = [at.errors, at.residual[:, :, None], np.linalg.solve(at.root, whitener)[:, :, known]]
+    columns = [at.errors, at.residual[:, :, None], solved_by_root(at.root, whitener)[:, :, known]]
     told, (k, d, c) = at.told, (at.a.size, at.x.size, len(known))
     if told is not None:
         none = np.zeros((at.u.size, 2, c))

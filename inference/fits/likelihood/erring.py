@@ -32,6 +32,7 @@ from inference.fits.likelihood.erring_point import (
 )
 from inference.fits.likelihood.maximum import Maximum
 from inference.fits.likelihood.other_starts import apart, larger, of_law, other_crosstalk
+from inference.fits.likelihood.pairs import solved
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import Told, contradictions, eliminated, improbable, told_at
 from inference.identifiability.elimination import eliminate
@@ -280,7 +281,7 @@ def end_of(problem: FitProblem, at: Point, remaining: float) -> Erring:
     if problem.law:
         chi_square += float(at.z @ at.z)
     frames = problem.frames.copy()
-    frames[:, :2] -= np.linalg.solve(whitener, (errors @ at.a)[:, :, None])[:, :, 0]
+    frames[:, :2] -= solved(whitener, (errors @ at.a)[:, :, None])[:, :, 0]
     return Erring(
         x=at.x,
         deviance=at.deviance,

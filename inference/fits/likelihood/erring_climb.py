@@ -19,6 +19,7 @@ from inference.fits.likelihood.frame_modes import frame_modes
 from inference.fits.likelihood.model_error import number_of_errors
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import eliminated
+from inference.fits.likelihood.triangle import triangle_of
 from inference.frame.sensitivity import Value
 from inference.identifiability.information import Information
 
@@ -104,7 +105,7 @@ def _settled(problem: FitProblem, at: Point) -> Point:
         seen, da = _eliminated(problem, at), np.zeros(k)
         if k > 0:
             rows = np.vstack([seen.errors, np.column_stack([np.eye(k), -at.a])])
-            triangle = np.asarray(np.linalg.qr(rows, mode="r"))
+            triangle = triangle_of(rows)
             da = _solved(triangle[:k, :k], triangle[:k, k])
         u = _ranges(problem, at, seen, at.x, da)
         at = point_at(problem, at.x, u, at.a + da, at.z)
@@ -175,7 +176,7 @@ def climbed(
         rows[m + k :, k:-1], rows[m + k :, -1] = slopes, -at.z
         if pull is not None:
             rows = np.vstack([rows, pull.row(seen, at.u)])
-        triangle = np.asarray(np.linalg.qr(rows, mode="r"))
+        triangle = triangle_of(rows)
         of_x, wanted = triangle[k : k + d, k:-1], triangle[k : k + d, -1]
         if held is not None:
             of_x = np.where(np.arange(d) == held, 0.0, of_x)

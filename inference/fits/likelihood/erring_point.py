@@ -16,6 +16,7 @@ from inference.fits.likelihood.model_error import (
     own_share_left,
     shadow_of,
 )
+from inference.fits.likelihood.pairs import cholesky, solved, solved_by_root
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import Told, told_at, with_column
 from inference.frame.delayed import delayed
@@ -71,7 +72,7 @@ class Point(NamedTuple):
         if self.errors.shape[2] == 0:  # noise alone, which is the same everywhere
             return self.deviance
         bare = self.root @ self.residual[:, :, None]
-        square = np.square(np.linalg.solve(other.root, bare)).sum()
+        square = np.square(solved_by_root(other.root, bare)).sum()
         change = float(square - np.square(self.residual).sum())
         return self.deviance - self.volume + other.volume + change
 
@@ -180,7 +181,7 @@ def linearised(
         errors = with_column(problem.known, np.zeros((n, 2, 0)))
         return residual, by_value @ chain, along, errors, whitener
     signal = by_value[:, :, Value.C2] * values[Value.C2]
-    light = np.linalg.solve(whitener, signal[:, :, None])[:, :, 0]
+    light = solved(whitener, signal[:, :, None])[:, :, 0]
     erring = erring_flux(problem, u)
     parts = [erring.of_light(light)]
     smooth = parts[0].shape[2]
@@ -197,7 +198,7 @@ def linearised(
             return np.asarray((whitener @ bare[:, :, None])[:, :, 0])
 
         columns = [Value.C0, Value.C1, Value.C2]
-        bare = np.asarray(np.linalg.solve(whitener, by_value[:, :, columns]), np.float64)
+        bare = solved(whitener, by_value[:, :, columns])
         for k, column in enumerate(columns):
             by_value[:, :, column] += noised(errs.change(bare[:, :, k]))
         slope = _slope_of_light(problem, values, light, u)
@@ -225,7 +226,7 @@ def _slope_of_light(problem: FitProblem, values: Array, light: Array, u: Array) 
 
 def whitened_of(problem: FitProblem, u: Array, errors: Array, parts: Array) -> Array:
     """Divide by the noise and what is left of errors."""
-    return np.asarray(np.linalg.solve(_root_of_covariance(problem, u, errors), parts))
+    return solved_by_root(_root_of_covariance(problem, u, errors), parts)
 
 
 def _root_of_covariance(problem: FitProblem, u: Array, errors: Array) -> Array:
@@ -237,7 +238,7 @@ def _root_of_covariance(problem: FitProblem, u: Array, errors: Array) -> Array:
     left = np.where(np.isfinite(left).all(axis=(1, 2), keepdims=True), left, 0.0)
     # beside errors of 1e8 the noise's own 1 would be lost
     own = 1.0 + 1e-12 * np.trace(left, axis1=1, axis2=2)
-    return np.asarray(np.linalg.cholesky(own[:, None, None] * np.eye(2) + left))
+    return cholesky(own[:, None, None] * np.eye(2) + left)
 
 
 def left_of_frames(
@@ -295,8 +296,7 @@ def point_at(problem: FitProblem, x: Array, u: Array, a: Array, z: Array | None 
     at, volume = (jacobian, along, errors), 0.0
     if errors.shape[2] > 0:  # else the root is 1
         parts = [(residual - errors @ a)[:, :, None], jacobian, along[:, :, None], errors]
-        white = np.asarray(np.linalg.solve(root, np.concatenate(parts, axis=2)), np.float64)
-        d = x.size
+        white, d = solved_by_root(root, np.concatenate(parts, axis=2)), x.size
         volume = _volume(root, along, white[:, :, d + 1]) + _shared_volume(problem, along, errors)
         residual = white[:, :, 0]
         at = white[:, :, 1 : d + 1], white[:, :, d + 1], white[:, :, d + 2 :]

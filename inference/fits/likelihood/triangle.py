@@ -1,15 +1,48 @@
-"""Least squares by Householder triangles, as kernels: never normal equations."""
+"""Least squares by Householder triangles, never by normal equations."""
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from simulator.compiled import compiled
 
-__all__ = ["damped_step", "reduce_columns", "solve_least_squares"]
+__all__ = ["damped_step", "reduce_columns", "solve_least_squares", "triangle_of"]
 
 Array = NDArray[np.float64]
+
+_BLOCK = 32  # columns that LAPACK reduces at a time
+_MANY, _SELDOM = 500, 0.25  # rows from which that is worth a look, and the share of a few
+
+
+def triangle_of(rows: Array) -> Array:
+    """Return the triangle of a QR decomposition, shape (min(m, n), n).
+
+    Where columns are zero but in a few rows, such as errors that a few of many frames share, the
+    other rows are reduced first, without them.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (m, n)
+        At least one.
+    """
+    if len(rows) > _MANY:
+        present = rows != 0.0
+        often = present.sum(axis=0) >= _SELDOM * len(rows)
+        apart = ~present[:, ~often].any(axis=1)
+        if apart.any() and often.any():
+            first = _reduced(rows[np.ix_(apart, often)])
+            whole = np.zeros((len(first), rows.shape[1]))
+            whole[:, often] = first
+            rows = np.concatenate([whole, rows[~apart]])
+    return _reduced(rows)
+
+
+def _reduced(rows: Array) -> Array:
+    # numpy's also clears and copies what is not asked for
+    reduced = lapack.dgeqrf(rows, lwork=_BLOCK * rows.shape[1])[0]
+    return np.asarray(np.triu(reduced[: rows.shape[1]]))
 
 
 @compiled
