@@ -63,9 +63,16 @@ async def _by_jobs(path: Path, request: Any, settings: SamplerSettings) -> dict[
 
 # a second for the start, and one for every chunk
 @pytest.mark.parametrize(
-    "max_seconds", [1.0, pytest.param(2.5, marks=pytest.mark.thorough), 1000.0]
+    ("max_seconds", "optional"),
+    [
+        (1.0, False),
+        (1.0, True),
+        pytest.param(2.5, False, marks=pytest.mark.thorough),
+        pytest.param(2.5, True, marks=pytest.mark.thorough),
+        (1000.0, False),
+        pytest.param(1000.0, True, marks=pytest.mark.thorough),
+    ],
 )
-@pytest.mark.parametrize("optional", [False, True])
 def test_the_same_answer_from_a_call_and_from_the_service(
     max_seconds: float, optional: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

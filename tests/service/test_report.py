@@ -95,8 +95,8 @@ def uncosted(rows: Sequence[Row]) -> list[Row]:
 def test_same_seed_same_errors_and_a_killed_run_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = measured()
-    scenes = [BY_NAME[name] for name in MEASURED]
+    scenes = [BY_NAME[MEASURED[1]]]
+    whole = [row for row in measured() if row.scene == MEASURED[1]]
     first = list(itertools.islice(rows_of(scenes, TINY, 1, tmp_path / "part"), 9))
     with (tmp_path / "part").open("a") as file:
         file.write('{"key": "cut sh')

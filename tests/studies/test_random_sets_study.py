@@ -123,6 +123,7 @@ def test_a_few_frames_do_not_tell_more_of_a_derivative_than_they_can(
     assert float(row["worst"]) < 4.0
 
 
+@pytest.mark.thorough
 def test_a_valley_that_falls_slowly_holds_mass() -> None:
     """The distance of a wall was 3.0 sd off and `identified`: its profile falls by half of what
     curvature foresees, and no valley was followed there."""
