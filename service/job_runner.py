@@ -204,7 +204,9 @@ class _Run(Generic[J, C, T, P]):
         spent = self.record.wall_s, self.cpu_s
         call = _summary, self.runner.fold.summarise, self.job, self.checkpoint, *spent
         (result,) = await self._execute(call, wanted=True)
-        return dict(result)
+        # the answer has cost something too
+        whole = {"wall_s": time.monotonic() - self.began, "cpu_s": self.cpu_s}
+        return dict(result) | {"runtime": result["runtime"] | whole}
 
     async def _fail(self, problem: dict[str, Any]) -> None:
         """End the job, with what was drawn before it failed."""

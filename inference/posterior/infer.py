@@ -1,5 +1,6 @@
 """The fold in a loop: from readings to the posterior in one call."""
 
+import dataclasses
 import functools
 import time
 from collections.abc import Callable
@@ -77,4 +78,7 @@ def infer(
         reached = progress(job, checkpoint)
         pace = Pace.followed(pace, reached, wall_s)
         tell(pace.foretell(reached, wall_s))
-    return summarise(job, checkpoint, wall_s, cpu_s)
+    posterior, spent = timed(summarise, job, checkpoint, wall_s, cpu_s)
+    wall_s, cpu_s = time.perf_counter() - begin, cpu_s + spent
+    runtime = dataclasses.replace(posterior.runtime, wall_s=wall_s, cpu_s=cpu_s)
+    return dataclasses.replace(posterior, runtime=runtime)

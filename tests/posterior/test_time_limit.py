@@ -94,6 +94,26 @@ def test_the_same_answer_from_a_call_and_from_the_service(
     assert called["verdict"]["converged"] != stopped
 
 
+def test_run_time_is_that_of_the_whole_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That of its summary too, which of many posteriors is the larger part."""
+
+    def by_name(function: Callable[..., R], *arguments: Any) -> tuple[R, float]:
+        return function(*arguments), 7.0 * function.__name__.strip("_").startswith("summar")
+
+    sensor, scene, frames = example("pulsed", crosstalk=False)
+    settings = SamplerSettings(method="importance", seed=7, target_ess=50)
+    monkeypatch.setattr(inference.posterior.infer, "timed", by_name)
+    monkeypatch.setattr(service.job_runner, "timed", by_name)
+    runtime = inference.posterior.infer.infer(sensor, scene, frames, settings).runtime
+    served = asyncio.run(_by_jobs(tmp_path, (sensor, scene, frames), settings))["runtime"]
+    assert runtime.cpu_s == 7.0
+    assert 7.0 <= served["cpu_s"] < 8.0  # merging is timed by a clock of its own
+    assert min(runtime.wall_s, served["wall_s"]) > 0.0
+    assert runtime.likelihood_calls == served["likelihood_calls"] > 0
+
+
 def test_a_finished_job_was_not_stopped() -> None:
     """The limit may pass while the answer is made: nothing was cut short then."""
     settings = SamplerSettings(seed=7, target_ess=50, max_seconds=60)

@@ -203,7 +203,18 @@ class LeftOutTerm:
 
 @dataclasses.dataclass(frozen=True)
 class Runtime:
-    """What the answer cost."""
+    """What the answer cost.
+
+    Attributes
+    ----------
+    wall_s, cpu_s : float
+        Time, and processor time without that of compiling [s]; of `infer` and the service with what
+        making the answer took.
+    likelihood_calls : int
+        Evaluations of the likelihood.
+    k_hat : float or None
+        Pareto k-hat of importance weights; None where there were none.
+    """
 
     wall_s: float
     cpu_s: float
