@@ -53,6 +53,17 @@ def test_roots_are_those_of_the_library(seed: int) -> None:
     )
 
 
+def test_what_is_not_finite_comes_out_again() -> None:
+    """Without a warning, and in its own frame alone."""
+    parts = np.ones((3, 2, 1))
+    parts[0], parts[1] = np.nan, np.inf
+    roots = np.broadcast_to(np.array([[2.0, 0.0], [1.0, 1.0]]), (3, 2, 2))
+    for solve in (solved, solved_by_root):
+        found = solve(roots, parts)
+        assert not np.isfinite(found[:2]).any(axis=(1, 2)).all()
+        assert found[2, :, 0].tolist() == [0.5, 0.5]
+
+
 @pytest.mark.parametrize("rows", [3, 60, 700])
 @pytest.mark.parametrize("seldom", [0, 9, 30])
 def test_triangle_is_that_of_the_library(rows: int, seldom: int) -> None:

@@ -1,6 +1,7 @@
 """Systems of two equations, one for each frame.
 
-Libraries solve them one by one, at a thousand times the cost of what is to be computed.
+numpy calls a library for each of them, and the calls cost more than what is computed. As of these
+nothing is said of numbers that are not finite, which come out again.
 """
 
 import numpy as np
@@ -11,6 +12,7 @@ __all__ = ["cholesky", "solved", "solved_by_root"]
 Array = NDArray[np.float64]
 
 
+@np.errstate(all="ignore")
 def cholesky(matrices: Array) -> Array:
     """Return lower triangular roots of symmetric positive definite matrices, shape (n, 2, 2)."""
     root = np.zeros_like(matrices)
@@ -20,6 +22,7 @@ def cholesky(matrices: Array) -> Array:
     return root
 
 
+@np.errstate(all="ignore")
 def solved_by_root(roots: Array, parts: Array) -> Array:
     """Solve with lower triangular matrices.
 
@@ -41,6 +44,7 @@ def solved_by_root(roots: Array, parts: Array) -> Array:
     return found
 
 
+@np.errstate(all="ignore")
 def solved(matrices: Array, parts: Array) -> Array:
     """Solve by elimination with row pivoting; shapes as of `solved_by_root`."""
     turned = np.abs(matrices[:, 1, 0]) > np.abs(matrices[:, 0, 0])
