@@ -5,7 +5,6 @@ the chunk is not one of Dask's worker, and a chunk that nobody wants any more ca
 and answers go through Dask as bytes, which it neither searches nor changes.
 """
 
-import atexit
 import functools
 import multiprocessing
 import pickle
@@ -34,9 +33,7 @@ def _pool(processes: int) -> ProcessPool:
     # they end with it (`service.parent_death`)
     configuration: dict[str, Any] = multiprocessing.current_process().__dict__["_config"]
     configuration["daemon"] = False
-    pool = ProcessPool(processes)
-    atexit.register(pool.shutdown, cancel_futures=True)
-    return pool
+    return ProcessPool(processes)
 
 
 def chunk(name: str, limit_s: float, call: bytes) -> bytes:

@@ -5,6 +5,7 @@ cannot stop one that runs. Here a thread stands for each process: it hands over 
 the answer, and where the process died instead it starts another and hands the task over again.
 """
 
+import atexit
 import contextlib
 import logging
 import queue
@@ -115,6 +116,8 @@ class ProcessPool(Executor):
                 raise RuntimeError("the pool is closed")
             if not self._started:
                 self._started = True
+                # at its end a process waits for those that it has started, which wait for it
+                atexit.register(self.shutdown, cancel_futures=True)
                 for thread in self._threads:
                     thread.start()
             self._tasks.put((future, watch, fn, args))
@@ -178,12 +181,13 @@ class ProcessPool(Executor):
             closed = self._closed.is_set()
             self._closed.set()
             started = self._started
+        atexit.unregister(self.shutdown)
         if cancel_futures:
             self._cancel_waiting()
             with self._lock:
                 for worker in self._workers.values():
                     worker.process.kill()
-        if not closed:
+        if cancel_futures or not closed:  # which takes away what an earlier end has put there
             for _ in self._threads:
                 self._tasks.put(None)
         if wait and started:
@@ -226,7 +230,7 @@ class ProcessPool(Executor):
         own, deaths = 0, 0
         while future not in self._unwanted and not self._closed.is_set():
             try:
-                return self._worker(index).ask(task, watch)
+                return self._worker(index, future).ask(task, watch)
             except DiedError as error:
                 with self._lock:
                     self._workers.pop(index, None)
@@ -244,8 +248,8 @@ class ProcessPool(Executor):
             self._closed.wait(min(_FIRST_PAUSE_S * 2 ** (deaths - 1), _LONGEST_PAUSE_S))
         return False, WorkerDiedError("the task was given up, or the pool was closed")
 
-    def _worker(self, index: int) -> WorkerProcess:
-        """Return the process of a thread; to be called in that thread."""
+    def _worker(self, index: int, future: Future[Any]) -> WorkerProcess:
+        """Return the process of a thread for a task; to be called in that thread."""
         with self._lock:
             worker = self._workers.get(index)
         if worker is not None:
@@ -254,6 +258,7 @@ class ProcessPool(Executor):
         worker = WorkerProcess()
         with self._lock:
             self._workers[index] = worker
-            if self._closed.is_set():  # shutdown did not see this process
+            # who closed the pool, or gave the task up, did not see this process
+            if self._closed.is_set() or future in self._unwanted:
                 worker.process.kill()
         return worker

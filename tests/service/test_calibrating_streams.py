@@ -70,10 +70,11 @@ async def sent(http: httpx.AsyncClient, path: str, some: list[bytes]) -> list[di
 async def until_told(http: httpx.AsyncClient, path: str, rest: list[bytes]) -> list[dict[str, Any]]:
     """Send lines one by one, when the posterior has ended, until one tells what became of it."""
     posterior = (await http.get(path)).json()["calibration"]["asked"]["posterior"]
-    while (await http.get(f"/v1/posteriors/{posterior}")).json().get("status") not in {
+    while (status := (await http.get(f"/v1/posteriors/{posterior}")).json()["status"]) not in {
         "done",
         "cancelled",
     }:
+        assert status != "failed"  # it may not be there yet
         await asyncio.sleep(0.1)
     found: list[dict[str, Any]] = []
     while not found or "calibration" not in found[-1]:

@@ -3,6 +3,8 @@
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Generator
@@ -205,6 +207,54 @@ def test_end_does_not_wait_for_a_task() -> None:
     with pytest.raises(RuntimeError):
         pool.submit(_pid, 0)
     assert not multiprocessing.active_children()
+
+
+def test_task_given_up_while_its_process_is_started_is_not_run(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """There is no process to be ended yet, and the task would run to its limit."""
+    begun, go_on = threading.Event(), threading.Event()
+
+    class Slow(worker_process.WorkerProcess):
+        def __init__(self) -> None:
+            begun.set()
+            assert go_on.wait(60.0)
+            super().__init__()
+
+    monkeypatch.setattr(process_pool, "WorkerProcess", Slow)
+    with ProcessPool(1) as pool:
+        future = pool.submit(time.sleep, 3600)
+        assert begun.wait(60.0)
+        pool.abandon(future)
+        go_on.set()
+        try:
+            with pytest.raises(WorkerDiedError, match="given up"):
+                future.result(timeout=60.0)
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def test_a_second_end_is_one_too() -> None:
+    """The first waits for nothing, and its threads are busy still."""
+    pool = ProcessPool(2)
+    tasks = [pool.submit(time.sleep, 3600) for _ in range(2)]
+    while not all(task.running() for task in tasks) or len(pool.pids) < 2:
+        time.sleep(0.01)
+    pool.shutdown(wait=False)
+    second = threading.Thread(target=pool.shutdown, kwargs={"cancel_futures": True}, daemon=True)
+    second.start()
+    second.join(60.0)
+    assert not second.is_alive()
+    assert not multiprocessing.active_children()
+
+
+def test_a_process_ends_though_nobody_has_ended_its_pool() -> None:
+    code = "from service.process_pool import ProcessPool\n"
+    code += "if __name__ == '__main__':\n    print(ProcessPool(1).submit(abs, -3).result())\n"
+    done = subprocess.run(
+        [sys.executable, "-c", code], timeout=60, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "3\n"
 
 
 def _leave_a_thread() -> int:

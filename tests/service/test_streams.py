@@ -32,6 +32,7 @@ from tests.service.streaming import LINES, NDJSON, plain, sent
 pytestmark = pytest.mark.anyio
 
 LIMITS: dict[str, Any] = {"workers": 1, "client_s": 1.0}
+WAIT_S = 300.0  # for what comes in milliseconds
 
 
 @pytest.fixture
@@ -166,8 +167,9 @@ async def test_the_stream_outlives_junk(address: str) -> None:
         part = LINES[7] + b"\n" + LINES[8]
         writer.write("\r\n".join([*head, "", ""]).encode())
         writer.write(f"{len(part):x}\r\n".encode() + part + b"\r\n")
-        while (await http.get(path)).json()["sequence"] != 8:
-            await asyncio.sleep(0.01)
+        async with asyncio.timeout(WAIT_S):
+            while (await http.get(path)).json()["sequence"] != 8:
+                await asyncio.sleep(0.01)
         writer.transport.abort()
         while (response := await http.post(path + "/frames", content=LINES[8],
                                            headers=NDJSON)).status_code == 409:  # fmt: skip

@@ -68,8 +68,9 @@ def test_what_two_processes_keep_at_once_is_found_again(
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     pipes = [CONTEXT.Pipe() for _ in range(2)]
     started = [CONTEXT.Process(target=keep, args=(k, far)) for k, (_, far) in enumerate(pipes)]
-    for each in started:
+    for each, (_, far) in zip(started, pipes, strict=True):
         each.start()
+        far.close()  # so that the end of a process is that of its pipe
     for _ in range(KINDS):
         assert [near.recv() for near, _ in pipes] == ["ready", "ready"]
         for near, _ in pipes:
