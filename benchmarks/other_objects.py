@@ -1,12 +1,13 @@
 """Tracks of objects that differ from the one that is stated, and what `discrepancy.flux` does.
 
-    python -m benchmarks.other_objects [--tracks 300] [--seed S]
+    python -m benchmarks.other_objects [--tracks 300] [--seed S] [--wall 1.0]
 
 Each track, of 12 s at 25 Hz, is of an object whose c0 and c2 are those that are stated times two
 lognormal factors: hands of all sizes, ground of all kinds. It rests, goes to and fro, approaches,
 or jumps between two ranges every four seconds, from 0.08 to 1.6 m; pulses of 30 ns and waves of
 20 MHz by turns, signal-to-noise ratios at 1 m of 30 to 3000, stated objects with a c0 of 0.003 to
-10,000 m2 (ground that fills the view). The crosstalk is known.
+10,000 m2 (ground that fills the view). The crosstalk is known, and so is a wall 3 m away, if one is
+asked for, in units of the object's light at 1 m; the object's shadow is its own.
 
 A line a spread of the factors (in log) and `discrepancy.flux`: frames with one range, frames that
 are sure and more than five standard deviations off (no misfit, no outlier), tracks with more than
@@ -39,7 +40,7 @@ KINDS: tuple[dict[str, Any], ...] = (
 STEP_S, COUNT = 0.04, 300
 SPREADS = (0.0, 0.1, 0.3, 0.5)
 FLUXES = (None, 0.3, 0.5, 0.7)
-FAR = 5.0
+FAR, WALL_M = 5.0, 3.0
 
 
 def _path(rng: np.random.Generator) -> Array:
@@ -54,7 +55,9 @@ def _path(rng: np.random.Generator) -> Array:
     return np.asarray(paths[int(rng.integers(4))])
 
 
-def random_visit(rng: np.random.Generator, kind: dict[str, Any], spread: float) -> Any:
+def random_visit(
+    rng: np.random.Generator, kind: dict[str, Any], spread: float, wall: float = 0.0
+) -> Any:
     """Draw a track: the sensor, what is stated of the scene, the frames and their ranges.
 
     Parameters
@@ -65,20 +68,26 @@ def random_visit(rng: np.random.Generator, kind: dict[str, Any], spread: float) 
         Of the sensor.
     spread : float
         Standard deviation of the logs of both factors [1].
+    wall : float
+        Strength of a wall in units of the object's light at 1 m; none where it is 0.
     """
     c0 = float(10.0 ** rng.uniform(-2.5, 4.0))
     c1 = 2.0 * c0**0.5 * float(np.expm1(rng.normal(0.0, 0.3))) if c0 < 10.0 else 0.0
     stated = {"c0": c0, "c1": c1, "c2": 0.1}
     size, brightness = np.exp(spread * rng.standard_normal(2)).tolist()
     other = {"c0": c0 * size, "c1": c1 * size**0.5, "c2": 0.1 * brightness}
-    noise = object_flux(1.0, 0.1 * c0, c0, c1) / float(10.0 ** rng.uniform(1.5, 3.5))
+    light = object_flux(1.0, 0.1 * c0, c0, c1)
+    noise = light / float(10.0 ** rng.uniform(1.5, 3.5))
     sensor = parse_sensor({**kind, "noise": {"read": [noise, noise]}})
     crosstalk = np.abs(noise * rng.normal(0.0, 50.0, 2)).tolist()
     r = _path(rng)
-    truth = parse_scene({"object": other, "crosstalk": crosstalk, "discrepancy": 0})
+    known: dict[str, Any] = {"crosstalk": crosstalk}
+    if wall > 0.0:
+        known["background"] = {"strength": wall * light, "distance_m": WALL_M, "shadow": "object"}
+    truth = parse_scene({"object": other, "discrepancy": 0, **known})
     path = SampledTrajectory(range_m=r.tolist(), time_s=(STEP_S * np.arange(COUNT)).tolist())
     frames: Frames = simulate(sensor, truth, path, rng).frames
-    return sensor, {"object": stated, "crosstalk": crosstalk}, frames, r
+    return sensor, {"object": stated, **known}, frames, r
 
 
 def frames_off(visit: Any, flux: float | None) -> tuple[Array, Array, bool]:
@@ -104,6 +113,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tracks", type=int, default=300)
     parser.add_argument("--seed", type=int, help="left out: a fresh one")
+    parser.add_argument("--wall", type=float, default=0.0, help="a wall, in the object's light")
     arguments = parser.parse_args()
     seed = secrets.randbits(31) if arguments.seed is None else arguments.seed
     print(f"seed {seed}, {arguments.tracks} tracks each")
@@ -114,7 +124,8 @@ def main() -> None:
             told = []
             for number in range(arguments.tracks):
                 rng = np.random.default_rng([seed, number])
-                told.append(frames_off(random_visit(rng, KINDS[number % 2], spread), flux))
+                visit = random_visit(rng, KINDS[number % 2], spread, arguments.wall)
+                told.append(frames_off(visit, flux))
             off = np.abs(np.array([each[0] for each in told]))
             one = np.isfinite(off)
             far = np.count_nonzero(off > FAR, axis=1)

@@ -39,6 +39,7 @@ _HEAD = """/*
 #include <float.h>
 #include <math.h>
 
+/* R writes literals alone: R(0.5); a variable is cast to @_real */
 #ifdef @UPPER_FLOAT
 typedef float @_real;
 #define R(number) number##f
@@ -62,6 +63,7 @@ typedef struct {
     int status;
     @_real range_m; /* 0 without a range */
     @_real sd_m;    /* whole standard deviation; 0 without a range, -1 where it is no number */
+    int near_fold;  /* 1: the object may be there or farther, however small sd_m is */
 } @_answer;
 
 int @_range(@_real first, @_real second, @_answer *out);
@@ -72,6 +74,7 @@ int @_range(@_real first, @_real second, @_answer *out)
 {
     out->range_m = 0;
     out->sd_m = 0;
+    out->near_fold = 0;
     out->status = @_NONE;
 @FULL    if (first - first == 0 && second - second == 0)
         out->status = answer(first, second, out);

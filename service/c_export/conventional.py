@@ -2,6 +2,7 @@
 
 import math
 
+from inference.realtime.assemble import NOISE_BAND
 from service.c_export.source import Asked, Bound, Exported, noise_lines
 from simulator.sensor import PulsedSensor
 
@@ -23,6 +24,7 @@ static int answer(real first, real second, @_answer *out)
 @NOISE        variance = own1 + share * share * own2 + (1 - share) * (1 - share) * shared;
     }
     noise = R0 / whole * SQRT(variance);
+    out->near_fold = range > R0 / 2 && R0 - range < BAND * noise;
     if (noise < EPSILON * range)
         noise = EPSILON * range;
     out->range_m = range;
@@ -97,7 +99,7 @@ def conventional(asked: Asked) -> Exported:
     noise = noise_lines(sensor).replace("    const", "        const")
     if isinstance(sensor, PulsedSensor):
         return Exported(
-            constants | {"R0": sensor.r0},
+            constants | {"R0": sensor.r0, "BAND": NOISE_BAND},
             {},
             _PULSE.replace("@NOISE", noise),
             Bound(0.0, 6.0, 0.0, crosstalk, (0.0, 0.0), read),
