@@ -73,6 +73,8 @@ def random_visit(
     """
     c0 = float(10.0 ** rng.uniform(-2.5, 4.0))
     c1 = 2.0 * c0**0.5 * float(np.expm1(rng.normal(0.0, 0.3))) if c0 < 10.0 else 0.0
+    if wall > 0.0:  # a shadow allows no range below -c1
+        c1 = abs(c1)
     stated = {"c0": c0, "c1": c1, "c2": 0.1}
     size, brightness = np.exp(spread * rng.standard_normal(2)).tolist()
     other = {"c0": c0 * size, "c1": c1 * size**0.5, "c2": 0.1 * brightness}
@@ -102,7 +104,10 @@ def frames_off(visit: Any, flux: float | None) -> tuple[Array, Array, bool]:
     """
     sensor, stated, frames, r = visit
     if flux is not None:
-        stated = {**stated, "discrepancy": {"flux": flux, "range_m": 0.0008}}
+        error = {"flux": flux, "range_m": 0.0008}
+        # before a wall its default has to be said again
+        error |= {"shadow": 0.2} if "background" in stated else {}
+        stated = {**stated, "discrepancy": error}
     found = track(sensor, parse_scene(stated), frames)
     sure = ~found.misfit & (found.outlier < 0.5)
     off = np.where(sure, (found.range_m - r) / found.sd_m, np.nan)
