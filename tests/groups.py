@@ -1,7 +1,4 @@
-"""Which tests one process runs: those of a group compile the same kernels, or share a fixture.
-
-Without groups both of two processes would compile nearly every kernel.
-"""
+"""Which tests one process runs: those of a group need the same kernels, or share a fixture."""
 
 __all__ = ["TOGETHER", "group_of"]
 
