@@ -1,4 +1,4 @@
-"""Time of the joint fit by number of frames, and how often what numpy solves frame by frame takes.
+"""Time of the joint fit by number of frames, beside that where numpy solves frame by frame.
 
     python -m benchmarks.many_frames [--frames 100 300 1000]
 
@@ -25,10 +25,9 @@ from simulator.sensor import parse_sensor
 from simulator.simulate import simulate
 from simulator.trajectories import RadialTrajectory
 
-__all__ = ["Timed", "by_library", "timed"]
+__all__ = ["by_library", "timed"]
 
 Array = NDArray[np.float64]
-Timed = tuple[float, Array]
 
 SENSOR = parse_sensor({"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1e-4, 1e-3]}})
 SD = (0.01, 0.05)
@@ -59,7 +58,7 @@ def by_library() -> Iterator[None]:
         yield
 
 
-def timed(frames: int) -> Timed:
+def timed(frames: int) -> tuple[float, Array]:
     """Fit frames; return processor time [s] and ranges [m], shape (n,)."""
     truth = parse_scene({"object": OBJECT, "crosstalk": [0.004, 0.02]})
     path = RadialTrajectory(from_m=0.15, to_m=1.5, frames=frames, spacing="log")

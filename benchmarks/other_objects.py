@@ -106,7 +106,8 @@ def frames_off(visit: Any, flux: float | None) -> tuple[Array, Array, bool]:
     if flux is not None:
         error = {"flux": flux, "range_m": 0.0008}
         # before a wall its default has to be said again
-        error |= {"shadow": 0.2} if "background" in stated else {}
+        if "background" in stated:
+            error["shadow"] = 0.2
         stated = {**stated, "discrepancy": error}
     found = track(sensor, parse_scene(stated), frames)
     sure = ~found.misfit & (found.outlier < 0.5)

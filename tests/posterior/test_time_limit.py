@@ -97,7 +97,7 @@ def test_the_same_answer_from_a_call_and_from_the_service(
 def test_run_time_is_that_of_the_whole_answer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """That of its summary too, which of many posteriors is the larger part."""
+    """That of its summary too."""
 
     def by_name(function: Callable[..., R], *arguments: Any) -> tuple[R, float]:
         return function(*arguments), 7.0 * function.__name__.strip("_").startswith("summar")
