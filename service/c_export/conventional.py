@@ -2,7 +2,8 @@
 
 import math
 
-from inference.realtime.assemble import NOISE_BAND
+from inference.realtime.solving.pulse_ratio import TOGETHER
+from inference.realtime.solving.ratio_reach import FEW
 from service.c_export.source import Asked, Bound, Exported, noise_lines
 from simulator.sensor import PulsedSensor
 
@@ -22,9 +23,26 @@ static int answer(real first, real second, @_answer *out)
         return @_NONE;
     {
 @NOISE        variance = own1 + share * share * own2 + (1 - share) * (1 - share) * shared;
+        noise = R0 / whole * SQRT(variance);
+        out->near_fold = END >= 1 - 8 * EPSILON && whole - late < TOGETHER * SQRT(own1 + own2);
+        if (FEW * (own2 + shared) > whole * whole) { /* noise leads it away from its tangent */
+            const real v1 = own1 / whole / whole, v2 = own2 / whole / whole;
+            const real both = shared / whole / whole, middle = share - 9 * both;
+            const real left = 1 - 9 * (v2 + both), rest = share * share - 9 * (v1 + both);
+            const real square = 9 * (variance / whole / whole - 9 * (v1 * v2 + both * (v1 + v2)));
+            real high = END, low = 0;
+            if (square > 0) {
+                const real root = SQRT(square);
+                if (left > 0 && middle + root < END * left)
+                    high = (middle + root) / left;
+                if (rest > 0)
+                    low = rest / (middle + root);
+            }
+            high = high - share > share - low ? high - share : share - low;
+            if (R0 * high / 3 > noise)
+                noise = R0 * high / 3;
+        }
     }
-    noise = R0 / whole * SQRT(variance);
-    out->near_fold = range > R0 / 2 && R0 - range < BAND * noise;
     if (noise < EPSILON * range)
         noise = EPSILON * range;
     out->range_m = range;
@@ -99,7 +117,9 @@ def conventional(asked: Asked) -> Exported:
     noise = noise_lines(sensor).replace("    const", "        const")
     if isinstance(sensor, PulsedSensor):
         return Exported(
-            constants | {"R0": sensor.r0, "BAND": NOISE_BAND},
+            constants
+            | {"R0": sensor.r0, "END": min(limits[1] / sensor.r0, 1.0)}
+            | {"TOGETHER": TOGETHER, "FEW": FEW},
             {},
             _PULSE.replace("@NOISE", noise),
             Bound(0.0, 6.0, 0.0, crosstalk, (0.0, 0.0), read),

@@ -156,11 +156,14 @@ def test_ranges_are_within_the_proven_error(case: str, kind: str, tmp_path: Path
         first, second = readings[n]
         if math.isnan(noise):  # so faint that the technique states none: the first-order one
             noise = sd_m
-        if isinstance(s, SineWaveSensor) and technique == "conventional":
+        if technique == "conventional":
             # of first order, as the bound wants it: that of the answer is of the curve
             x, y = first - CROSSTALK[0], second - CROSSTALK[1]
             read = sensor["noise"]["read"]
-            noise = math.hypot(y * read[0], x * read[1]) / (x * x + y * y) / s.wave_number
+            if isinstance(s, SineWaveSensor):
+                noise = math.hypot(y * read[0], x * read[1]) / (x * x + y * y) / s.wave_number
+            else:
+                noise = min(noise, s.max_range_m / y * math.hypot(read[0], x / y * read[1]))
         allowed = exported.bound.of(kind, root, noise, (first, second))
         # the technique itself is right to roundings of its own
         own = exported.bound.of("double", root, noise, (first, second)) - exported.bound.method
@@ -197,15 +200,12 @@ def test_an_object_beyond_the_reach_of_a_pulse_is_near_a_fold(kind: str, tmp_pat
     if kind == "float":
         readings = readings.astype(np.float32).astype(np.float64)
     (expected,) = estimate(s, parse_scene(scene), Frames(readings), ["conventional"]).results
-    assert expected.sd_parts_m is not None
     found = compiled(exported_of("pulse")[1], kind, tmp_path)(readings)
     counted = 0
     for n, (status, range_m, _, near) in enumerate(found):
         if status == Status.UNIQUE == expected.status[n]:
-            edge = s.max_range_m - 3 * expected.sd_parts_m.noise[n, 0]
-            if abs(range_m - edge) > 1e-5 * s.max_range_m:
-                assert bool(near) == expected.near_fold[n], (range_m, edge)
-                counted += near
+            assert bool(near) == expected.near_fold[n], (range_m, readings[n])
+            counted += near
     assert counted > 50
 
 

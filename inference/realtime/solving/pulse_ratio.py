@@ -10,15 +10,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.realtime.solving.ratio_reach import FEW, ratio_reach
 from simulator.compiled import compiled
 from simulator.readings import noise_parts
 
 __all__ = [
     "CONTRADICTED",
+    "TOGETHER",
     "Codes",
     "Columns",
     "Pulse",
     "explain",
+    "follow_noise",
     "pulsed_ranges",
     "ranges_alone",
 ]
@@ -47,8 +50,6 @@ class Pulse(NamedTuple):
         Full scale, inf where there is none.
     error : float
         Standard deviation of the error of the effective distance, the model's part [m].
-    band : float
-        Standard deviations of noise within which r0 is reached.
     """
 
     r0: float
@@ -61,7 +62,6 @@ class Pulse(NamedTuple):
     full_late: float
     full_whole: float
     error: float
-    band: float
 
 
 class Columns(NamedTuple):
@@ -80,6 +80,8 @@ class Columns(NamedTuple):
 
 CONTRADICTED = 5.0
 """Standard deviations by which noise moves no reading to the wrong side of a limit."""
+TOGETHER = 4.0
+"""Standard deviations by which noise parts windows that hold the same: once in 30,000 frames."""
 
 
 class Codes(NamedTuple):
@@ -129,8 +131,8 @@ def ranges_alone(flat: Array, r0: float, crosstalk_late: float, crosstalk_whole:
 
 
 @compiled
-def pulsed_ranges(flat: Array, pulse: Pulse, columns: Columns) -> int:
-    """Fill ranges, standard deviations and a mark of the frames that have none; count the marks.
+def pulsed_ranges(flat: Array, pulse: Pulse, columns: Columns) -> tuple[int, int]:
+    """Fill ranges, standard deviations and a mark of the frames that have none.
 
     A frame's gain and the relative error of the object's signal cancel in the ratio.
 
@@ -142,12 +144,17 @@ def pulsed_ranges(flat: Array, pulse: Pulse, columns: Columns) -> int:
         What they are computed with.
     columns : Columns
         Receives the results.
+
+    Returns
+    -------
+    (int, int)
+        Frames that are marked, and such whose light nearly drowns: `follow_noise` is theirs.
     """
     roots, sds, noise, reason = columns.roots, columns.sds, columns.noise, columns.reason
     near = columns.near
     square = pulse.error * pulse.error
-    half = 0.5 * pulse.r0
-    bad = 0
+    beyond = pulse.high >= pulse.r0  # where objects may stand there at all
+    bad, faint = 0, 0
     for i in range(roots.size):
         raw1, raw2 = flat[2 * i], flat[2 * i + 1]
         late, whole = raw1 - pulse.crosstalk_late, raw2 - pulse.crosstalk_whole
@@ -171,10 +178,36 @@ def pulsed_ranges(flat: Array, pulse: Pulse, columns: Columns) -> int:
         # the square of what is tiny or huge is no number
         sds[i] = (whole_sd if sd < whole_sd < math.inf else sd) if good else math.nan
         reason[i] = 0 if good else 1
-        # noise as wide as the range tells of no end
-        near[i] = 1 if good & (r > half) & (pulse.r0 - r < pulse.band * sd) else 0
+        # of an object there or farther the windows differ by noise alone
+        together = whole - late < TOGETHER * math.sqrt(own1 + own2)
+        near[i] = 1 if good & beyond & together else 0
         bad += 0 if good else 1
-    return bad
+        faint += 1 if good & (FEW * (own2 + shared) > whole * whole) else 0
+    return bad, faint
+
+
+@compiled
+def follow_noise(flat: Array, pulse: Pulse, columns: Columns) -> None:
+    """Follow the noise along the curve in frames whose light nearly drowns.
+
+    Parameters
+    ----------
+    flat, pulse, columns
+        As for `pulsed_ranges`, which has filled them.
+    """
+    end = min(pulse.high / pulse.r0, 1.0)
+    for i in range(columns.roots.size):
+        if columns.reason[i] != 0:
+            continue
+        raw1, raw2 = flat[2 * i], flat[2 * i + 1]
+        own1, own2, shared, _, _ = noise_parts(
+            pulse.read, pulse.shot, None, True, (raw1, raw2), (0.0, 0.0)
+        )
+        late, whole = raw1 - pulse.crosstalk_late, raw2 - pulse.crosstalk_whole
+        if FEW * (own2 + shared) > whole * whole:
+            reach = pulse.r0 * ratio_reach(late, whole, own1, own2, shared, end)
+            columns.noise[i] = max(columns.noise[i], reach)
+            columns.sds[i] = math.hypot(columns.noise[i], pulse.error)
 
 
 @compiled

@@ -24,6 +24,7 @@ from inference.realtime.solving.pulse_ratio import (
     Columns,
     Pulse,
     explain,
+    follow_noise,
     pulsed_ranges,
     ranges_alone,
 )
@@ -136,7 +137,6 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
         full_late=full_late,
         full_whole=full_whole,
         error=model_error_of(task).range_m,
-        band=NOISE_BAND,
     )
     # one block for all columns: freshly mapped pages would cost more than the arithmetic
     block = np.empty(35 * n, dtype=np.uint8)
@@ -145,7 +145,9 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
     status, reason, near = (block[(32 + i) * n : (33 + i) * n] for i in range(3))
     columns = Columns(roots, sds, noise, reason, near)
     flat = np.ascontiguousarray(frames.readings).reshape(-1)
-    bad = pulsed_ranges(flat, pulse, columns)
+    bad, faint = pulsed_ranges(flat, pulse, columns)
+    if faint:
+        follow_noise(flat, pulse, columns)
     count.fill(1)
     status.fill(Status.UNIQUE)
     if bad:

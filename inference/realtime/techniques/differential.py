@@ -21,6 +21,7 @@ from inference.realtime.motion import MotionLaw, law_of_model, law_of_motion
 from inference.realtime.net import Net, net_readings
 from inference.realtime.phase_reach import phase_reach
 from inference.realtime.solving.curves import differential_phase, differential_ratio
+from inference.realtime.solving.ratio_reach import FEW, ratio_reaches
 from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor, Sensor
 
@@ -102,6 +103,9 @@ def target_of(task: Task, rate: Net) -> Targets:
             sd = sensor.r0 * np.sqrt(variance)
             top = np.where(usable, sensor.r0 * d1, np.nan)
             contact = (ratio <= 0) & (sensor.r0 * ratio > -NOISE_BAND * sd)
+            # a fixed object's flicker is of the noise here, and moves nothing: it is not followed
+            if task.scene.motion != "tangential" or sensor.noise.relative is None:
+                sd = _followed(rate, sd, sensor.r0)
             return Targets(top, d2, sd, contact | (ratio == 0), still)
         length = np.hypot(d1, d2)
         # turned into the upper half plane first: there a small phase keeps its relative precision
@@ -115,6 +119,18 @@ def target_of(task: Task, rate: Net) -> Targets:
         contact = (phase > np.pi - band) | (phase == 0)
         turned = phase_reach(phase, sd, rate, size, np.pi)
         return Targets(np.where(usable, phase, np.nan), np.ones_like(phase), turned, contact, still)
+
+
+def _followed(rate: Net, sd: Array, r0: float) -> Array:
+    """Return standard deviations of a ratio that hold where its lower derivative drowns."""
+    bent = np.flatnonzero(np.sqrt(FEW * rate.var2) > np.abs(rate.second))
+    if bent.size == 0:
+        return sd
+    few = rate.select(bent)
+    result = sd.copy()
+    reach = ratio_reaches(few.first, few.second, few.var1, few.cov, few.var2)
+    result[bent] = np.maximum(sd[bent], r0 * reach)
+    return result
 
 
 def farthest_by_derivatives(sensor: Sensor) -> float:
