@@ -10,6 +10,7 @@ from inference.realtime.net import COMMON_REASONS, SATURATED
 
 __all__ = [
     "DROWNED",
+    "END_BAND",
     "NEGATIVE",
     "NOISE_BAND",
     "OUTSIDE",
@@ -24,6 +25,9 @@ Flags = NDArray[np.bool_]
 
 # standard deviations within which noise explains a reading on the wrong side of a limit
 NOISE_BAND = 3.0
+# the same where a frame taken for one on the right side has a range at the other end of all ranges:
+# one frame in 300,000
+END_BAND = 4.5
 
 NEGATIVE = (
     "the light is below zero by far more than noise: the crosstalk or the noise is not as stated"

@@ -2,7 +2,7 @@
 
 import math
 
-from inference.realtime.solving.pulse_ratio import TOGETHER
+from inference.realtime.assemble import END_BAND
 from inference.realtime.solving.ratio_reach import FEW
 from service.c_export.source import Asked, Bound, Exported, noise_lines
 from simulator.sensor import PulsedSensor
@@ -24,7 +24,7 @@ static int answer(real first, real second, @_answer *out)
     {
 @NOISE        variance = own1 + share * share * own2 + (1 - share) * (1 - share) * shared;
         noise = R0 / whole * SQRT(variance);
-        out->near_fold = END >= 1 - 8 * EPSILON && whole - late < TOGETHER * SQRT(own1 + own2);
+        out->near_fold = END >= 1 - 8 * EPSILON && whole - late < BAND * SQRT(own1 + own2);
         if (FEW * (own2 + shared) > whole * whole) { /* noise leads it away from its tangent */
             const real v1 = own1 / whole / whole, v2 = own2 / whole / whole;
             const real both = shared / whole / whole, middle = share - 9 * both;
@@ -55,7 +55,8 @@ static int answer(real first, real second, @_answer *out)
 {
     const real x = first - CROSSTALK1, y = second - CROSSTALK2;
     const real size = LARGER(x, y), a = x / size, b = y / size, square = a * a + b * b;
-    real phase, range, sd, band, var1, var2;
+    real phase, range, sd, along, across, var1, var2;
+    int beside;
     if (!(size > 0))
         return @_NONE;
     phase = ATAN2(y, x) - OFFSET;
@@ -68,8 +69,10 @@ static int answer(real first, real second, @_answer *out)
         var2 = (own2 + shared) / size / size;
     }
     sd = SQRT(b * b * var1 + a * a * var2) / square;
-    band = 3 * sd < TURN / 4 ? 3 * sd : TURN / 4;
-    if (!(phase > 0) || phase > TURN - band + LOW * WAVE_NUMBER)
+    along = COSINE * a + SINE * b;
+    across = COSINE * b - SINE * a;
+    beside = along > 0 && SIZE(across) < BAND * SQRT(SINE * SINE * var1 + COSINE * COSINE * var2);
+    if (!(phase > 0) || (phase > TURN / 2 && beside))
         return @_NONE;
     range = phase / WAVE_NUMBER;
     if (!(range >= LOW * (1 - 8 * EPSILON)) || !(range <= HIGH * (1 + 8 * EPSILON)))
@@ -88,6 +91,7 @@ static int answer(real first, real second, @_answer *out)
     sd = sd / WAVE_NUMBER;
     if (sd < EPSILON * range)
         sd = EPSILON * range;
+    out->near_fold = phase < TURN / 2 && beside && HIGH * WAVE_NUMBER >= TURN * (1 - 8 * EPSILON);
     out->range_m = range;
     out->sd_m = SQRT(sd * sd + MODEL * MODEL);
     return @_UNIQUE;
@@ -119,7 +123,7 @@ def conventional(asked: Asked) -> Exported:
         return Exported(
             constants
             | {"R0": sensor.r0, "END": min(limits[1] / sensor.r0, 1.0)}
-            | {"TOGETHER": TOGETHER, "FEW": FEW},
+            | {"BAND": END_BAND, "FEW": FEW},
             {},
             _PULSE.replace("@NOISE", noise),
             Bound(0.0, 6.0, 0.0, crosstalk, (0.0, 0.0), read),
@@ -129,7 +133,9 @@ def conventional(asked: Asked) -> Exported:
         )
     k, offset = sensor.wave_number, math.remainder(sensor.known_phase_rad, 2 * math.pi)
     return Exported(
-        constants | {"OFFSET": offset, "WAVE_NUMBER": k, "TURN": 2 * math.pi},
+        constants
+        | {"OFFSET": offset, "WAVE_NUMBER": k, "TURN": 2 * math.pi, "BAND": END_BAND}
+        | {"COSINE": math.cos(offset + k * low), "SINE": math.sin(offset + k * low)},
         {},
         _WAVE.replace("@NOISE", noise),
         # arctangent 4 pi, offset and its difference 4 pi, turn and its sum 4 pi, readings 1

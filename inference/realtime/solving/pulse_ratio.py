@@ -16,7 +16,6 @@ from simulator.readings import noise_parts
 
 __all__ = [
     "CONTRADICTED",
-    "TOGETHER",
     "Codes",
     "Columns",
     "Pulse",
@@ -50,6 +49,8 @@ class Pulse(NamedTuple):
         Full scale, inf where there is none.
     error : float
         Standard deviation of the error of the effective distance, the model's part [m].
+    band : float
+        Standard deviations by which noise parts windows that hold the same.
     """
 
     r0: float
@@ -62,6 +63,7 @@ class Pulse(NamedTuple):
     full_late: float
     full_whole: float
     error: float
+    band: float
 
 
 class Columns(NamedTuple):
@@ -80,8 +82,6 @@ class Columns(NamedTuple):
 
 CONTRADICTED = 5.0
 """Standard deviations by which noise moves no reading to the wrong side of a limit."""
-TOGETHER = 4.0
-"""Standard deviations by which noise parts windows that hold the same: once in 30,000 frames."""
 
 
 class Codes(NamedTuple):
@@ -179,7 +179,7 @@ def pulsed_ranges(flat: Array, pulse: Pulse, columns: Columns) -> tuple[int, int
         sds[i] = (whole_sd if sd < whole_sd < math.inf else sd) if good else math.nan
         reason[i] = 0 if good else 1
         # of an object there or farther the windows differ by noise alone
-        together = whole - late < TOGETHER * math.sqrt(own1 + own2)
+        together = whole - late < pulse.band * math.sqrt(own1 + own2)
         near[i] = 1 if good & beyond & together else 0
         bad += 0 if good else 1
         faint += 1 if good & (FEW * (own2 + shared) > whole * whole) else 0

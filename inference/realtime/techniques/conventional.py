@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from inference.estimates import SdParts, Status, TechniqueResult
 from inference.realtime.assemble import (
     DROWNED,
+    END_BAND,
     NEGATIVE,
-    NOISE_BAND,
     OUTSIDE,
     Candidates,
     Outcome,
@@ -17,7 +17,13 @@ from inference.realtime.assemble import (
     reasons_of,
 )
 from inference.realtime.model_error import model_error_of
-from inference.realtime.net import ABSENT, SATURATED, UNREPRESENTABLE, known_net_readings
+from inference.realtime.net import (
+    ABSENT,
+    SATURATED,
+    UNREPRESENTABLE,
+    Net,
+    known_net_readings,
+)
 from inference.realtime.phase_reach import phase_reach
 from inference.realtime.solving.pulse_ratio import (
     Codes,
@@ -110,6 +116,16 @@ def _phase(x: Array, y: Array, offset: float) -> Array:
     return phase
 
 
+def _beside_zero(net: Net, phase: float) -> NDArray[np.bool_]:
+    """Tell whether noise may have brought a signal across a phase, which lies about its own."""
+    cosine, sine = np.float64(math.cos(phase)), np.float64(math.sin(phase))
+    along = cosine * net.first + sine * net.second
+    across = cosine * net.second - sine * net.first
+    return np.asarray(
+        (along > 0) & (np.abs(across) < END_BAND * np.sqrt(net.variance(-sine, cosine)))
+    )
+
+
 def _same(value: float, n: int) -> Array:
     """Return a column of one number, which takes no memory; as np.broadcast_to, in a tenth."""
     column: Array = np.ndarray((n, 1), np.float64, np.array([value]), strides=(0, 0))
@@ -137,6 +153,7 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
         full_late=full_late,
         full_whole=full_whole,
         error=model_error_of(task).range_m,
+        band=END_BAND,
     )
     # one block for all columns: freshly mapped pages would cost more than the arithmetic
     block = np.empty(35 * n, dtype=np.uint8)
@@ -187,10 +204,10 @@ def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
         safe = np.where(modulus > 0, modulus, 1.0)
         # gradient of the phase: (-q, i) / modulus^2
         sd = np.sqrt(net.variance(-net.second / safe / safe, net.first / safe / safe))
-        band = np.minimum(NOISE_BAND * sd, 0.5 * np.pi)
         turned = phase_reach(phase, sd, net, safe, 2 * np.pi)
         # a range that the scene allows lies within the noise of zero, or this is the far end
-        contact = (phase > 2 * np.pi - band + k * support[0]) | (phase == 0.0)
+        beside = _beside_zero(net, sensor.known_phase_rad + k * support[0])
+        contact = ((phase > np.pi) & beside) | (phase == 0.0)
         usable = (modulus > 0) & np.isfinite(modulus)
         if task.physical:
             usable &= ~contact
@@ -206,7 +223,8 @@ def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
             noise=np.broadcast_to((turned / k)[:, None], roots.shape),
             model=np.broadcast_to(error, roots.shape) if error > 0 else None,
             near=np.zeros(roots.shape, dtype=np.bool_),
-            near_frame=np.zeros(len(task.frames), dtype=np.bool_),
+            # from the far end, if the scene reaches there, noise leads past it to the near one
+            near_frame=(phase < np.pi) & beside & (k * support[1] >= 2 * np.pi * (1 - _SLACK)),
         )
         far = (phase > np.pi) & (phase <= k * support[1])
     wrapped = np.where(far, _EITHER, _WRAPPED)

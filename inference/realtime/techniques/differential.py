@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from inference.estimates import Status, TechniqueResult
 from inference.realtime.assemble import (
+    END_BAND,
     NOISE_BAND,
     Candidates,
     Outcome,
@@ -115,8 +116,9 @@ def target_of(task: Task, rate: Net) -> Targets:
         phase = np.arctan2(turned * y, turned * x)
         size = np.ldexp(length, exponent)
         sd = np.sqrt(rate.variance(-d2 / length / size, d1 / length / size))
-        band = np.minimum(NOISE_BAND * sd, 0.25 * np.pi)
-        contact = (phase > np.pi - band) | (phase == 0)
+        across = END_BAND * np.sqrt(rate.variance(np.float64(-sine), np.float64(cosine)))
+        contact = (phase > 0.75 * np.pi) & (np.abs(np.ldexp(y, exponent)) < across)
+        contact |= phase == 0
         turned = phase_reach(phase, sd, rate, size, np.pi)
         return Targets(np.where(usable, phase, np.nan), np.ones_like(phase), turned, contact, still)
 
