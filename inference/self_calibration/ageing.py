@@ -26,6 +26,7 @@ from simulator.scene import Scene
 
 __all__ = [
     "EMPTY_ENOUGH",
+    "awake",
     "changed",
     "further",
     "in_force",
@@ -192,9 +193,28 @@ def renewed(
     return state, None
 
 
-def in_force(plan: Plan, state: CalibrationState, drift: Drift) -> CalibrationState:
-    """Put a law in force, as wide as it has to be now."""
-    drift, scene = widened(plan, drift, last_time(state))
+def awake(plan: Plan, state: CalibrationState, now_s: float) -> CalibrationState:
+    """Widen the scene in force before a frame for which it is too old, as after a sleep.
+
+    Parameters
+    ----------
+    plan, state : Plan, CalibrationState
+        The stream.
+    now_s : float
+        Time of the frame [s].
+    """
+    if state.drift is None or not state.calibrated or plan.settings.observables == "derivatives":
+        return state
+    if not now_s > state.drift.until_s:
+        return state
+    return in_force(plan, state, state.drift, now_s)
+
+
+def in_force(
+    plan: Plan, state: CalibrationState, drift: Drift, now_s: float | None = None
+) -> CalibrationState:
+    """Put a law in force, as wide as it has to be at a time, left out that of the last frame."""
+    drift, scene = widened(plan, drift, last_time(state) if now_s is None else now_s)
     state = dataclasses.replace(state, drift=drift)
     if scene == state.scene:
         return state

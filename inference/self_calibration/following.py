@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from inference.self_calibration.ageing import awake
 from inference.self_calibration.calibration import Asked, Outcome
 from inference.self_calibration.gathering import Kept, in_order, kinds_of, surprising
 from inference.self_calibration.handing_over import hand_over
@@ -87,7 +88,9 @@ def follow(
         if state.switch is not None and numbers[start] >= state.switch.applies_at:
             one = frames.select(slice(start, start + 1))
             state, event = hand_over(plan, state, one, int(numbers[start]))
+        state = awake(plan, state, _time_of(frames, start))
         end = min(len(frames), start + EVERY - state.count % EVERY)
+        end = min(end, _outlived(state, frames, start))
         if state.switch is not None:
             end = min(end, int(np.searchsorted(numbers, state.switch.applies_at)))
         part = frames.select(slice(start, end))
@@ -100,6 +103,18 @@ def follow(
                 state = concluding(state)
         start = end
     return state, pieces
+
+
+def _time_of(frames: Frames, index: int) -> float:
+    return 0.0 if frames.time_s is None else float(frames.time_s[index])
+
+
+def _outlived(state: CalibrationState, frames: Frames, start: int) -> int:
+    """Return the first frame behind the next one for which the scene in force is too old."""
+    if frames.time_s is None or state.drift is None or not state.calibrated:
+        return len(frames)
+    late = np.searchsorted(frames.time_s[start + 1 :], state.drift.until_s, side="right")
+    return start + 1 + int(late)
 
 
 def _tracked(
