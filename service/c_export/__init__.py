@@ -211,9 +211,9 @@ def _comment(exported: Exported, technique: str, sensor: Sensor, scene: Scene, n
         f"Distance from the exact range r of the same readings, sd its standard deviation by "
         f"noise, at most: {'; '.join(errors)}.",
         f"How that is known: {exported.proof}.",
-        "The standard deviation is first-order, of noise and of errors of the model: it is too "
-        "small where a reading is light whose noise is more than some hundredths of it. "
-        "What a scene knows only by a prior is not part of it.",
+        "The standard deviation is of noise, followed along the curve to three of its own, and of "
+        "errors of the model; -1 where such noise may leave no light, so that an object at any "
+        "farther range reads alike. What a scene knows only by a prior is not part of it.",
         json.dumps(system).replace("*/", "* /"),
     ]
     filled = "\n\n".join(textwrap.fill(text, 96, break_on_hyphens=False) for text in paragraphs)

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from inference.realtime.from_curve import curve_parameters
 from inference.realtime.registry import TECHNIQUES
@@ -17,32 +18,12 @@ from simulator.sensor import PulsedSensor
 
 __all__ = ["background_cancelling", "from_late_light", "from_light"]
 
-# what is common to all: what the light is at a range, and how far errors move the range
-_LIGHT = """
-static int found(real range, real light, real variance, real whole, @_answer *out)
-{
-    const real q = range * (range + C1) + C0;
-    const real bare = STRENGTH / (range * @POWER * q);
-    const real slope = bare * (NEARNESS + (1 - range * NEARNESS)
-                               * (@P + range * (2 * range + C1) / q) / range);
-    const real late = @LATE;
-    const real shadow = @HIDDEN;
-    (void)whole;
-    out->range_m = range;
-    out->sd_m = SQRT(variance + light * light * (RELATIVE * RELATIVE + FLUX * FLUX)
-                     + late * late + shadow * shadow) / slope;
-    return @_UNIQUE;
-}
-"""
+# where the light is as much as this, between the ends
 _BRACKET = """
-static int solved(real light, real variance, real whole, @_answer *out)
+static real range_of(real light)
 {
     real low = LOW, high = HIGH;
     int turns;
-    if (!(light > 0)
-        || !(light * (low * low) * (low * (low + C1) + C0) <= STRENGTH)
-        || !(light * (high * high) * (high * (high + C1) + C0) >= STRENGTH))
-        return @_NONE;
     for (turns = 0; turns < 200; turns++) {
         const real middle = low + (high - low) / 2;
         if (!(middle > low && middle < high))
@@ -52,16 +33,20 @@ static int solved(real light, real variance, real whole, @_answer *out)
         else
             high = middle;
     }
-    return found(low, light, variance, whole, out);
+    return low;
+}
+
+static int between(real light)
+{
+    const real low = LOW, high = HIGH;
+    return light > 0 && light * (low * low) * (low * (low + C1) + C0) <= STRENGTH
+        && light * (high * high) * (high * (high + C1) + C0) >= STRENGTH;
 }
 """
 _TABLE = """
-static int solved(real light, real variance, real whole, @_answer *out)
+static real range_of(real light)
 {
     int low = 0, high = NODES - 1;
-    real range;
-    if (!(light > 0) || !(light <= readings[low]) || !(light >= readings[high]))
-        return @_NONE;
     while (high - low > 1) {
         const int middle = (low + high) / 2;
         if (light <= readings[middle])
@@ -69,9 +54,45 @@ static int solved(real light, real variance, real whole, @_answer *out)
         else
             high = middle;
     }
-    range = ranges[low] + (light - readings[low])
-            * ((ranges[high] - ranges[low]) / (readings[high] - readings[low]));
-    return found(range, light, variance, whole, out);
+    return ranges[low] + (light - readings[low])
+           * ((ranges[high] - ranges[low]) / (readings[high] - readings[low]));
+}
+
+static int between(real light)
+{
+    return light > 0 && light <= readings[0] && light >= readings[NODES - 1];
+}
+"""
+# what is common to all: how far noise moves a range, along the curve where it is bent, and how far
+# errors of the model do
+_LIGHT = """
+static int solved(real light, real variance, real whole, @_answer *out)
+{
+    if (!between(light))
+        return @_NONE;
+    const real range = range_of(light);
+    const real q = range * (range + C1) + C0;
+    const real bare = STRENGTH / (range * @POWER * q);
+    const real slope = bare * (NEARNESS + (1 - range * NEARNESS)
+                               * (@P + range * (2 * range + C1) / q) / range);
+    const real late = @LATE;
+    const real shadow = @HIDDEN;
+    const real noise = SQRT(variance + light * light * RELATIVE * RELATIVE);
+    const real model = SQRT(light * light * FLUX * FLUX + late * late + shadow * shadow) / slope;
+    real sd = noise / slope;
+    (void)whole;
+    out->range_m = range;
+    out->sd_m = -1;
+    if (sd > range / 200) { /* noise leads it away from its tangent */
+        const real more = light + 3 * noise, less = light - 3 * noise;
+        const real near = between(more) ? range_of(more) : LOW;
+        const real far = between(less) ? range_of(less) : HIGH;
+        if (GOES_ON > 0 && !between(less))
+            return @_UNIQUE; /* at any farther range */
+        sd = LARGER(sd, LARGER(far - range, range - near) / 3);
+    }
+    out->sd_m = SQRT(sd * sd + model * model);
+    return @_UNIQUE;
 }
 """
 _HEAD = """
@@ -127,7 +148,15 @@ def _crosstalk(asked: Asked) -> tuple[float, float]:
     return asked.known.crosstalk
 
 
-def _limits(asked: Asked, kind: int) -> tuple[float, float]:
+class _Limits(NamedTuple):
+    """Between which ranges is looked, and whether an object may be farther."""
+
+    low: float
+    high: float
+    goes_on: bool
+
+
+def _limits(asked: Asked, kind: int) -> _Limits:
     """Return between which ranges is looked; refuse a curve that turns, whatever its ranges."""
     prior = range_prior(asked.sensor, asked.scene)
     technique = TECHNIQUES[asked.technique]
@@ -142,13 +171,13 @@ def _limits(asked: Asked, kind: int) -> tuple[float, float]:
         )
     if not 0 < low < high < math.inf:
         raise RefusedError("state a range_m with two ends: a table or a bracket needs both")
-    return low, high
+    return _Limits(low, high, reach > high)
 
 
-def _exported(asked: Asked, form: _Form, limits: tuple[float, float], bracket: bool) -> Exported:
+def _exported(asked: Asked, form: _Form, limits: _Limits, bracket: bool) -> Exported:
     curve, read = form.curve, asked.sensor.noise.read
     crosstalk = _crosstalk(asked)
-    low, high = limits
+    low, high = limits.low, limits.high
     constants = {
         "CROSSTALK1": crosstalk[0],
         "CROSSTALK2": crosstalk[1],
@@ -164,6 +193,7 @@ def _exported(asked: Asked, form: _Form, limits: tuple[float, float], bracket: b
         "C0": curve.c0,
         "C1": curve.c1,
         "NEARNESS": curve.nearness,
+        "GOES_ON": float(limits.goes_on),
         **form.constants,
     }
     slope = curve.least_slope(low, high)
@@ -199,7 +229,7 @@ def _exported(asked: Asked, form: _Form, limits: tuple[float, float], bracket: b
         assert isinstance(asked.sensor, PulsedSensor)  # noqa: S101  # what has late light
         constants["R0"] = asked.sensor.r0
     bound = Bound(method, relative, 0.0, form.crosstalk, form.readings, read)
-    return Exported(constants, tables, light + body + head, bound, proof, limits)
+    return Exported(constants, tables, body + light + head, bound, proof, (low, high))
 
 
 def from_light(asked: Asked) -> Exported:
@@ -247,5 +277,4 @@ def background_cancelling(asked: Asked) -> Exported:
         "(whole - bare) * SHADOW * (SHADOW0 / (range * (range + SHADOW1) + SHADOW0))",
         {"SHADOW": asked.error.shadow, "SHADOW0": c0, "SHADOW1": c1},
     )
-    low, high = _limits(asked, cancelling_ratio.KIND)
-    return _exported(asked, form, (low, high), bracket=False)
+    return _exported(asked, form, _limits(asked, cancelling_ratio.KIND), bracket=False)
