@@ -68,10 +68,12 @@ class Net(NamedTuple):
     relative: float
     state: NDArray[np.uint8]
 
-    def variance(self, g1: Array, g2: Array) -> Array:
+    def variance(self, g1: Array | float, g2: Array | float) -> Array:
         """Return the variance of g1 first + g2 second from noise that is not relative."""
         # in this order nothing overflows that does not have to
-        return g1 * (g1 * self.var1) + g2 * (g2 * self.var2) + 2.0 * g1 * (g2 * self.cov)
+        return np.asarray(
+            g1 * (g1 * self.var1) + g2 * (g2 * self.var2) + 2.0 * g1 * (g2 * self.cov)
+        )
 
     def covariance(self, a: Form, b: Form) -> Array:
         """Return the covariance of two linear forms, from noise that is not relative."""

@@ -134,7 +134,7 @@ def _modes(problem: FitProblem, answers: Sequence[Answer]) -> tuple[_Modes, Arra
     chi_square = np.empty(0)
     for answer in answers:
         erring, factor = answer.erring, answer.covariance_factor
-        u, deviance, reach = frame_reaches(problem if erring is None else erring.clean, answer.x)
+        u, deviance, reach = frame_reaches(problem if erring is None else erring.bare, answer.x)
         if erring is not None and erring.clean.known is not None:
             u = np.column_stack([erring.with_known(column) for column in u.T])
             reach[(erring.clean.known.rates > 0).any(axis=1)] = 0.0  # more than readings tell it
@@ -214,7 +214,7 @@ def beside(one: Erring, excess: float) -> Beside:
 
     A frame that is all but in the dark there may be bright at the best values, and sure of itself.
     """
-    modes, _, reaches = frame_reaches(one.clean, one.x)
+    modes, _, reaches = frame_reaches(one.bare, one.x)
     away = np.abs(modes - one.positions[:, None])
     nearest = np.where(np.isfinite(away), away, np.inf).argmin(axis=1)
     noise = np.take_along_axis(reaches, nearest[:, None], axis=1)[:, 0]

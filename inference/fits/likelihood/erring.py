@@ -24,8 +24,10 @@ from inference.fits.likelihood.erring_climb import (
 )
 from inference.fits.likelihood.erring_point import (
     Point,
+    brighter_by,
     left_of_frames,
     linearised,
+    own_change,
     point_at,
     slopes_of_priors,
     whitened_of,
@@ -67,6 +69,9 @@ class Erring(Maximum):
         Of readings, errors and what is known beside them.
     clean : FitProblem
         With readings less what the errors do to them.
+    bare : FitProblem
+        With readings less, besides, what is left of errors and each frame's own, at its likeliest:
+        of these each frame by itself has the range that it has at the maximum.
     facts : Information
         What those readings and the priors tell, the errors known.
     whole : Information
@@ -76,6 +81,7 @@ class Erring(Maximum):
     a: Array
     chi_square: float
     clean: FitProblem
+    bare: FitProblem
     facts: Information
     whole: Information
 
@@ -95,7 +101,9 @@ class Erring(Maximum):
             frames leave them.
         """
         problem = self.clean
-        residual, jacobian, along, errors, _ = linearised(problem, self.x, u)
+        residual, jacobian, along, errors, _ = linearised(problem, self.x, u, self.a)
+        change = own_change(problem, u, residual, errors)
+        along = along * brighter_by(problem, u, self.a, change)[:, None]
         told = told_at(problem.known, u, self.a)
         own = _errors_known(problem, jacobian, along, told)
         of_x, of_errors = self.whole.factors
@@ -123,7 +131,7 @@ class Erring(Maximum):
         told = told_at(problem.known, u, self.a)
         if told is None:
             return np.zeros(u.size)
-        residual, jacobian, along, errors, _ = linearised(problem, self.x, u)
+        residual, jacobian, along, errors, _ = linearised(problem, self.x, u, self.a)
         of_x, of_errors = self.whole.factors
         free = jacobian @ of_x + errors @ of_errors
         parts = [residual[:, :, None], along[:, :, None], free]
@@ -139,7 +147,7 @@ class Erring(Maximum):
             told = told_at(problem.known, u, self.a)
             if told is None:
                 break
-            residual, _, along, _, _ = linearised(problem, self.x, u)
+            residual, _, along, _, _ = linearised(problem, self.x, u, self.a)
             move = np.where(np.isfinite(along), along, 0.0)
             size = np.square(move).sum(axis=1) + np.square(told.along).sum(axis=1)
             pull = np.einsum("ni,ni->n", move, residual)
@@ -268,9 +276,16 @@ def _errors_known(
     return eliminated(problem.names, jacobian, along, errors, told)
 
 
+def _less(problem: FitProblem, change: Array) -> FitProblem:
+    """Return the problem with readings less a change, shape (n, 2, 1)."""
+    frames = problem.frames.copy()
+    frames[:, :2] -= change[:, :, 0]
+    return dataclasses.replace(problem, frames=frames)
+
+
 def end_of(problem: FitProblem, at: Point, remaining: float) -> Erring:
     """Return what is told at the end of a climb; `remaining` is what a step would still gain."""
-    _, jacobian, along, errors, whitener = linearised(problem, at.x, at.u)
+    _, jacobian, along, errors, whitener = linearised(problem, at.x, at.u, at.a)
     slopes = slopes_of_priors(problem, at.x)
     facts = _with_priors(_errors_known(problem, jacobian, along, at.told), slopes)
     seen = eliminated(problem.names, at.jacobian, at.along, at.errors, at.told)
@@ -280,8 +295,11 @@ def end_of(problem: FitProblem, at: Point, remaining: float) -> Erring:
         chi_square += float(np.square(at.told.residual).sum())
     if problem.law:
         chi_square += float(at.z @ at.z)
-    frames = problem.frames.copy()
-    frames[:, :2] -= solved(whitener, (errors @ at.a)[:, :, None])[:, :, 0]
+    moved = (errors @ at.a)[:, :, None]
+    clean = _less(problem, solved(whitener, moved))
+    if errors.shape[2] > 0:
+        off = (at.root @ at.residual[:, :, None])[:, :, 0]
+        moved = moved + errors @ own_change(problem, at.u, off, errors)[:, :, None]
     return Erring(
         x=at.x,
         deviance=at.deviance,
@@ -289,7 +307,8 @@ def end_of(problem: FitProblem, at: Point, remaining: float) -> Erring:
         positions=at.u,
         a=at.a,
         chi_square=chi_square,
-        clean=dataclasses.replace(problem, frames=frames),
+        clean=clean,
+        bare=_less(problem, solved(whitener, moved)),
         facts=facts,
         whole=whole,
     )

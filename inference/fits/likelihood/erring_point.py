@@ -26,9 +26,11 @@ from simulator.object_arrays import quadratics
 
 __all__ = [
     "Point",
+    "brighter_by",
     "left_of_frames",
     "linearised",
     "moved_by_errors",
+    "own_change",
     "point_at",
     "slopes_of_priors",
     "standard",
@@ -159,19 +161,20 @@ def _aside(size: int) -> Array:
 
 
 def linearised(
-    problem: FitProblem, x: Array, u: Array, a: Array | None = None
+    problem: FitProblem, x: Array, u: Array, a: Array | None = None, inside: bool = False
 ) -> tuple[Array, ...]:
     """Return residuals, derivatives along unknowns, log r and errors, and from readings to noise.
 
     All but the last in units of the noise. With ``a``, of the light as it is with these errors:
     where many frames leave little of what errors do not take up, derivatives of the bare light end
-    a climb away from its top.
+    a climb away from its top. With ``inside`` a range at an end of what is possible has the slope
+    beside it, so that a step knows where it leads; else it has none.
     """
     n, (values, chain) = u.size, problem.opened(x)
     by_value, along, residual = np.empty((n, 2, SLOTS)), np.empty((n, 2)), np.empty((n, 2))
     fit = problem.kernel_fit()
     at = np.ascontiguousarray(u)
-    if a is not None:  # of a range at an end of what is possible a step has to know where it leads
+    if inside:
         low, high = problem.log_ends(x)
         at = np.clip(at, low + _INSIDE, high - _INSIDE)
     whitened_slopes(by_value, along, residual, values, _EACH, at, fit)
@@ -185,6 +188,9 @@ def linearised(
     erring = erring_flux(problem, u)
     parts = [erring.of_light(light)]
     smooth = parts[0].shape[2]
+    if a is not None and smooth > 0:  # what is brighter is late by more light
+        brighter = 1.0 + problem.error.flux * (erring.values @ a[: smooth // 2])
+        parts[0][:, :, smooth // 2 :] *= brighter[:, None, None]
     shadow = shadow_of(problem, values, u)
     if shadow is not None:
         parts.append(shadow.columns)
@@ -202,11 +208,13 @@ def linearised(
         for k, column in enumerate(columns):
             by_value[:, :, column] += noised(errs.change(bare[:, :, k]))
         slope = _slope_of_light(problem, values, light, u)
-        along = along + noised(errs.change_of_slopes(light, slope))
+        moves = along.any(axis=1, keepdims=True)  # not at an end of what is possible
+        along = along + np.where(moves, noised(errs.change_of_slopes(light, slope)), 0.0)
     if a is not None and shadow is not None:
         more, further = shadow.changes(a[smooth : smooth + parts[1].shape[2]])
         by_value += whitener @ np.nan_to_num(more)
-        along = along + (whitener @ np.nan_to_num(further)[:, :, None])[:, :, 0]
+        further = (whitener @ np.nan_to_num(further)[:, :, None])[:, :, 0]
+        along = along + np.where(along.any(axis=1, keepdims=True), further, 0.0)
     return (
         residual,
         by_value @ chain,
@@ -239,6 +247,28 @@ def _root_of_covariance(problem: FitProblem, u: Array, errors: Array) -> Array:
     # beside errors of 1e8 the noise's own 1 would be lost
     own = 1.0 + 1e-12 * np.trace(left, axis1=1, axis2=2)
     return cholesky(own[:, None, None] * np.eye(2) + left)
+
+
+def own_change(problem: FitProblem, u: Array, residual: Array, errors: Array) -> Array:
+    """Return the likeliest of what is left of errors in each frame's own residual, shape (n, k).
+
+    Of a covariance 1 + S, S = s E E^T, S takes up the share S (1 + S)^-1; in coefficients of the
+    errors E that is s E^T (1 + S)^-1 of the residual.
+    """
+    root = _root_of_covariance(problem, u, errors)
+    pull = solved(root.transpose(0, 2, 1), solved_by_root(root, residual[:, :, None]))
+    share = own_share_left(problem, u)[:, None]
+    return np.asarray(share * (errors.transpose(0, 2, 1) @ pull)[:, :, 0])
+
+
+def brighter_by(problem: FitProblem, u: Array, a: Array, own: Array) -> Array:
+    """Return by what factor each frame's own change makes the light brighter, shape (n,)."""
+    values = erring_flux(problem, u).values
+    flux, count = problem.error.flux, values.shape[1]
+    smooth = 1.0 + flux * (values @ a[:count])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = 1.0 + flux * (values * own[:, :count]).sum(axis=1) / smooth
+    return np.where(np.isfinite(factor), factor, 1.0)
 
 
 def left_of_frames(
@@ -291,7 +321,7 @@ def _shared_volume(problem: FitProblem, along: Array, errors: Array) -> float:
 
 def point_at(problem: FitProblem, x: Array, u: Array, a: Array, z: Array | None = None) -> Point:
     """Linearise in units of the noise and of what is left of errors; ``z`` is `standard` of x."""
-    residual, jacobian, along, errors, _ = linearised(problem, x, u, a)
+    residual, jacobian, along, errors, _ = linearised(problem, x, u, a, inside=True)
     root = _root_of_covariance(problem, u, errors)
     at, volume = (jacobian, along, errors), 0.0
     if errors.shape[2] > 0:  # else the root is 1

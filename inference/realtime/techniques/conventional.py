@@ -118,7 +118,7 @@ def _phase(x: Array, y: Array, offset: float) -> Array:
 
 def _beside_zero(net: Net, phase: float) -> NDArray[np.bool_]:
     """Tell whether noise may have brought a signal across a phase, which lies about its own."""
-    cosine, sine = np.float64(math.cos(phase)), np.float64(math.sin(phase))
+    cosine, sine = math.cos(phase), math.sin(phase)
     along = cosine * net.first + sine * net.second
     across = cosine * net.second - sine * net.first
     return np.asarray(

@@ -116,7 +116,7 @@ def target_of(task: Task, rate: Net) -> Targets:
         phase = np.arctan2(turned * y, turned * x)
         size = np.ldexp(length, exponent)
         sd = np.sqrt(rate.variance(-d2 / length / size, d1 / length / size))
-        across = END_BAND * np.sqrt(rate.variance(np.float64(-sine), np.float64(cosine)))
+        across = END_BAND * np.sqrt(rate.variance(-sine, cosine))
         contact = (phase > 0.75 * np.pi) & (np.abs(np.ldexp(y, exponent)) < across)
         contact |= phase == 0
         turned = phase_reach(phase, sd, rate, size, np.pi)
