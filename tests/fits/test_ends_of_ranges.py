@@ -86,7 +86,7 @@ def test_slopes_of_ranges_at_an_end_are_those_beside_it() -> None:
     assert np.exp(low) == pytest.approx(0.15, rel=1e-12)
     for end, inward in ((low, 1e-7), (high, -1e-7)):
         at, beside = (
-            linearised(problem, x, np.full(problem.present.size, u), none)[2]
+            linearised(problem, x, np.full(problem.present.size, u), none, inside=True)[2]
             for u in (end, end + inward)
         )
         assert np.abs(at).min(axis=0).max() > 0.0
