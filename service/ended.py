@@ -85,7 +85,9 @@ class Ended(Generic[J, C, T, P]):
         record = await self._ended(job_id, client)
         return await self._written(record, functools.partial(write_file, media_type))
 
-    async def scene(self, job_id: str, date: str, client: str = "") -> bytes:
+    async def scene(
+        self, job_id: str, date: str, client: str = "", other_objects: bool = False
+    ) -> bytes:
         """Return a job that has ended as a document of sensor and scene, made from its draws.
 
         Parameters
@@ -96,6 +98,8 @@ class Ended(Generic[J, C, T, P]):
             To be written into it.
         client : str
             To whom it belongs.
+        other_objects : bool
+            Whether it is to be used for other objects.
 
         Returns
         -------
@@ -104,7 +108,7 @@ class Ended(Generic[J, C, T, P]):
         """
         record = await self._ended(job_id, client)
         findings = findings_of(record.result or {}, record.seed, date)
-        return await self._written(record, functools.partial(write_scene, findings))
+        return await self._written(record, functools.partial(write_scene, findings, other_objects))
 
     async def _ended(self, job_id: str, client: str) -> JobRecord:
         """Return a job that has draws."""

@@ -2,7 +2,7 @@
 
 import dataclasses
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from simulator.priors import Prior
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor
 
-__all__ = ["calibrated_scene", "scene_of_draws"]
+__all__ = ["calibrated_scene", "refuse_known_object", "scene_of_draws"]
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,12 @@ _RIDGE = 1e-9  # of a variance: what keeps a law of two unknowns that are one a 
 
 
 def calibrated_scene(
-    sensor: Sensor, scene: Scene, frames: Frames, posterior: Posterior, date: str | None = None
+    sensor: Sensor,
+    scene: Scene,
+    frames: Frames,
+    posterior: Posterior,
+    date: str | None = None,
+    other_objects: bool = False,
 ) -> Scene:
     """Make a scene of what a posterior knows, to be used wherever a scene is.
 
@@ -45,6 +50,9 @@ def calibrated_scene(
         Its answer.
     date : str, optional
         To be written into the calibration.
+    other_objects : bool
+        Whether the frames to come are of other objects: nothing is kept of the object then, nor of
+        its shadow, and what is known of crosstalk, background and sensor stays.
 
     Returns
     -------
@@ -56,7 +64,7 @@ def calibrated_scene(
     Raises
     ------
     RefusedError
-        Where nothing was drawn.
+        Where nothing was drawn, or the object is stated in numbers and others are to come.
     """
     kept = () if posterior.selection is None else posterior.selection.decisions
     findings = {
@@ -70,11 +78,37 @@ def calibrated_scene(
     if not posterior.drawn:
         raise RefusedError("nothing was drawn: there is nothing that this posterior knows")
     stays = [decision.term for decision in kept if decision.kept]
-    return scene_of_draws(sensor, reduced(scene, stays), frames, posterior.draws, findings)
+    whole = reduced(scene, stays)
+    return scene_of_draws(sensor, whole, frames, posterior.draws, findings, other_objects)
+
+
+def refuse_known_object(names: Iterable[str]) -> None:
+    """Refuse to make a scene for other objects of one whose object is known.
+
+    Parameters
+    ----------
+    names : iterable of str
+        What is unknown of it.
+
+    Raises
+    ------
+    RefusedError
+        Where that is nothing of the object.
+    """
+    if not any(name.startswith("object.") for name in names):
+        raise RefusedError(
+            "the object is stated in numbers, which other objects do not have: state priors of "
+            "it, or leave it out, and calibrate again"
+        )
 
 
 def scene_of_draws(
-    sensor: Sensor, scene: Scene, frames: Frames, draws: Draws, findings: Mapping[str, Any]
+    sensor: Sensor,
+    scene: Scene,
+    frames: Frames,
+    draws: Draws,
+    findings: Mapping[str, Any],
+    other_objects: bool = False,
 ) -> Scene:
     """Make a scene of draws.
 
@@ -86,7 +120,16 @@ def scene_of_draws(
         Of their posterior, moved by the errors of the model.
     findings : mapping
         Members of `simulator.joint.Calibration` that are not in the draws.
+    other_objects : bool
+        As for `calibrated_scene`.
+
+    Raises
+    ------
+    RefusedError
+        As there.
     """
+    if other_objects:
+        refuse_known_object(draws.names)
     prior = scene.model_copy(update={"joint": None, "calibration": None})
     parameters = parameters_of(sensor, prior)
     kept = [j for j, name in enumerate(parameters.names) if not name.startswith("range_m.")]
@@ -105,12 +148,15 @@ def scene_of_draws(
     if names:
         z = _coordinates(parameters, natural)[:, kept]
         modes = _modes(z, draws.mode.reshape(-1))
-        joint = {"unknowns": names, "modes": modes}
-        document["joint"] = joint
-        law = Joint.model_validate(joint)
-        priors = [priors_of(sensor, prior)[name] for name in names]
-        calibration["unknowns"] = list(_learnt(names, priors, natural[:, kept]))
-        calibration["distance"] = _distance(law, z)
+        law = Joint.model_validate({"unknowns": names, "modes": modes})
+        stay = [j for j, name in enumerate(names) if not (other_objects and _of_object(name))]
+        if stay:
+            told = [names[j] for j in stay]
+            document["joint"] = {"unknowns": told, "modes": [_marginal(m, stay) for m in modes]}
+            priors = [priors_of(sensor, prior)[name] for name in told]
+            of_draws = natural[:, [kept[j] for j in stay]]
+            calibration["unknowns"] = list(_learnt(told, priors, of_draws))
+            calibration["distance"] = _distance(Joint.model_validate(document["joint"]), z[:, stay])
         heaviest = max(law.modes, key=lambda mode: mode.weight)
         centre = np.zeros((1, len(parameters)))
         centre[0, kept] = heaviest.mean
@@ -126,6 +172,20 @@ def scene_of_draws(
                     document["discrepancy"]["shadow"] = error.shadow
     document["calibration"] = calibration
     return parse_scene(document)
+
+
+def _of_object(name: str) -> bool:
+    """Tell whether an unknown is of the object that was there: the shadow is its own, too."""
+    return name.startswith(("object.", "background.shadow."))
+
+
+def _marginal(mode: Mapping[str, Any], stay: Sequence[int]) -> dict[str, Any]:
+    """Return the law of some unknowns of a normal one."""
+    return {
+        "weight": mode["weight"],
+        "mean": [mode["mean"][j] for j in stay],
+        "covariance": [[mode["covariance"][i][j] for j in stay] for i in stay],
+    }
 
 
 def _digest(frames: Frames) -> str:

@@ -223,7 +223,7 @@ def _times(frames: Frames, last: float) -> Array:
     check_increasing(times)
     if not np.isnan(last) and not times[0] > last:
         raise InvalidInputError.at(
-            "/frames/time_s", f"entry 0 is not later than the last frame, {last:.9g} s"
+            "/frames/time_s", f"entry 0 is not later than the last frame, {last:.15g} s"
         )
     return times
 

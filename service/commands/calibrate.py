@@ -38,18 +38,31 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
     parser.add_argument(
         "--output", type=Path, required=True, help="write the calibrated scene file here (.json)"
     )
+    parser.add_argument(
+        "--other-objects",
+        action="store_true",
+        help="for other objects to come: keep nothing of this one, nor of its shadow",
+    )
 
 
 def _run(args: argparse.Namespace) -> int:
+    from inference.posterior.calibrated import refuse_known_object
     from service.commands.files import check_folder
     from service.commands.frames import checked_whole
     from service.whole_files import write_whole
+    from simulator.parameters import parameters_of
 
     check_folder("--output", args.output)
+    system = checked_whole(args)
+    if args.other_objects:  # before minutes of sampling
+        refuse_known_object(parameters_of(system[0], system[1]).names)
     settings = settings_of(args)
     date = datetime.now(UTC).isoformat(timespec="seconds")
     record, document = posterior_of(
-        args, checked_whole(args), settings, lambda jobs, done: jobs.ended.scene(done.id, date)
+        args,
+        system,
+        settings,
+        lambda jobs, done: jobs.ended.scene(done.id, date, other_objects=args.other_objects),
     )
     if document is not None:
         write_whole(args.output, document + b"\n", private=False)
@@ -64,7 +77,7 @@ def _learnt(document: bytes) -> list[str]:
     """Return the verdict, and for every unknown what was stated of it and what is known now."""
     calibration = json.loads(document)["scene"]["calibration"]
     lines = []
-    for now in calibration["unknowns"]:
+    for now in calibration.get("unknowns", ()):
         prior = now.get("prior") or "default"
         stated = {} if isinstance(prior, str) else dict(prior)
         name = stated.pop("prior", "default")

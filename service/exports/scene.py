@@ -33,13 +33,17 @@ def findings_of(result: Mapping[str, Any], seed: int, date: str) -> dict[str, An
     }
 
 
-def write_scene(findings: Mapping[str, Any], job: Job, _: str, draws: Draws) -> bytes:
+def write_scene(
+    findings: Mapping[str, Any], other_objects: bool, job: Job, _: str, draws: Draws
+) -> bytes:
     """Write the calibrated scene of draws.
 
     Parameters
     ----------
     findings : mapping
         Of `findings_of`.
+    other_objects : bool
+        Whether it is for other objects, as for `scene_of_draws`.
     job : Job
         With the terms that were kept.
     _ : str
@@ -50,7 +54,7 @@ def write_scene(findings: Mapping[str, Any], job: Job, _: str, draws: Draws) -> 
     bytes
         JSON of an object with the members sensor and scene.
     """
-    scene = scene_of_draws(job.sensor, job.scene, job.frames, draws, findings)
+    scene = scene_of_draws(job.sensor, job.scene, job.frames, draws, findings, other_objects)
     document = {
         "sensor": job.sensor.model_dump(mode="json", exclude_none=True),
         "scene": scene.model_dump(mode="json", exclude_none=True),

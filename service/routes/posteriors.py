@@ -152,12 +152,16 @@ async def draws(request: Request, job_id: str) -> Response:
 @router.get(
     "/{job_id}/scene",
     response_model=None,
-    responses={200: {"model": SystemDescription}, **problem_responses(404, 409, 410, 503)},
+    responses={200: {"model": SystemDescription}, **problem_responses(404, 409, 410, 422, 503)},
 )
-async def scene(request: Request, job_id: str) -> Response:
-    """Return sensor and scene as a finished posterior knows them, for whatever takes a scene."""
+async def scene(request: Request, job_id: str, other_objects: bool = False) -> Response:
+    """Return sensor and scene as a finished posterior knows them, for whatever takes a scene.
+
+    With `other_objects` nothing is kept of the object that was there, nor of its shadow.
+    """
     date = datetime.now(UTC).isoformat(timespec="seconds")
-    making = shared_of(request).jobs.ended.scene(job_id, date, client_of(request))
+    ended = shared_of(request).jobs.ended
+    making = ended.scene(job_id, date, client_of(request), other_objects)
     return Response(await while_wanted(request, making), media_type="application/json")
 
 

@@ -210,7 +210,7 @@ class _Batch:
             alone = one_frame(self._model, frame, shape.columns)
         time_s = float(frame["time_s"])
         if time_s <= self._time:
-            message = f"{time_s:.9g} s is not later than the last frame, {self._time:.9g} s"
+            message = f"{time_s:.15g} s is not later than the last frame, {self._time:.15g} s"
             if self._time - time_s > _SET_BACK_S:
                 message += "; where a clock was set back, or that frame's was wrong: a new stream"
             raise InvalidInputError.at("/time_s", message)

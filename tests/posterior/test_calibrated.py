@@ -4,10 +4,15 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from inference.posterior.calibrated import scene_of_draws
+from simulator.errors import RefusedError
+from simulator.frames import Frames
 from simulator.parameters import parameters_of
+from simulator.scene import parse_scene
+from simulator.sensor import parse_sensor
 from tests.service import drawn
 
 FINDINGS = {"converged": True, "misfit": False, "seed": 3, "date": None}
@@ -59,3 +64,53 @@ def test_draws_at_the_end_of_a_support_are_a_law() -> None:
     z = np.column_stack([np.full(500, 40.0), np.zeros(500)])
     law = of_coordinates(z, np.zeros(500, dtype=np.intp))
     assert np.isfinite(law["modes"][0]["covariance"]).all()
+
+
+SENSOR = parse_sensor({"kind": "pulsed", "pulse_width_s": 3e-8, "noise": {"read": [1e-4, 1e-4]}})
+CROSSTALK = [{"prior": "halfnormal", "sd": 0.01}, {"prior": "halfnormal", "sd": 0.08}]
+WALL = {"strength": {"prior": "lognormal", "median": 0.01, "sigma": 1.0}, "distance_m": 3.0}
+
+
+def learnt_of(stated: dict[str, Any], other_objects: bool) -> Any:
+    """Return a scene of 2000 draws, of which all unknowns are correlated."""
+    scene = parse_scene(stated)
+    parameters, rng = parameters_of(SENSOR, scene), np.random.default_rng(4)
+    d = len(parameters.names)
+    z = 0.1 * rng.standard_normal((2000, d)) @ rng.standard_normal((d, d)) + 0.3
+    draws = dataclasses.replace(
+        drawn.draws(),
+        names=parameters.names,
+        parameters=parameters.natural(z).reshape(1, 1, len(z), d),
+        mode=np.zeros((1, 1, len(z)), dtype=np.intp),
+    )
+    frames = Frames(np.full((9, 2), 0.1), np.arange(9.0))
+    return scene_of_draws(SENSOR, scene, frames, draws, FINDINGS, other_objects)
+
+
+@pytest.mark.parametrize("stated", [{"crosstalk": CROSSTALK}, {"background": WALL}])
+def test_for_other_objects_nothing_is_kept_of_the_one_that_was_there(stated: Any) -> None:
+    """What stays has the law that it has beside all else: of a normal law rows and columns."""
+    whole, rest = (learnt_of(stated, other).model_dump()["joint"] for other in (False, True))
+    gone = [n for n in whole["unknowns"] if n.startswith(("object.", "background.shadow."))]
+    stay = [j for j, name in enumerate(whole["unknowns"]) if name not in gone]
+    assert {"object.c0", "object.c1", "object.c2"} <= set(gone)
+    assert list(rest["unknowns"]) == [whole["unknowns"][j] for j in stay]
+    (before,), (after,) = whole["modes"], rest["modes"]
+    assert np.array_equal(after["mean"], np.array(before["mean"])[stay])
+    assert np.array_equal(after["covariance"], np.array(before["covariance"])[np.ix_(stay, stay)])
+    said = learnt_of(stated, True).calibration
+    assert [row.unknown for row in said.unknowns] == list(rest["unknowns"])
+
+
+def test_an_object_that_is_stated_in_numbers_is_no_other() -> None:
+    stated = {"object": {"c0": 0.08, "c1": 0.05, "c2": 0.1}, "crosstalk": CROSSTALK}
+    assert learnt_of(stated, False).joint is not None
+    with pytest.raises(RefusedError, match="stated in numbers"):
+        learnt_of(stated, True)
+
+
+def test_where_the_object_alone_was_unknown_the_priors_are_left() -> None:
+    scene = learnt_of({}, True)
+    assert scene.joint is None
+    assert scene.calibration is not None
+    assert scene.calibration.unknowns == ()

@@ -243,6 +243,11 @@ def test_calibrate_writes_a_scene_that_every_command_takes(
     assert [path.name for path in tmp_path.glob("calibrated*")] == ["calibrated.json"]
     code, out, err = run(capsys, "identifiability", "--scene", output, "--ranges", "0.5")
     assert (code, err) == (0, "")
+    others = tmp_path / "others.json"
+    code, _, err = run(capsys, "calibrate", frames, "--scene", scene, "--output", others,
+                       "--seed", "1", "--method", "importance", "--other-objects")  # fmt: skip
+    assert code == 0, err
+    assert "joint" not in json.loads(others.read_text())["scene"]
     document["scene"]["calibration"]["converged"] = False
     output.write_text(json.dumps(document))
     code, _, err = run(capsys, "estimate", frames, "--scene", output)

@@ -63,6 +63,8 @@ async def test_over_http() -> None:
             await asyncio.sleep(0.2)
         netcdf = (await client.get(location + "/draws")).content
         calibrated = (await client.get(location + "/scene")).json()
+        others = (await client.get(location + "/scene", params={"other_objects": True})).json()
+        odd = await client.get(location + "/scene", params={"other_objects": "some"})
         asked = calibrated | {"ranges_m": [0.5, 1.0]}
         foreseen = await client.post("/v1/identifiability", json=asked)
         other = asked | {"sensor": SENSOR | {"pulse_width_s": 2e-7}}
@@ -77,6 +79,10 @@ async def test_over_http() -> None:
     law = calibrated["scene"]["calibration"]["unknowns"][0]
     assert law["mean"] == pytest.approx(drawn.mean(), rel=1e-12)
     assert calibrated["scene"]["joint"]["unknowns"] == list(body["parameters"])
+    # of a scene in which all else is known, nothing is left to other objects
+    assert "joint" not in others["scene"]
+    assert others["scene"]["crosstalk"] == [0.01, 0.02]
+    assert odd.status_code == 422
     assert foreseen.status_code == 200, foreseen.text
     bound = foreseen.json()["parameters"]["object.c0"]
     assert bound["value"] == pytest.approx(law["mean"], abs=law["sd"])
