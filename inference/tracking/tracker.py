@@ -224,7 +224,7 @@ def _check(sensor: Sensor, scene: Scene, settings: TrackingSettings) -> None:
     if drifting:
         raise RefusedError(
             f"{listed(drifting)} unknown: what that does to a range changes with the temperature, "
-            "and a tracker takes a number; calibrate, and state what has been found",
+            "and a tracker takes a number; state the median of a posterior, and calibrate with it",
             *(Problem(f"/{path.replace('.', '/')}", "must be a number here") for path in drifting),
         )
     _, wave = instrument(sensor)
