@@ -32,6 +32,7 @@ __all__ = [
     "in_force",
     "known_since",
     "last_time",
+    "old_from",
     "renewed",
     "settled",
     "wide_enough",
@@ -203,11 +204,16 @@ def awake(plan: Plan, state: CalibrationState, now_s: float) -> CalibrationState
     now_s : float
         Time of the frame [s].
     """
-    if state.drift is None or not state.calibrated or plan.settings.observables == "derivatives":
-        return state
-    if not now_s > state.drift.until_s:
+    if state.drift is None or not now_s > old_from(state):
         return state
     return in_force(plan, state, state.drift, now_s)
+
+
+def old_from(state: CalibrationState) -> float:
+    """Return the time from which on the scene in force is too old; inf where it never is."""
+    if not state.calibrated or state.drift is None:
+        return float("inf")
+    return state.drift.until_s
 
 
 def in_force(

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from inference.self_calibration.ageing import awake
+from inference.self_calibration.ageing import awake, old_from
 from inference.self_calibration.calibration import Asked, Outcome
 from inference.self_calibration.gathering import Kept, in_order, kinds_of, surprising
 from inference.self_calibration.handing_over import hand_over
@@ -111,9 +111,9 @@ def _time_of(frames: Frames, index: int) -> float:
 
 def _outlived(state: CalibrationState, frames: Frames, start: int) -> int:
     """Return the first frame behind the next one for which the scene in force is too old."""
-    if frames.time_s is None or state.drift is None or not state.calibrated:
+    if frames.time_s is None:
         return len(frames)
-    late = np.searchsorted(frames.time_s[start + 1 :], state.drift.until_s, side="right")
+    late = np.searchsorted(frames.time_s[start + 1 :], old_from(state), side="right")
     return start + 1 + int(late)
 
 
