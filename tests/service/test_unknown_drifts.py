@@ -33,7 +33,7 @@ GAIN = "/sensor/temperature/gain_drift_per_k"
 @pytest.mark.parametrize(
     ("ask", "pointer", "remedy"),
     [
-        (lambda: tracker(SENSOR, SCENE, SETTINGS), GAIN, "calibrate, and state"),
+        (lambda: tracker(SENSOR, SCENE, SETTINGS), GAIN, "state the median of a posterior"),
         (lambda: plan_of(SENSOR, OPEN, SETTINGS, 1), GAIN, "calibrate from recorded frames"),
         (lambda: export_c("conventional", SENSOR, SCENE), GAIN.rpartition("/")[0], "turn the"),
     ],
