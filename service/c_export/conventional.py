@@ -32,11 +32,17 @@ static int answer(real first, real second, @_answer *out)
             const real square = 9 * (variance / whole / whole - 9 * (v1 * v2 + both * (v1 + v2)));
             real high = END, low = 0;
             if (square > 0) {
-                const real root = SQRT(square);
-                if (left > 0 && middle + root < END * left)
-                    high = (middle + root) / left;
-                if (rest > 0)
-                    low = rest / (middle + root);
+                const real root = SQRT(square), total = middle < 0 ? middle - root : middle + root;
+                const real one = rest / total, none = middle < 0 ? END : R(-1.0);
+                const real other = left > 0 || left < 0 ? total / left : none;
+                const real less = one < other ? one : other, more = one < other ? other : one;
+                if (left > 0) {
+                    high = more < END ? more : END;
+                    low = less > 0 ? less : 0;
+                } else if (share <= less) { /* all but what lies between them */
+                    high = more > END && less < END ? less : END;
+                } else
+                    low = less < 0 && more > 0 ? more : 0;
             }
             high = high - share > share - low ? high - share : share - low;
             if (R0 * high / 3 > noise)
@@ -91,7 +97,6 @@ static int answer(real first, real second, @_answer *out)
     sd = sd / WAVE_NUMBER;
     if (sd < EPSILON * range)
         sd = EPSILON * range;
-    out->near_fold = phase < TURN / 2 && beside && HIGH * WAVE_NUMBER >= TURN * (1 - 8 * EPSILON);
     out->range_m = range;
     out->sd_m = SQRT(sd * sd + MODEL * MODEL);
     return @_UNIQUE;

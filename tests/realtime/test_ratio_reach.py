@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import binom, norm
@@ -22,6 +22,9 @@ FRAMES = 40_000
 UNIT = st.floats(1e-9, 1.0)
 
 
+# between two ratios that are not explained, and where three deviations are all of the whole window
+@example(0.125, 0.03125, 0.25, 1.0, 0.0)
+@example(0.4, 0.01, 1.0 / 2.7, 0.0, 0.0)
 @given(UNIT, st.floats(1e-3, 1.0), UNIT, st.floats(0.0, 1.0), st.floats(-12.0, 12.0))
 def test_the_reach_is_the_farther_end_of_what_three_deviations_explain(
     late: float, own1: float, own2: float, shared: float, power: float
@@ -133,10 +136,10 @@ def test_ranges_by_derivatives_that_drown_are_not_far_off(late_noise: float, tim
 
 @pytest.mark.parametrize("times", [1.5, 3.0, 10.0])
 @pytest.mark.parametrize("noise", [(0.1, 1.0), (1.0, 1.0), (1.0, 0.1)])
-def test_an_object_at_one_end_of_a_turn_does_not_pass_for_one_at_the_other(
+def test_an_object_at_contact_does_not_pass_for_one_at_the_far_end(
     noise: tuple[float, float], times: float
 ) -> None:
-    """Noise turns a phase past zero: from contact to the far end, and from there to contact.
+    """Noise turns its phase past zero, where the far end of the unambiguous range is.
 
     Within three standard deviations of the tangent an object at 8 cm was one at 81 m, 36 of its
     deviations off. Phases more than a quarter of a turn off belong to light that drowns. A false
@@ -144,16 +147,12 @@ def test_an_object_at_one_end_of_a_turn_does_not_pass_for_one_at_the_other(
     """
     document = {"kind": "sine_wave", "frequency_hz": 2e7, "noise": {"read": list(noise)}}
     sensor, rng = parse_sensor(document), np.random.default_rng(20261201)
-    turn = sensor.max_range_m
-    for r in (0.003 * turn, 0.997 * turn):
-        angle = 2 * np.pi * r / turn
-        signal = times * np.array([np.cos(angle), np.sin(angle)])
-        readings = signal + rng.normal(size=(FRAMES, 2)) * noise
-        (found,) = estimate(sensor, parse_scene({}), Frames(readings), ["conventional"]).results
-        sure = np.isfinite(found.sd_m) & ~found.near_fold
-        bright = readings[:, 0] > 0
-        passed = sure & bright & (np.abs(found.range_m - r) > 0.5 * turn)
-        assert passed.sum() <= binom.isf(1e-6 / 18, FRAMES, norm.sf(END_BAND))
-    stated = {"range_m": {"prior": "uniform", "low": 0.01, "high": 0.9 * turn}}
-    (near,) = estimate(sensor, parse_scene(stated), Frames(readings), ["conventional"]).results
-    assert not near.near_fold.any()
+    r = 0.003 * sensor.max_range_m
+    angle = 2 * np.pi * r / sensor.max_range_m
+    signal = times * np.array([np.cos(angle), np.sin(angle)])
+    readings = signal + rng.normal(size=(FRAMES, 2)) * noise
+    (found,) = estimate(sensor, parse_scene({}), Frames(readings), ["conventional"]).results
+    bright = readings[:, 0] > 0
+    passed = np.isfinite(found.sd_m) & bright & (found.range_m > 0.5 * sensor.max_range_m)
+    assert passed.sum() <= binom.isf(1e-6 / 9, FRAMES, norm.sf(END_BAND))
+    assert np.isfinite(found.range_m).sum() > FRAMES / 4

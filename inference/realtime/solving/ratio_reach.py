@@ -22,7 +22,13 @@ _BAND = 3.0  # standard deviations of noise that are followed, as `assemble.NOIS
 
 @compiled
 def _ends(
-    ratio: float, var1: float, cov: float, var2: float, determinant: float
+    ratio: float,
+    var1: float,
+    cov: float,
+    var2: float,
+    determinant: float,
+    bottom: float,
+    top: float,
 ) -> tuple[float, float]:
     """Return the ends of the ratios s that noise of three standard deviations explains.
 
@@ -35,6 +41,8 @@ def _ends(
         x / y, readings in units of the lower one, y.
     var1, cov, var2, determinant : float
         Covariance of their noise in these units, and its determinant.
+    bottom, top : float
+        Between which a ratio lies.
     """
     few = _BAND * _BAND
     left, middle = 1.0 - few * var2, ratio - few * cov
@@ -45,11 +53,14 @@ def _ends(
         return -math.inf, math.inf
     # the sum in which nothing cancels is one root, and leads to the other
     total = middle + math.copysign(math.sqrt(square), middle)
-    one = rest / total
+    one, other = rest / total, total / left if left != 0.0 else math.copysign(math.inf, -total)
+    low, high = min(one, other), max(one, other)
     if left > 0.0:
-        other = total / left
-        return min(one, other), max(one, other)
-    return (one, math.inf) if 0.0 < one <= ratio else (-math.inf, math.inf)
+        return low, high
+    # all but what lies between them
+    if ratio <= low:
+        return -math.inf, low if high > top else math.inf
+    return high if low < bottom else -math.inf, math.inf
 
 
 @compiled
@@ -76,7 +87,7 @@ def ratio_reach(
     share = late / whole
     own1, own2, shared = own1 / whole / whole, own2 / whole / whole, shared / whole / whole
     determinant = own1 * own2 + shared * (own1 + own2)
-    low, high = _ends(share, own1 + shared, shared, own2 + shared, determinant)
+    low, high = _ends(share, own1 + shared, shared, own2 + shared, determinant, 0.0, end)
     return max(min(high, end) - share, share - max(low, 0.0), 0.0) / _BAND
 
 
@@ -104,6 +115,6 @@ def ratio_reaches(x: Array, y: Array, var1: Array, cov: Array, var2: Array) -> A
         if math.isnan(a + b + c):
             reaches[i] = math.nan
             continue
-        low, high = _ends(ratio, a, b, c, max(a * c - b * b, 0.0))
+        low, high = _ends(ratio, a, b, c, max(a * c - b * b, 0.0), -math.inf, math.inf)
         reaches[i] = max(high - ratio, ratio - low) / _BAND
     return reaches

@@ -223,8 +223,7 @@ def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
             noise=np.broadcast_to((turned / k)[:, None], roots.shape),
             model=np.broadcast_to(error, roots.shape) if error > 0 else None,
             near=np.zeros(roots.shape, dtype=np.bool_),
-            # from the far end, if the scene reaches there, noise leads past it to the near one
-            near_frame=(phase < np.pi) & beside & (k * support[1] >= 2 * np.pi * (1 - _SLACK)),
+            near_frame=np.zeros(len(task.frames), dtype=np.bool_),
         )
         far = (phase > np.pi) & (phase <= k * support[1])
     wrapped = np.where(far, _EITHER, _WRAPPED)
