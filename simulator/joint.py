@@ -1,5 +1,6 @@
 """What a calibration has learnt: one law of several unknowns together, and where it comes from."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -100,6 +101,25 @@ class Joint(Validated):
         if abs(sum(mode.weight for mode in self.modes) - 1) > _SYMMETRIC:
             raise ValueError("the weights of the modes must add up to 1")
         return self
+
+    def marginal(self, names: Sequence[str]) -> "Joint":
+        """Return the law of some of the unknowns, in their order here; of a normal one a block.
+
+        Parameters
+        ----------
+        names : sequence of str
+            One at least.
+        """
+        stay = [j for j, name in enumerate(self.unknowns) if name in names]
+        modes = [
+            {
+                "weight": mode.weight,
+                "mean": [mode.mean[j] for j in stay],
+                "covariance": [[mode.covariance[i][j] for j in stay] for i in stay],
+            }
+            for mode in self.modes
+        ]
+        return Joint.model_validate({"unknowns": [self.unknowns[j] for j in stay], "modes": modes})
 
 
 class CalibrationFrames(Validated):

@@ -2,7 +2,7 @@
 
 import dataclasses
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -149,14 +149,15 @@ def scene_of_draws(
         z = _coordinates(parameters, natural)[:, kept]
         modes = _modes(z, draws.mode.reshape(-1))
         law = Joint.model_validate({"unknowns": names, "modes": modes})
-        stay = [j for j, name in enumerate(names) if not (other_objects and _of_object(name))]
-        if stay:
-            told = [names[j] for j in stay]
-            document["joint"] = {"unknowns": told, "modes": [_marginal(m, stay) for m in modes]}
+        told = [name for name in names if not (other_objects and _of_object(name))]
+        if told:
+            rest = law.marginal(told)
+            stay = [names.index(name) for name in told]
+            document["joint"] = rest.model_dump(mode="json")
             priors = [priors_of(sensor, prior)[name] for name in told]
             of_draws = natural[:, [kept[j] for j in stay]]
             calibration["unknowns"] = list(_learnt(told, priors, of_draws))
-            calibration["distance"] = _distance(Joint.model_validate(document["joint"]), z[:, stay])
+            calibration["distance"] = _distance(rest, z[:, stay])
         heaviest = max(law.modes, key=lambda mode: mode.weight)
         centre = np.zeros((1, len(parameters)))
         centre[0, kept] = heaviest.mean
@@ -177,15 +178,6 @@ def scene_of_draws(
 def _of_object(name: str) -> bool:
     """Tell whether an unknown is of the object that was there: the shadow is its own, too."""
     return name.startswith(("object.", "background.shadow."))
-
-
-def _marginal(mode: Mapping[str, Any], stay: Sequence[int]) -> dict[str, Any]:
-    """Return the law of some unknowns of a normal one."""
-    return {
-        "weight": mode["weight"],
-        "mean": [mode["mean"][j] for j in stay],
-        "covariance": [[mode["covariance"][i][j] for j in stay] for i in stay],
-    }
 
 
 def _digest(frames: Frames) -> str:

@@ -55,19 +55,11 @@ def about_object(scene: Scene, stated: Scene) -> Scene | None:
     """
     if scene.joint is None or stated.optional_terms:
         return None
-    names = scene.joint.unknowns
-    own = [j for j, name in enumerate(names) if name.startswith("object.")]
+    own = [name for name in scene.joint.unknowns if name.startswith("object.")]
     if not own:
         return None
-    modes = [
-        {
-            "weight": mode.weight,
-            "mean": [mode.mean[j] for j in own],
-            "covariance": [[mode.covariance[i][j] for j in own] for i in own],
-        }
-        for mode in scene.joint.modes
-    ]
-    return _with_law(stated, [names[j] for j in own], modes)
+    law = scene.joint.marginal(own)
+    return _with_law(stated, own, [mode.model_dump(mode="json") for mode in law.modes])
 
 
 def trackable(sensor: Sensor, scene: Scene) -> Scene:
