@@ -28,7 +28,8 @@ def main() -> None:
         "--of",
         choices=[*SETS],
         default="random",
-        help="wide: sensors and scenes of all kinds; spoiled: readings as no scene states them",
+        help="wide: sensors and scenes of all kinds; uneven: those, with readings that differ in "
+        "noise by up to 100; spoiled: readings as no scene states them",
     )
     given = parser.parse_args()
     seed = secrets.randbits(31) if given.seed is None else given.seed

@@ -12,7 +12,7 @@ from benchmarks.coverage.path_rows import posterior_of
 from benchmarks.coverage.paths import PathSet
 from benchmarks.random_sets.sets import random_set
 from benchmarks.random_sets.spoiled import spoiled_set
-from benchmarks.random_sets.wide import wide_set
+from benchmarks.random_sets.wide import uneven_set, wide_set
 from benchmarks.resumable import Row
 from inference.estimate import estimate
 from inference.estimates import TechniqueResult
@@ -180,6 +180,7 @@ WAYS: Mapping[str, Callable[[PathSet, int, float, Held], Row]] = {
 SETS: Mapping[str, Callable[[int, int], PathSet]] = {
     "random": random_set,
     "wide": wide_set,
+    "uneven": uneven_set,
     "spoiled": spoiled_set,
 }
 

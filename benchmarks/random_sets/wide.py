@@ -18,11 +18,12 @@ from simulator.sensor import parse_sensor
 from simulator.simulate import simulate
 from simulator.trajectories import SampledTrajectory
 
-__all__ = ["between", "wide_set"]
+__all__ = ["between", "uneven_set", "wide_set"]
 
 _LIGHT_SPEED = 299792458.0
 _WIDTHS_S, _FREQUENCIES_HZ = (2e-8, 3e-7), (1e6, 4e7)
 _SNR = (3.0, 1e6)  # in the stroke's middle
+_EVEN, _UNEVEN = (0.3, 3.0), (0.01, 100.0)  # read noise of the second reading over the first's
 _FRAMES = (2, 120)
 _EMPTY = (0, 0, 1, 5, 20)
 _NEAREST_M, _STROKE = (0.05, 0.8), (1.2, 10.0)
@@ -41,7 +42,24 @@ class _Part(NamedTuple):
     truth: dict[str, float]
 
 
-def wide_set(seed: int, number: int) -> PathSet:
+def uneven_set(seed: int, number: int) -> PathSet:
+    """Draw a wide set of which one reading may have a hundred times the other's noise.
+
+    A late window that is read out for longer, or another amplifier behind each window.
+
+    Parameters
+    ----------
+    seed, number : int
+        As of `wide_set`; all else of the set is as there.
+
+    Returns
+    -------
+    PathSet
+    """
+    return wide_set(seed, number, ratio=_UNEVEN)
+
+
+def wide_set(seed: int, number: int, *, ratio: tuple[float, float] = _EVEN) -> PathSet:
     """Draw a set of the object model with a smooth error as large as stands by default.
 
     Pulses of 20 to 300 ns and waves of 1 to 40 MHz; a gain of 1e-3 to 1e6; read noise that differs
@@ -56,6 +74,8 @@ def wide_set(seed: int, number: int) -> PathSet:
     ----------
     seed, number : int
         Of the study, a fresh one every time, and of the set in it.
+    ratio : tuple of float
+        Least and greatest read noise of the second reading over that of the first.
 
     Returns
     -------
@@ -90,7 +110,7 @@ def wide_set(seed: int, number: int) -> PathSet:
     error = DISCREPANCY_SD * (1.0 if thing.truth else FITTED_SHARE)
     made = {name: part.is_ for name, part in parts.items()}
     made["discrepancy"] = {"flux": error, "range_m": RANGE_ERROR_SD}
-    noise = _noise(middle, snr, rng)
+    noise = _noise(middle, snr, ratio, rng)
     step = max(float(np.sqrt(np.mean(np.diff(np.log(ranges)) ** 2))), 1e-3)
     ruled, no_object = _ruled(count, rng), list[float | None]([None] * empty)
     trajectory = SampledTrajectory(
@@ -171,9 +191,11 @@ def _background(
     return _Part(is_, told, truth)
 
 
-def _noise(middle: float, snr: float, rng: np.random.Generator) -> dict[str, Any]:
+def _noise(
+    middle: float, snr: float, ratio: tuple[float, float], rng: np.random.Generator
+) -> dict[str, Any]:
     read = middle / snr
-    law: dict[str, Any] = {"read": [read, read * between((0.3, 3.0), rng)]}
+    law: dict[str, Any] = {"read": [read, read * between(ratio, rng)]}
     if rng.random() < 0.4:
         law["shot"] = read * read / middle * between((0.1, 10.0), rng)
     if rng.random() < 0.25:

@@ -8,7 +8,7 @@ from benchmarks.random_sets.answers import COLUMNS, answer_row
 from benchmarks.random_sets.report import summary, wrong
 from benchmarks.random_sets.sets import random_set
 from benchmarks.random_sets.spoiled import SPOILED, spoiled_set
-from benchmarks.random_sets.wide import wide_set
+from benchmarks.random_sets.wide import uneven_set, wide_set
 from simulator.scene import parse_scene
 from simulator.scene_checks import check_scene
 
@@ -47,6 +47,19 @@ def test_wide_sets_are_what_they_say() -> None:
     assert len(told) > 15
     again = wide_set(SEED, 3).frames.readings
     np.testing.assert_array_equal(wide_set(SEED, 3).frames.readings, again)
+
+
+def test_uneven_sets_are_wide_ones_with_another_noise() -> None:
+    ratios = []
+    for number in range(40):
+        data, before = uneven_set(SEED, number), wide_set(SEED, number)
+        assert data.scene == before.scene
+        np.testing.assert_array_equal(data.range_m, before.range_m)
+        first, second = data.sensor.noise.read
+        assert first == before.sensor.noise.read[0]
+        ratios.append(second / first)
+    # log-uniform over four decades: none in either outer one in 40 with probability 2 (3/4)^40
+    assert min(ratios) < 0.1 < 10.0 < max(ratios)
 
 
 def test_spoiled_sets_are_random_sets_with_other_readings() -> None:
