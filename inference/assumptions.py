@@ -24,7 +24,7 @@ _TEMPERATURE = (
 )
 # unambiguous ranges that a sensor of this kind may have [m]: it ends neither where scenes begin by
 # default nor beyond a horizon
-_SHORTEST, _LONGEST = 2e-2, 1e5
+_SHORTEST, _LONGEST = 2e-2, 3e3
 _TURN = 2 * math.pi * (1 + 1e-6)  # of a whole turn that was typed with seven digits
 # temperatures at which no sensor is run [K]
 _COLDEST_K, _HOTTEST_K = 200.0, 500.0

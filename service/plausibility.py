@@ -10,12 +10,12 @@ from inference.assumptions import doubtful_unit
 from simulator.frames import Frames
 from simulator.sensor import Sensor
 
-__all__ = ["LOOKED", "doubts", "noise_doubts"]
+__all__ = ["LOOKED", "doubts", "noise_doubts", "time_doubts"]
 
 Array = NDArray[np.float64]
 
 LOOKED = 32
-"""Frames of a stream by which its noise is looked at, once."""
+"""Frames of a stream by which its noise and its times are looked at, once."""
 
 # a few numbers that were typed are round by themselves
 _FEWEST = 6
@@ -49,7 +49,7 @@ def doubts(sensor: Sensor, frames: Frames | None = None) -> list[str]:
     if frames is not None:
         found += noise_doubts(sensor, frames.readings)
         if frames.time_s is not None:
-            found += _of_times(frames.time_s)
+            found += time_doubts(frames.time_s)
     return found
 
 
@@ -96,7 +96,21 @@ def _rounding(values: Array) -> float | None:
     return None
 
 
-def _of_times(time_s: Array) -> Iterator[str]:
+def time_doubts(time_s: Array) -> Iterator[str]:
+    """Yield whether times look like milliseconds.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (n,)
+        Of some frames, in their order; of none nothing is said.
+
+    Yields
+    ------
+    str
+        A sentence for a person.
+    """
+    if not time_s.size:
+        return
     if np.abs(time_s).max() > _EPOCH_S:
         yield f"time_s holds {time_s[0]:.15g}: are these milliseconds?"
     elif time_s.size >= _FEWEST and np.array_equal(time_s, np.round(time_s)):

@@ -83,8 +83,8 @@ class Place:
         What is told of a stream that calibrates itself.
     supposed : bool
         Whether a line was told what its answer supposes.
-    early : sequence of pairs of float, or None
-        Readings of the first frames, until there are enough to look at their noise; then None.
+    early : sequence of sequences of float, or None
+        Readings and times of the first frames, until there are enough to look at; then None.
     """
 
     state: TrackState | CalibrationState

@@ -1,12 +1,12 @@
 """What answers of a stream suppose, and what looks like a mistake: each told once a stream."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from inference.assumptions import unused_temperature
-from service.plausibility import LOOKED, noise_doubts
+from service.plausibility import LOOKED, noise_doubts, time_doubts
 from simulator.frames import Frames
 from simulator.sensor import Sensor
 
@@ -22,9 +22,9 @@ class Supposing(NamedTuple):
     ----------
     supposed : bool
         Whether a temperature that nothing uses was.
-    early : sequence of pairs of float, or None
-        Readings of the first frames, until there are enough to look at their noise; then None, and
-        nothing is looked at any more.
+    early : sequence of sequences of float, or None
+        Readings and times of the first frames, until there are enough to look at their noise and
+        their steps; then None, and nothing is looked at any more.
     """
 
     supposed: bool
@@ -36,7 +36,7 @@ def told_with(
 ) -> tuple[Supposing, More]:
     """Tell what is to be told with frames: of an unused temperature the first frame that has one.
 
-    Of noise it is the last of the first `LOOKED` frames, however a stream is cut.
+    Of noise and times it is the last of the first `LOOKED` frames, however a stream is cut.
 
     Parameters
     ----------
@@ -59,9 +59,9 @@ def told_with(
         told.append(unused)
     if early is not None:
         room = LOOKED - len(early)
-        early = [*early, *frames.readings[:room].tolist()]
+        early = [*early, *_rows(frames, room)]
         if len(early) == LOOKED:
-            told += [(room - 1, doubt) for doubt in noise_doubts(sensor, np.array(early))]
+            told += [(room - 1, doubt) for doubt in _doubts(sensor, early)]
             early = None
     if not told:
         return Supposing(supposed, early), also
@@ -70,3 +70,16 @@ def told_with(
         said = more[at] or {}
         more[at] = said | {"assumptions": [*said.get("assumptions", ()), reason]}
     return Supposing(supposed, early), more
+
+
+def _rows(frames: Frames, count: int) -> Sequence[Sequence[float]]:
+    """Return the readings and, where there is one, the time of the first frames."""
+    columns = (frames.readings,) if frames.time_s is None else (frames.readings, frames.time_s)
+    rows: list[list[float]] = np.column_stack(columns)[:count].tolist()
+    return rows
+
+
+def _doubts(sensor: Sensor, early: Sequence[Sequence[float]]) -> Iterator[str]:
+    """Yield what looks like a mistake; a stream of an earlier version kept no times at first."""
+    yield from noise_doubts(sensor, np.array([row[:2] for row in early]))
+    yield from time_doubts(np.array([time for row in early for time in row[2:]]))
