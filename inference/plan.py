@@ -102,8 +102,8 @@ def _sensor_obstacle(technique: Technique, sensor: Sensor, known: Known) -> str 
     of = sensor.temperature
     if of is not None and of.delay_drift_s_per_k is not None and known.crosstalk is None:
         return (
-            "the sensor's delay follows its temperature and crosstalk does not: crosstalk has to be "
-            "a number to be taken apart here; a posterior of these frames takes a prior"
+            "the sensor's delay follows its temperature and crosstalk does not: it has to be a "
+            "number to be taken apart here; a posterior of these frames takes a prior"
         )
     if fits and isinstance(sensor, PulsedSensor) and sensor.timing_offset_s is not None:
         return "fits over many frames take no timing_offset_s; a posterior of these frames does"

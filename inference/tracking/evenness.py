@@ -7,7 +7,8 @@ counted a hundred times: the flatter branch would be sure, and wrong as often as
 
 So would an empty scene whose crosstalk is still to be learnt. Light that stays as it is may be
 crosstalk, or crosstalk and an object at rest. By the motion that is stated the latter is less
-likely with every frame, though none of them tells the two apart.
+likely with every frame, though none of them tells the two apart. `inference.tracking.resting` has
+what is answered of it.
 """
 
 import math

@@ -39,6 +39,7 @@ from inference.tracking.report import (
     UNSTEADY_MEAN,
     report,
 )
+from inference.tracking.resting import least_present
 from inference.tracking.unsteady import OUTLIERS, UNSTEADY, take_empty, take_unsteady
 from inference.tracking.weighing import Model, room_for, weigh_frame, weigh_known
 from simulator.closed import closed
@@ -119,6 +120,9 @@ def run_filter(
             numbers[RUNNING] += (1.0 - rules.memory) * (own - numbers[RUNNING])
             numbers[ROUGHNESS] += (min(own, 1.0) - numbers[ROUGHNESS]) / _LATE
         report(out, rows, i, of, rules)
+        told_empty = kinds[i] == EMPTY or kinds[i] == EMPTY_SATURATED
+        least = least_present(of, frame, model.table, told_empty, outlier)
+        out[i, PRESENT] = max(out[i, PRESENT], least)
         out[i, OUTLIER], out[i, SURPRISE] = outlier, numbers[RUNNING]
         out[i, STUCK] = stuck_for(numbers)
         if numbers.size > UNSTEADY:

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.tracking.evenness import ROUGH
-from inference.tracking.hypotheses import ANCHOR, CROSSTALK1, Hypotheses
+from inference.tracking.evenness import ROUGH, hides
+from inference.tracking.hypotheses import ANCHOR, CROSSTALK1, RESTING, Hypotheses
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
 from inference.tracking.unsteady import first_unsteady
@@ -70,10 +70,12 @@ def first_state(
     there = settings.visit_s / (settings.visit_s + settings.absence_s)
     weight[0] = 1.0 - there
     numbers = [math.nan, there, 1.0, 0.0, 0.0, ROUGH, 0.0]
-    numbers += [math.nan, math.nan, math.inf, math.inf]
+    numbers += [math.nan, math.nan, math.inf, math.inf, 0.0, 0.0, 0.0]
     if steady:
         numbers += first_unsteady(directions)
-    return TrackState(Hypotheses(x, X, weight, np.array(numbers)))
+    first = Hypotheses(x, X, weight, np.array(numbers))
+    first.numbers[RESTING] = float(crosstalk is not None and hides(first, 0))
+    return TrackState(first)
 
 
 def crosstalk_bounds(

@@ -19,8 +19,11 @@ __all__ = [
     "COUNT",
     "CROSSTALK1",
     "CROSSTALK2",
+    "LEVEL1",
+    "LEVEL2",
     "LOST",
     "PENDING",
+    "RESTING",
     "ROUGHNESS",
     "RUNNING",
     "SAME",
@@ -48,6 +51,7 @@ U, V, CROSSTALK1, CROSSTALK2, ANCHOR = range(5)
 WITHOUT_CROSSTALK = 2  # own states of a hypothesis that does not learn it
 # places in `Hypotheses.numbers`
 TIME, PENDING, RUNNING, COUNT, LOST, ROUGHNESS, SAME, _READ1, _READ2, _STEP1, _STEP2 = range(11)
+RESTING, LEVEL1, LEVEL2 = range(11, 14)
 _LEAST = -700.0  # log of a weight that underflows
 _ROOT_8 = math.sqrt(8.0)
 # probability of no change at all from which on readings that do not change say nothing: thirty
@@ -64,12 +68,13 @@ class Hypotheses(NamedTuple):
     x: Array
     X: Array  # (rows, n, n + p): roots of the covariances
     weight: Array  # (rows,): probabilities
-    # (11,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
+    # (14,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
     # the last frame [s] (nan: none yet), probability of an object of which nothing is known yet,
     # running surprise, number of hypotheses, whether an object that was there may be anywhere by
     # now, the surprise of the last frames, each cut at 1, how many frames up to the last had the
-    # readings of the one before, these readings, and the shortest step of each from one frame to
-    # the next (inf: none yet)
+    # readings of the one before, these readings, the shortest step of each from one frame to
+    # the next (inf: none yet), where crosstalk is learnt whether its light may be that of an object
+    # at rest (`inference.tracking.resting`), and what the crosstalk was before anything changed
     numbers: Array
 
 
