@@ -54,6 +54,14 @@ def loaded(code: str) -> set[str]:
     return set(done.stdout.split())
 
 
+def test_the_package_runs_as_the_script_does() -> None:
+    command = [sys.executable, "-m", "hybridtof", "--version"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout == f"hybridtof {hybridtof.__version__}\n"
+    wrong = subprocess.run([*command[:3], "estimates"], capture_output=True, check=False, cwd=ROOT)
+    assert wrong.returncode == 2
+
+
 def test_the_import_brings_nothing_heavy() -> None:
     """Counted in modules: a clock would say more of the machine."""
     code = "import sys; before = len(sys.modules); import hybridtof\n"
