@@ -109,6 +109,16 @@ def test_frames_from_files(tmp_path: Path, suffix: str) -> None:
     np.testing.assert_array_equal(hybridtof.read_frames(sensor, path).readings, frames.readings)
 
 
+@pytest.mark.parametrize("name", ["phase", "Amplitude", "phase_rad"])
+def test_readings_in_polar_form_are_told_how_to_be_given(name: str) -> None:
+    wave = {"kind": "sine_wave", "frequency_hz": 1e7, "noise": {"read": [1e-3, 1e-3]}}
+    sensor = hybridtof.parse_sensor(wave)
+    with pytest.raises(InvalidInputError, match=r"i = amplitude cos\(phase\)"):
+        hybridtof.frames_from_columns(sensor, {"i": [1.0], "q": [1.0], name: [1.0]})
+    with pytest.raises(InvalidInputError, match="known_range_m"):
+        hybridtof.frames_from_columns(sensor, {"i": [1.0], "q": [1.0], "distance_m": [1.0]})
+
+
 def test_bad_files(tmp_path: Path) -> None:
     sensor = hybridtof.parse_sensor(PULSED)
     path = tmp_path / "frames.csv"
