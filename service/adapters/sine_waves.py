@@ -138,7 +138,7 @@ def offset_note(frequency_hz: float) -> str:
     metres = _OFFSET * SPEED_OF_LIGHT / (4 * np.pi * frequency_hz)
     return (
         f"phase_offset_rad is taken as 0, which no dump tells: {_OFFSET:g} rad of it move every "
-        f"range by {metres:.2g} m at {frequency_hz / 1e6:g} MHz, and no answer sees it. Calibrate "
+        f"range by {metres:.2g} m at {frequency_hz / 1e6:g} MHz, in no answer's sd. Calibrate "
         "with frames of known_range_m and a prior of phase_offset_rad (docs/adapters.md)"
     )
 
