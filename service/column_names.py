@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from simulator.errors import InvalidInputError, Problem, escape
 from simulator.frames import FrameColumns
+from simulator.other_readings import instead_of
 
 __all__ = ["NAMES", "check_names", "check_readings", "ignored_names", "meant", "with_remedy"]
 
@@ -101,11 +102,13 @@ def check_readings(names: Sequence[str]) -> None:
     """
     if ignored_names(names) and not _READINGS.intersection(names):
         found = ", ".join(names)
+        hints = dict.fromkeys(filter(None, map(instead_of, ignored_names(names))))
         raise InvalidInputError(
             Problem(
                 "",
                 f"no column holds readings: found {found}; a pulsed sensor has w1 (the late "
-                "window) and w2 (the whole pulse), a sine_wave sensor i and q",
+                "window) and w2 (the whole pulse), a sine_wave sensor i and q"
+                + "".join(f"; {hint}" for hint in hints),
             )
         )
 
@@ -116,7 +119,7 @@ def ignored_names(names: Sequence[str]) -> list[str]:
 
 
 def with_remedy(error: InvalidInputError, columns: object, at: str = "") -> InvalidInputError:
-    """Return an error that says what to do about entries of columns that are null.
+    """Return an error that says what to do about null entries, and about others' columns.
 
     Columns are one document, good as a whole or refused: of rows each stands for itself.
 
@@ -135,6 +138,9 @@ def with_remedy(error: InvalidInputError, columns: object, at: str = "") -> Inva
         column = columns.get(found[1]) if found and isinstance(columns, dict) else None
         if found and isinstance(column, list) and column[int(found[2])] is None:
             return Problem(problem.pointer, _NULL)
+        name = problem.pointer.removeprefix(f"{at}/")
+        if f"{at}/{name}" == problem.pointer and name not in NAMES and instead_of(name):
+            return Problem(problem.pointer, f"is not a column: {instead_of(name)}")
         return problem
 
     return InvalidInputError(*map(told, error.problems))

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simulator.errors import InvalidInputError, Problem
 from simulator.known_ranges import MAY_BE_NULL, known_range_problems, telling
+from simulator.other_readings import instead_of
 from simulator.sensor import Sensor
 from simulator.temperature import temperature_problems
 from simulator.validated import Validated
@@ -207,11 +208,12 @@ def frames_from_columns(
 
 
 def _of_another(name: str) -> str:
-    """Return of which sensor a column is that this one has not; nothing of a name that none has."""
+    """Return of which sensor a column is that this one has not, or what to give instead."""
     for kind, columns in (("pulsed", ("w1", "w2")), ("sine_wave", ("i", "q"))):
         if name in columns or name in _columns_of(*columns)[0]:
             return f": it looks like one of a {kind} sensor; is the sensor's `kind` right?"
-    return ""
+    remedy = instead_of(name)
+    return f": {remedy}" if remedy else ""
 
 
 @functools.cache

@@ -54,6 +54,14 @@ def loaded(code: str) -> set[str]:
     return set(done.stdout.split())
 
 
+def test_the_package_runs_as_the_script_does() -> None:
+    command = [sys.executable, "-m", "hybridtof", "--version"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout == f"hybridtof {hybridtof.__version__}\n"
+    wrong = subprocess.run([*command[:3], "estimates"], capture_output=True, check=False, cwd=ROOT)
+    assert wrong.returncode == 2
+
+
 def test_the_import_brings_nothing_heavy() -> None:
     """Counted in modules: a clock would say more of the machine."""
     code = "import sys; before = len(sys.modules); import hybridtof\n"
@@ -99,6 +107,16 @@ def test_frames_from_files(tmp_path: Path, suffix: str) -> None:
     assert isinstance(frames, hybridtof.Frames)
     np.testing.assert_array_equal(frames.readings, [[0.02, 0.3], [0.03, 0.4]])
     np.testing.assert_array_equal(hybridtof.read_frames(sensor, path).readings, frames.readings)
+
+
+@pytest.mark.parametrize("name", ["phase", "Amplitude", "phase_rad"])
+def test_readings_in_polar_form_are_told_how_to_be_given(name: str) -> None:
+    wave = {"kind": "sine_wave", "frequency_hz": 1e7, "noise": {"read": [1e-3, 1e-3]}}
+    sensor = hybridtof.parse_sensor(wave)
+    with pytest.raises(InvalidInputError, match=r"i = amplitude cos\(phase\)"):
+        hybridtof.frames_from_columns(sensor, {"i": [1.0], "q": [1.0], name: [1.0]})
+    with pytest.raises(InvalidInputError, match="known_range_m"):
+        hybridtof.frames_from_columns(sensor, {"i": [1.0], "q": [1.0], "distance_m": [1.0]})
 
 
 def test_bad_files(tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ ALLOWED: dict[str, str] = {
     "service/store/migrations/versions": "",
     "service/streams": "service inference",
     "service/warm": "service inference",
-    "hybridtof": "inference service.frame_files",
+    "hybridtof": "inference service.frame_files service.cli",
 }
 
 

@@ -51,7 +51,8 @@ class Converted:
     Attributes
     ----------
     sensor : PulsedSensor or SineWaveSensor
-        With the noise of these frames; gain 1 and no phase offset, since neither is in a dump.
+        With the noise of these frames; gain 1 and no phase offset, since neither is in a dump:
+        the notes say what the offset would cost.
     columns : mapping of str to sequence
         Columns of frames, and registers that no frame has a column for.
     notes : tuple of str

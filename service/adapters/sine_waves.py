@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from service.adapters.adapter import Converted, Settings
 from service.adapters.registers import Registers
+from simulator.constants import SPEED_OF_LIGHT
 from simulator.errors import RefusedError
 from simulator.sensor import Noise, SineWaveSensor
 
-__all__ = ["Pair", "dropped", "phase_of", "sine_wave_frames", "turned"]
+__all__ = ["Pair", "dropped", "offset_note", "phase_of", "sine_wave_frames", "turned"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -20,6 +21,7 @@ _FEWEST = 16  # frames: the scatter of 14 second differences is known to a fifth
 _NORMAL_MAD = 1.4826  # standard deviation over median absolute deviation
 # phases of an object that moved less tell nothing of the sense of rotation
 _MOVED = 1e-3
+_OFFSET = 0.01  # rad, as the measure of what an unknown phase offset costs
 
 
 def dropped(registers: Registers, bad: Mapping[str, Flags]) -> tuple[Registers, tuple[str, ...]]:
@@ -125,6 +127,22 @@ def turned(readings: Array, phase_rad: Array) -> tuple[Array, tuple[str, ...]]:
     return readings, ()
 
 
+def offset_note(frequency_hz: float) -> str:
+    """Return what a phase offset that no dump tells does to ranges, and how to find it.
+
+    Parameters
+    ----------
+    frequency_hz : float
+        Modulation frequency [Hz].
+    """
+    metres = _OFFSET * SPEED_OF_LIGHT / (4 * np.pi * frequency_hz)
+    return (
+        f"phase_offset_rad is taken as 0, which no dump tells: {_OFFSET:g} rad of it move every "
+        f"range by {metres:.2g} m at {frequency_hz / 1e6:g} MHz, in no answer's sd. Calibrate "
+        "with frames of known_range_m and a prior of phase_offset_rad (docs/adapters.md)"
+    )
+
+
 def sine_wave_frames(
     readings: Array,
     registers: Registers,
@@ -157,7 +175,7 @@ def sine_wave_frames(
     also : mapping of str to ndarray, shape (n,), optional
         Further columns.
     notes : tuple of str
-        To hand on.
+        To hand on, before that on the phase offset.
 
     Raises
     ------
@@ -177,4 +195,4 @@ def sine_wave_frames(
     columns |= {"i": readings[:, 0].tolist(), "q": readings[:, 1].tolist()}
     columns |= {name: column.tolist() for name, column in (also or {}).items()}
     sensor = SineWaveSensor(frequency_hz=frequency_hz, noise=Noise(read=read))
-    return Converted(sensor, columns, notes)
+    return Converted(sensor, columns, (*notes, offset_note(frequency_hz)))

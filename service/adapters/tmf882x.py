@@ -12,6 +12,7 @@ import numpy as np
 from service.adapters.adapter import Adapter, Converted, Settings
 from service.adapters.histograms import pulsed, sine_wave
 from service.adapters.recordings import recording_of
+from service.adapters.sine_waves import offset_note
 from simulator.errors import InvalidInputError, RefusedError
 from simulator.frames import Frames
 from simulator.sensor import Sensor
@@ -47,8 +48,13 @@ def _convert(raw: bytes, form: str, settings: Settings) -> Converted:
     if settings.period_s is not None:
         time_s = settings.period_s * np.arange(len(frames))
         columns = {"time_s": time_s.tolist(), **columns}
-    note = "ranges start with the histogram: an offset of the instant of emission is in all of them"
-    return Converted(sensor, columns, (note,))
+    offset = "timing_offset_s" if wanted == "pulsed" else "phase_offset_rad"
+    note = (
+        "ranges start with the histogram: an offset of the instant of emission is in all of them. "
+        f"Calibrate with frames of known_range_m and a prior of {offset} (docs/adapters.md)"
+    )
+    notes = (note,) if settings.frequency_hz is None else (note, offset_note(settings.frequency_hz))
+    return Converted(sensor, columns, notes)
 
 
 ADAPTER = Adapter(

@@ -150,6 +150,32 @@ def test_emitters_are_not_mixed() -> None:
         convert("opt3101", [WRITERS["opt3101"](900.0, 1.0, frequency=1)], ".bin")
 
 
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_phase_offset_that_no_dump_tells_is_said(name: str) -> None:
+    """What it costs is c / (4 pi f) times it: 0.024 m of 0.01 rad at 10 MHz."""
+    result = convert(name, [WRITERS[name](900.0, 1.0)] * 3, ".bin")
+    assert isinstance(result.sensor, SineWaveSensor)
+    metres = 0.01 * SPEED_OF_LIGHT / (4 * math.pi * result.sensor.frequency_hz)
+    (line,) = [line for line in result.notes if "phase_offset_rad is taken as 0" in line]
+    assert f"0.01 rad of it move every range by {metres:.2g} m" in line
+    assert "known_range_m" in line
+
+
+@pytest.mark.parametrize(
+    ("settings", "offset"),
+    [
+        (Settings(), "timing_offset_s"),
+        (Settings(readings="sine_wave", frequency_hz=5e6), "phase_offset_rad"),
+    ],
+)
+def test_how_to_find_the_offset_of_a_histogram_is_said(settings: Settings, offset: str) -> None:
+    raw = tmf882x([[2] * 40 + [40000] + [2] * 87], 1e-10)
+    notes = converted(BY_NAME["tmf882x"], raw, ".json", settings).notes
+    assert f"known_range_m and a prior of {offset}" in notes[0]
+    costs = ["0.01 rad of it move every range by 0.048 m at 5 MHz" in line for line in notes[1:]]
+    assert costs == ([True] if settings.readings else [])
+
+
 def test_amplitude_and_phase_of_an_opt3101() -> None:
     settings = Settings(read=(1.0, 1.0), readings="amplitude_phase", period_s=0.5)
     result = convert("opt3101", [WRITERS["opt3101"](900.0, 1.0)] * 3, ".bin", settings)
@@ -258,8 +284,11 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     out, scene = tmp_path / "frames.csv", tmp_path / "scene.json"
     arguments = ["convert", "opt3101", str(path), "--read", "2", "2", "--period-s", "0.1"]
     assert main([*arguments, "--output", str(out), "--document", str(scene)]) == 0
-    printed = json.loads(capsys.readouterr().out)
+    said = capsys.readouterr()
+    printed = json.loads(said.out)
     assert printed["sensor"]["noise"]["read"] == [2.0, 2.0]
+    assert "note: phase_offset_rad is taken as 0" in said.err
+    assert any("phase_offset_rad is taken as 0" in line for line in printed["notes"])
     assert read_table(out.read_bytes(), ".csv").columns.i == printed["frames"]["i"]
     assert main(["estimate", str(out), "--scene", str(scene)]) == 0
     body = json.loads(capsys.readouterr().out)

@@ -158,8 +158,9 @@ def test_ranges_all_but_in_the_dark_are_as_open_as_crosstalk_leaves_them(
     assert result.fit is not None
     assert result.fit["by_priors"]
     off = np.abs(result.range_m - one.simulation.range_m) / result.sd_m
-    assert np.isfinite(off).all()
-    assert off.max() < 3.3  # a normal law's is above it in 1e-3
+    told = np.isfinite(off)
+    assert told.mean() > 0.8  # others may be any range
+    assert off[told].max() < 3.3  # a normal law's is above it in 1e-3
 
 
 @pytest.mark.usefixtures("near_only")

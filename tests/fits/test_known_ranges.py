@@ -99,7 +99,8 @@ def test_known_ranges_are_residuals_of_the_fit(kind: str) -> None:
     for name, value in zip(parameters.names, natural.tolist(), strict=True):
         said = found.parameters[name]
         assert said["value"] == pytest.approx(value, abs=0.1 * said["sd"])
-    assert np.median(found.sd_m) < 0.5 * np.median(plain.sd_m)
+    told = np.isfinite(plain.sd_m)  # else as open as all ranges are
+    assert np.median(found.sd_m[told]) < 0.5 * np.median(plain.sd_m[told])
 
 
 def test_a_contradiction_names_its_frame() -> None:

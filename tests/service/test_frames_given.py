@@ -61,6 +61,8 @@ def test_standard_input_is_named(
         ("W1 (V),w1,w2", "did you mean w1?"),
         ("0.1,w1,w2", "the first line must name the columns. The columns are"),
         ("Late,Total,n", "no column holds readings: found Late, Total, n; a pulsed sensor has w1"),
+        ("phase,amplitude,n", "i = amplitude cos(phase) and q = amplitude sin(phase)"),
+        ("distance,time_s,n", "one that is known beforehand is known_range_m"),
         ("i,q,n", "i: is not a column of a pulsed sensor: it looks like one of a sine_wave sensor"),
     ],
 )

@@ -118,6 +118,19 @@ async def test_a_null_reading_is_named_with_what_to_do(
     assert "null" not in said["/frames/known_range_m/1"]
 
 
+async def test_readings_of_another_form_are_named_with_what_to_give(
+    client: httpx.AsyncClient, request_body: dict[str, Any]
+) -> None:
+    request_body["frames"] = {"phase": [0.1], "amplitude": [1.5], "distance": [1.0], "spin": [1.0]}
+    response = await client.post("/v1/estimates", json=request_body)
+    assert response.status_code == 422
+    said = {error["pointer"]: error["detail"] for error in response.json()["errors"]}
+    for name in ("phase", "amplitude"):
+        assert "i = amplitude cos(phase) and q = amplitude sin(phase)" in said[f"/frames/{name}"]
+    assert "known_range_m" in said["/frames/distance"]
+    assert said["/frames/spin"].startswith("Extra inputs")
+
+
 @pytest.mark.parametrize("content", [b"", b"{", b"nope", b"\xff\xfe", b"[" * 100_000])
 async def test_malformed_body(client: httpx.AsyncClient, content: bytes) -> None:
     for route in ("estimates", "identifiability", "posteriors", "simulations"):

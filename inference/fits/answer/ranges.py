@@ -40,6 +40,7 @@ _IMPOSSIBLE = 36.0  # chi-square of a single frame that nothing explains
 # of the range, below which the tangent holds as far as noise reaches
 _SMALL = 0.005
 _ONE = 1.0  # standard deviations below which two modes are one
+_BAND = 3.0  # standard deviations that are followed, as of noise
 
 # why a fit that does not explain the frames gives no range
 CONTRADICTION = (
@@ -53,8 +54,11 @@ _REASONS = (
     "the best range lies at the end of the ranges of the scene",
     MISFIT,
     CONTRADICTION,
+    "what else explains the frames leaves this range open: its standard deviation is no number",
 )
-_AMBIGUOUS, _UNEXPLAINED, _EDGE, _MISFIT, _CONTRADICTED = range(len(COMMON_REASONS), len(_REASONS))
+_AMBIGUOUS, _UNEXPLAINED, _EDGE, _MISFIT, _CONTRADICTED, _OPEN = range(
+    len(COMMON_REASONS), len(_REASONS)
+)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -231,6 +235,19 @@ def _reaches(problem: FitProblem, best: Array, points: Sequence[Beside]) -> Arra
     return reach
 
 
+def _open(roots: Array, parts: SdParts, support: tuple[float, float]) -> NDArray[np.bool_]:
+    """Return which roots may be any range of the support as far as an error can say.
+
+    Noise is followed to the ends of the ranges and not beyond (docs/model.md, reach), so that a
+    part of the error that passes both is that of a tangent, or of other values of the unknowns.
+    """
+    low, high = support
+    with np.errstate(invalid="ignore", over="ignore"):
+        whole = np.fmax(high - roots, roots - low) * (1 + 1e-9)
+        rest = np.hypot(parts.scene, parts.model)
+        return np.asarray((_BAND * parts.noise > whole) | (_BAND * rest > whole))
+
+
 def frame_ranges(
     name: str,
     problem: FitProblem,
@@ -270,7 +287,8 @@ def frame_ranges(
     Returns
     -------
     TechniqueResult
-        Without run time.
+        Without run time. A range that the fit leaves open within all that may be has no standard
+        deviation, and a reason.
     """
     used = np.flatnonzero(state != SATURATED)
     modes, chi_square = _modes(problem, answers)
@@ -317,7 +335,10 @@ def frame_ranges(
             noise[frame, place] = roots[frame, place] * modes.noise[row, index]
             scene[frame, place] = roots[frame, place] * shared[row, index]
             model[frame, place] = roots[frame, place] * modes.model[row, index]
-    roots_sd[~np.isfinite(roots_sd)] = np.nan
+    parts = SdParts(noise, scene, model)
+    lost = _open(roots, parts, problem.support)
+    reason[(count == 1) & lost.any(axis=1)] = _OPEN
+    roots_sd[lost | ~np.isfinite(roots_sd)] = np.nan
     status = status_of_counts(count)
     status[state == SATURATED] = Status.SATURATED
     reason[state == ABSENT] = ABSENT
@@ -330,7 +351,7 @@ def frame_ranges(
         near_fold=near,
         reason=reason,
         reasons=_REASONS,
-        sd_parts_m=SdParts(noise, scene, model),
+        sd_parts_m=parts,
         parameters=parameters,
         fit=fit,
     )
