@@ -7,13 +7,12 @@ from inference.empty_frames import Contradiction, contradiction
 from inference.estimates import LeftOut, TechniqueResult
 from inference.first_step import first_step
 from inference.known import known_of
-from inference.plan import Plan, obstacle
+from inference.plan import Plan, asked_with, obstacle
 from inference.realtime.registry import TECHNIQUES
 from inference.run import Said, by_prior, run
 from inference.stated_light import StatedLight, stated_light
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.frames import Frames
-from simulator.joint_scene import centre
 from simulator.scene import Scene
 from simulator.sensor import Sensor
 
@@ -40,9 +39,7 @@ class Asked(NamedTuple):
         reason = ELSEWHERE.get(name)
         if reason is not None or self.rests_on_prior(name):
             return reason
-        sensor, scene = self.sensor, self.scene
-        # a fit over many frames asks the frames alone
-        of, stated = centre(sensor, scene) if name in TECHNIQUES else (sensor, scene)
+        of, stated = asked_with(name, self.sensor, self.scene)
         return obstacle(ALL_TECHNIQUES[name], of, stated, known_of(stated, of), self.frames)
 
     def run(self, name: str) -> TechniqueResult | LeftOut:

@@ -49,7 +49,8 @@ def first_step(
         return f"send frames that show the object: all of these {lost}"
     if choice.chosen is not None and refused is None:
         return f"ask for {choice.chosen}, or name no technique: it serves this scene"
-    if sensor.unknown:
+    told = () if scene.joint is None else scene.joint.unknowns
+    if not set(sensor.unknown) <= set(told):
         return (
             "calibrate the sensor, which states priors: take frames at ranges that a ruler tells "
             "(known_range_m, known_range_sd_m), and hybridtof calibrate makes a scene of them"
@@ -61,6 +62,8 @@ def first_step(
         if timed is not None:
             return f"give time_s, or derivative columns: {timed} then serves"
         return "state crosstalk and background as numbers: hybridtof calibrate learns them"
+    if sensor.unknown:  # of a calibrated scene: what takes their law takes what else it has
+        return _POSTERIOR
     return _more_frames(sensor, scene, objects, empty, refused)
 
 

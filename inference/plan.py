@@ -19,7 +19,7 @@ from simulator.scene import Scene
 from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor
 from simulator.sensor_unknowns import DRIFTS, GAIN
 
-__all__ = ["Plan", "cheapest", "obstacle", "plan"]
+__all__ = ["Plan", "asked_with", "cheapest", "obstacle", "plan"]
 
 _MOST_HALF_TURNS = 1000.0  # of phase to the background, each of which may hold a root
 _OF_GAIN = (GAIN, DRIFTS[0])
@@ -43,6 +43,20 @@ class Plan:
 
     chosen: str | None
     left_out: tuple[LeftOut, ...]
+
+
+def asked_with(name: str, sensor: Sensor, scene: Scene) -> tuple[Sensor, Scene]:
+    """Return sensor and scene as a technique takes them where the scene has a joint law.
+
+    Parameters
+    ----------
+    name : str
+        The technique. Of single frames it takes numbers, those at the centre of the law; a fit over
+        many frames takes the law as it is.
+    sensor, scene : Sensor, Scene
+        The request, checked.
+    """
+    return centre(sensor, scene) if name in REALTIME else (sensor, scene)
 
 
 def obstacle(
@@ -85,7 +99,7 @@ def obstacle(
                 f"the background lies {turns:.3g} half turns of phase away, and a frame may have "
                 "as many roots; a lower frequency would tell them apart"
             )
-    of_sensor = _sensor_obstacle(technique, sensor, known)
+    of_sensor = _sensor_obstacle(technique, sensor, scene, known)
     if of_sensor is not None:
         return of_sensor
     missing = [path for path in technique.needs if not known.has(path)]
@@ -96,14 +110,16 @@ def obstacle(
     return None
 
 
-def _sensor_obstacle(technique: Technique, sensor: Sensor, known: Known) -> str | None:
+def _sensor_obstacle(
+    technique: Technique, sensor: Sensor, scene: Scene, known: Known
+) -> str | None:
     """Return why a technique cannot serve a sensor that is not calibrated, None if it can."""
     fits = technique.name not in REALTIME
     of = sensor.temperature
     if of is not None and of.delay_drift_s_per_k is not None and known.crosstalk is None:
         return (
-            "the sensor's delay follows its temperature and crosstalk does not: it has to be a "
-            "number to be taken apart here; a posterior of these frames takes a prior"
+            "the sensor's delay follows its temperature and crosstalk does not: crosstalk has to "
+            "be a number to be taken apart here; a posterior of these frames takes a prior"
         )
     if fits and isinstance(sensor, PulsedSensor) and sensor.timing_offset_s is not None:
         return "fits over many frames take no timing_offset_s; a posterior of these frames does"
@@ -115,6 +131,11 @@ def _sensor_obstacle(technique: Technique, sensor: Sensor, known: Known) -> str 
         # neither w2 nor the modulus depends on when light comes
         or (path not in _OF_GAIN and technique.name != "intensity")
     ]
+    if missing and scene.joint is not None and set(missing) <= set(scene.joint.unknowns):
+        return (
+            f"needs {listed(missing)} as known numbers, and of a calibrated scene has their law; a "
+            "posterior of these frames (hybridtof infer) takes it"
+        )
     if missing:
         return (
             f"needs {listed(missing)} as known numbers: the sensor states priors, and a posterior "
@@ -184,14 +205,12 @@ def _planned_for(sensor: Sensor, scene: Scene, n: int, timed: bool, derived: boo
 
 
 def _planned(sensor: Sensor, scene: Scene, frames: Frames | None) -> Plan:
-    sensor, scene = centre(sensor, scene)
-    known = known_of(scene, sensor)
-    obstacles = {
-        name: obstacle(technique, sensor, scene, known, frames)
-        for name, technique in ALL_TECHNIQUES.items()
-    }
+    obstacles = {}
+    for name, technique in ALL_TECHNIQUES.items():
+        of, stated = asked_with(name, sensor, scene)
+        obstacles[name] = obstacle(technique, of, stated, known_of(stated, of), frames)
     able = [name for name, reason in obstacles.items() if reason is None]
-    chosen = cheapest(able, sensor, scene)
+    chosen = cheapest(able, *centre(sensor, scene))
     left_out = [
         LeftOut(name, reason if reason is not None else _served_better(name, chosen))
         for name, reason in obstacles.items()

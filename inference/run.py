@@ -8,7 +8,7 @@ from inference.contradicted import without_moved
 from inference.empty_frames import Contradiction
 from inference.estimates import LeftOut, TechniqueResult
 from inference.known import known_of
-from inference.plan import obstacle
+from inference.plan import asked_with, obstacle
 from inference.realtime.registry import TECHNIQUES
 from inference.shared_error import with_shared_error
 from inference.stated_light import StatedLight, faint, with_scene_part
@@ -90,7 +90,7 @@ def _beside(
     sensor: Sensor, scene: Scene, frames: Frames, name: str, against: Contradiction
 ) -> TechniqueResult | None:
     """Solve with the light that empty frames show as crosstalk; None where that is refused."""
-    of, stated = centre(sensor, scene) if name in TECHNIQUES else (sensor, scene)
+    of, stated = asked_with(name, sensor, scene)
     crosstalk = known_of(stated, of).crosstalk
     assert crosstalk is not None  # noqa: S101  # nothing contradicts what is unknown
     light = tuple(a + b for a, b in zip(crosstalk, against.light, strict=True))

@@ -66,6 +66,9 @@ def task_of(sensor: Sensor, scene: Scene, frames: Frames, known: Known, **more: 
     """
     crosstalk = (0.0, 0.0) if known.crosstalk is None else known.crosstalk
     cold, frames = at_reference(sensor, frames, crosstalk)
+    if cold is not sensor and scene.calibration is not None:
+        # it was checked with the sensor that it is of, and a cold one would be another
+        scene = scene.model_copy(update={"calibration": None})
     return Task(cold, scene, frames, known, **more)
 
 

@@ -146,8 +146,11 @@ class CollapsedDensity:
 
     def _of_terms(self, terms: Terms) -> Array:
         """Return log p(y_j | terms_i) for physical terms."""
-        parts = pieces(self, terms, self.integral_rows(terms))
-        return self.shared(np.concatenate([self._of_rows(rows, data) for _, rows, data in parts]))
+        rows = self.integral_rows(terms)
+        out = np.empty((len(rows.shapes), self.data.blocks))  # of no vectors there are no pieces
+        for k, each, data in pieces(self, terms, rows):
+            out[k] = self._of_rows(each, data)
+        return self.shared(out)
 
     def frame_log_likelihoods(self, z: Array) -> Array:
         """Return log p(y_j | z_i), shape (len(z), frames); -inf where physics forbids z."""

@@ -19,6 +19,7 @@ from inference.posterior.job import Job
 from inference.posterior.sampling.start import Optimum, climb, refine
 from simulator.compiled import at_once, soon
 from simulator.parameters import OFFSET
+from simulator.sensor_unknowns import TIMING
 
 __all__ = ["fitted_optima"]
 
@@ -43,11 +44,13 @@ def fitted_optima(job: Job, density: CollapsedDensity) -> list[Optimum]:
     -------
     list of Optimum
         Not sorted, some of them perhaps the same; empty where the fit has other unknowns, as for an
-        object at rest or ranges whose law is unknown.
+        object at rest or ranges whose law is unknown, and of a sensor that fits do not take.
     """
     names = tuple(name for name in density.parameters.names if name != OFFSET)
-    drifting = job.sensor.temperature is not None
-    if job.scene.motion != "radial" or job.sensor.unknown or drifting:
+    sensor = job.sensor
+    # a pulse that comes late, even by a known time, has other equations than the fit's
+    beyond = sensor.unknown or sensor.temperature is not None or TIMING in sensor.quantities
+    if job.scene.motion != "radial" or beyond:
         return []
     problem = fit_problem(job.sensor, job.scene, job.frames.select(job.usable))
     if problem.names != names:

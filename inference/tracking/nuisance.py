@@ -6,18 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.posterior.answer.posterior import Posterior
+from inference.tracking.remedies import remedy
 from simulator.errors import InvalidInputError, RefusedError, listed
 from simulator.parameters import Parameters, Terms
+from simulator.scene import Scene
 from simulator.sensor_unknowns import GAIN
 
-__all__ = ["CALIBRATE", "Nuisance", "nuisance_of"]
+__all__ = ["Nuisance", "nuisance_of"]
 
 Array = NDArray[np.float64]
-
-CALIBRATE = (
-    "calibrate the scene first (hybridtof calibrate, or a posterior of frames of this scene), or "
-    "let the stream learn it (--calibrate, over HTTP `calibrate`)"
-)
 
 _FEWEST_DRAWS = 20  # a direction
 
@@ -36,6 +33,7 @@ class Nuisance:
 
 
 def nuisance_of(
+    scene: Scene,
     parameters: Parameters,
     posterior: Posterior | Array | None,
     learnt: tuple[str, ...],
@@ -44,6 +42,8 @@ def nuisance_of(
 
     Parameters
     ----------
+    scene : Scene
+        The scene.
     parameters : Parameters
         The scene's unknowns.
     posterior : Posterior or ndarray, shape (draws, d), optional
@@ -68,7 +68,7 @@ def nuisance_of(
         if others:
             raise RefusedError(
                 f"{listed(others)} unknown: a tracker takes priors of the object, the gain and the "
-                f"crosstalk, and needs numbers or a posterior of all else; {CALIBRATE}"
+                f"crosstalk, and needs numbers or a posterior of all else; {remedy(scene, others)}"
             )
         steps = np.eye(len(names))[[names.index(name) for name in (*told, *free)]]
         near = parameters.natural(np.concatenate([origin[None], steps, -steps]))

@@ -10,10 +10,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.tracking.nuisance import CALIBRATE, Nuisance
+from inference.tracking.nuisance import Nuisance
+from inference.tracking.remedies import remedy
 from simulator.errors import RefusedError, listed
 from simulator.object_arrays import object_fluxes
 from simulator.parameters import Terms
+from simulator.scene import Scene
 
 __all__ = ["check_carried"]
 
@@ -21,13 +23,9 @@ Array = NDArray[np.float64]
 
 _FACTOR = 2.0  # by which light may be unknown at any range, a standard deviation up or down
 _PLACES = 65
-_DIFFERS = (
-    "; of objects that differ, state the numbers of one and as `discrepancy.flux` how far others "
-    "are from it (0.7: half to twice the light)"
-)
 
 
-def check_carried(known: Nuisance, positions: Array) -> None:
+def check_carried(scene: Scene, known: Nuisance, positions: Array) -> None:
     """Refuse priors that leave the light open by more than first order carries.
 
     The light of an object is the gain times c0 c2 / (r^2 (r^2 + c1 r + c0)); half the difference of
@@ -36,6 +34,8 @@ def check_carried(known: Nuisance, positions: Array) -> None:
 
     Parameters
     ----------
+    scene : Scene
+        The scene.
     known : Nuisance
         What is carried along.
     positions : ndarray, shape (n,)
@@ -61,9 +61,9 @@ def check_carried(known: Nuisance, positions: Array) -> None:
         factor = float(np.exp(open_by[at]))
     by = f"a factor of {factor:.3g}" if factor < 1e3 else "orders of magnitude"
     raise RefusedError(
-        f"{listed(known.carried)} unknown, by {by} of the light at {r[at]:.3g} m: a tracker takes "
-        f"priors that leave it open by {_FACTOR:g} at most, one standard deviation; state them "
-        f"narrower, or {CALIBRATE}" + _DIFFERS
+        f"{listed(known.carried)} unknown, by {by} of the light at {r[at]:.3g} m, one standard "
+        f"deviation: a tracker takes narrower priors, to {_FACTOR:g}; "
+        f"{remedy(scene, known.carried)}"
     )
 
 

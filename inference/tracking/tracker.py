@@ -153,7 +153,7 @@ def tracker(
         )
     # derivatives do not see crosstalk at all
     spared = unknown_crosstalk if learns or observed.by_rate else ()
-    known = nuisance_of(parameters, posterior, spared)
+    known = nuisance_of(scene, parameters, posterior, spared)
     static = (0.0, 0.0)
     if known.centre.crosstalk is not None:
         first, second = known.centre.crosstalk[0].tolist()
@@ -166,7 +166,7 @@ def tracker(
         )
     law = _law(parameters.range_prior, known.centre)
     knots = knots_of(sensor, known.centre, law, observed, settings.rate_sd)
-    check_carried(known, knots.positions)
+    check_carried(scene, known, knots.positions)
     # what derivatives owe to errors of the model is added to what the filter says
     erring = scene.model_error
     carried = ModelError(0.0, 0.0, integrated=False)

@@ -66,3 +66,11 @@ def test_the_true_valley_is_found_where_a_screen_of_the_prior_sees_false_ones() 
 def test_a_fit_of_other_unknowns_is_no_start(scene: dict[str, Any]) -> None:
     job = job_of(scene, 0)
     assert fitted_optima(job, job.density()) == []
+
+
+def test_a_sensor_whose_pulses_come_late_is_started_without_a_fit() -> None:
+    """Fits have no place for a timing offset, be it a known one."""
+    sensor = sensor_of("pulsed").model_copy(update={"timing_offset_s": 2e-10})
+    frames = data(sensor, frames=8).frames
+    job = fold.prepare(sensor, parse_scene({}), frames, SamplerSettings(method="emcee", seed=0))
+    assert fitted_optima(job, job.density()) == []

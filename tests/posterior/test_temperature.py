@@ -164,3 +164,12 @@ def test_a_posterior_without_any_temperature_is_refused() -> None:
     nothing = dataclasses.replace(frames, temperature_k=np.full(RANGES.size, np.nan))
     with pytest.raises(RefusedError, match="temperature_k is null"):
         prepare(unknown, scene, nothing, SamplerSettings(seed=1))
+
+
+def test_of_no_draws_there_are_no_densities() -> None:
+    """As of a posterior that is stopped before it draws."""
+    unknown, _, scene, frames = _told("pulsed")
+    for motion in ("radial", "static"):
+        stated = scene.model_copy(update={"motion": motion})
+        density = prepare(unknown, stated, frames, SamplerSettings(seed=1)).density()
+        assert density(np.empty((0, len(density.parameters)))).shape == (0,)

@@ -16,6 +16,7 @@ from service.answers.posteriors import PosteriorResponse, full
 from service.cli import main
 from service.store.record import QUEUED, JobRecord
 from simulator.scene import parse_scene
+from simulator.sensor import parse_sensor
 from tests.posterior.scenes import UNKNOWN_CROSSTALK, data, sensor_of
 
 NO_TIME = SamplerSettings(method="emcee", seed=1, max_seconds=1e-3)
@@ -64,6 +65,17 @@ def test_nothing_drawn_has_no_numbers_and_says_what_is_foreseen(crosstalk: Any) 
     record = JobRecord("a", "", "emcee", 1, "", 1, 1, "done", False, 1, QUEUED, 0, 0, result)
     answer = PosteriorResponse.model_validate(full(record))
     assert answer.model_dump(exclude={"problem"}) == full(record)
+
+
+@pytest.mark.usefixtures("untrusted")
+def test_nothing_drawn_of_a_sensor_of_unknown_drifts_has_no_numbers_either() -> None:
+    drifts = {"gain_drift_per_k": {"prior": "normal", "mean": 0.0, "sd": 3e-3}}
+    sensor = parse_sensor(SENSOR.model_dump() | {"temperature": drifts})
+    warm = dataclasses.replace(FRAMES, temperature_k=np.linspace(290.0, 310.0, 8))
+    found = infer(sensor, parse_scene({"crosstalk": UNKNOWN_CROSSTALK}), warm, NO_TIME)
+    assert not found.drawn
+    assert np.isnan(found.range_m.mean).all()
+    assert found.draws.range_m.shape == (1, 1, 0, 8)
 
 
 @pytest.mark.usefixtures("untrusted")

@@ -101,6 +101,37 @@ def test_a_sensor_that_is_not_calibrated_is_to_be_calibrated() -> None:
     assert "known_range_m" in found.do_first
 
 
+DRIFT = {"gain_drift_per_k": {"prior": "normal", "mean": 0.0, "sd": 3e-3}}
+LATE = {"prior": "normal", "mean": 0.0, "sd": 3e-10}
+
+
+@pytest.mark.parametrize(
+    ("more", "unknown"),
+    [
+        ({"temperature": DRIFT}, "sensor.temperature.gain_drift_per_k"),
+        ({"timing_offset_s": LATE}, "sensor.timing_offset_s"),
+    ],
+)
+@pytest.mark.parametrize("techniques", [None, ["joint_fit"]])
+def test_a_calibrated_sensor_that_no_fit_takes_is_one_for_a_posterior(
+    more: dict[str, Any], unknown: str, techniques: list[str] | None
+) -> None:
+    """Before other objects than the one of the calibration: nothing of it is a number."""
+    sensor = parse_sensor(SENSORS["pulsed"] | more)
+    law = {"unknowns": [unknown], "modes": [{"mean": [0.1], "covariance": [[0.01]]}]}
+    scene = parse_scene({"background": {"strength": 0.01, "distance_m": 5.0}, "joint": law})
+    of = frames(15, temperature_k=np.full(15, 300.0))
+    choice = plan(sensor, scene, of)
+    assert choice.chosen is None
+    found = estimate(sensor, scene, of, techniques)
+    assert not found.results
+    assert found.do_first is not None
+    assert found.do_first.startswith("ask for a posterior (hybridtof infer")
+    for left_out in (choice.left_out, found.left_out):
+        reasons = {item.name: item.reason for item in left_out}
+        assert "a posterior of these frames" in reasons["joint_fit"]
+
+
 def test_where_bounds_alone_are_told_a_fit_is_named_or_what_it_takes() -> None:
     leak = [{"prior": "normal", "mean": 0.0, "sd": 0.2}] * 2  # as wide as the light
     sensor, scene = parse_sensor(SENSORS["pulsed"]), parse_scene({"crosstalk": leak})

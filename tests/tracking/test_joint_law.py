@@ -6,6 +6,7 @@ import pytest
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.track import track
 from inference.tracking.tracker import tracker
+from service.problems import describe
 from simulator.errors import RefusedError
 from simulator.frames import frames_from_columns
 from simulator.parameters import parameters_of
@@ -141,3 +142,33 @@ def test_light_that_is_open_by_more_than_a_factor_of_two_is_refused(
     scene = parse_scene({"object": {name: x for name, x in told.items() if x is not None}})
     with pytest.raises(RefusedError, match=f"by a factor of {factor} of the light.*narrower"):
         tracker(SENSOR, scene)
+
+
+LAW = {"unknowns": ["crosstalk.w1"], "modes": [{"mean": [0.0], "covariance": [[1e-4]]}]}
+FOR_OTHERS = {"crosstalk": [STATED["crosstalk"][0], 0.0], "joint": LAW}
+WALL = {"background": {"strength": 0.01, "distance_m": 3.0}}
+ONE = {"c0": 0.08, "c1": 0.0, "c2": 0.1}
+DIFFERS = {"flux": 0.7, "range_m": 8e-4, "shadow": 0.2}
+
+
+@pytest.mark.parametrize("wall", [{}, WALL])
+def test_a_scene_for_other_objects_says_what_is_to_be_stated(wall: dict[str, object]) -> None:
+    """It is calibrated: to calibrate it once more would lead nowhere. What is said leads on."""
+    with pytest.raises(RefusedError) as told:
+        tracker(SENSOR, parse_scene(FOR_OTHERS | wall))
+    assert "hybridtof calibrate" not in str(told.value)
+    assert "state the numbers of one object" in str(told.value)
+    assert ("of its shadow" in str(told.value)) == bool(wall)
+    assert "`discrepancy.flux`" in describe(told.value)["detail"]
+    shadow = {"background": WALL["background"] | {"shadow": {"c0": 0.06, "c1": 0.0}}}
+    stated = FOR_OTHERS | (shadow if wall else {}) | {"object": ONE, "discrepancy": DIFFERS}
+    tracker(SENSOR, parse_scene(stated))
+
+
+@pytest.mark.parametrize("scene", [{}, {"object": {"c0": 0.1}}, FOR_OTHERS, FOR_OTHERS | WALL])
+@pytest.mark.parametrize("gain", [1.0, LogNormal(prior="lognormal", median=1.0, sigma=50.0)])
+def test_the_whole_remedy_is_said_over_http(scene: dict[str, object], gain: object) -> None:
+    sensor = SENSOR.model_copy(update={"gain": gain})
+    with pytest.raises(RefusedError) as told:
+        tracker(sensor, parse_scene(scene))
+    assert describe(told.value)["detail"] == str(told.value)

@@ -67,10 +67,10 @@ def test_nor_is_one_that_has_moved_a_little() -> None:
 
 
 def test_what_came_and_went_tells_that_the_way_is_free() -> None:
-    """An object that is seen for eight seconds, from afar to afar, and leaves the light as it was."""
+    """An object that is seen for eight seconds, and leaves the light as it was."""
     time = STEP * np.arange(900)
-    passing = np.where(np.abs(time - 8.0) < 4.0, 0.4 * np.exp(np.abs(time - 8.0) / 1.3), np.nan)
-    found = followed(passing, 1e3, 1.0, 5)
+    passing = np.where(np.abs(time - 8.0) < 4.0, 0.4 * np.exp(np.abs(time - 8.0) / 4.0), np.nan)
+    found = followed(passing, 1e3, 1.0, 0)
     before, after = found.present[time < 3.9], found.present[time > 14.0]
     assert before.min() > 0.1
     assert np.mean(after < FREE) > 0.8

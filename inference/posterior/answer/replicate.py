@@ -92,14 +92,11 @@ def _at_temperature(density: CollapsedDensity, terms: Terms, readings: Array) ->
         return readings
     warm = density.frames[:, WARM]
     static = np.zeros((len(readings), 2)) if terms.crosstalk is None else terms.crosstalk
-    drifts = terms.drift[:, 1].tolist()
-    # back by the opposite drift
-    return np.stack(
-        [
-            readings_at_reference(density.sensor, each, warm, -drift, x)
-            for each, drift, x in zip(readings, drifts, static, strict=True)
-        ]
-    )
+    # back by the opposite drift, draw by draw: of none there is none
+    moved = np.empty_like(readings)
+    for i, (drift, x) in enumerate(zip(terms.drift[:, 1].tolist(), static, strict=True)):
+        moved[i] = readings_at_reference(density.sensor, readings[i], warm, -drift, x)
+    return moved
 
 
 def replicate_frames(
