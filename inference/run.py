@@ -1,5 +1,6 @@
 """One technique, asked about frames of one scene."""
 
+import dataclasses
 import time
 
 import numpy as np
@@ -9,6 +10,7 @@ from inference.empty_frames import Contradiction
 from inference.estimates import LeftOut, TechniqueResult
 from inference.known import known_of
 from inference.plan import asked_with, obstacle
+from inference.realtime.clipped_light import beside_ends
 from inference.realtime.registry import TECHNIQUES
 from inference.shared_error import with_shared_error
 from inference.stated_light import StatedLight, faint, with_scene_part
@@ -21,6 +23,8 @@ from simulator.scene import Scene
 from simulator.sensor import Sensor
 
 __all__ = ["NOT_SMALL", "Said", "by_prior", "obstacle_by_prior", "run"]
+
+_WHOLE_ALONE = frozenset({"intensity"})  # techniques that do not ask when light comes
 
 Said = dict[str, TechniqueResult | str]
 """What techniques said of one request, or why they said nothing; by the names of what differs."""
@@ -151,8 +155,11 @@ def _taken(result: TechniqueResult, name: str, seconds: float) -> TechniqueResul
 
 def _solved(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> TechniqueResult:
     solve = ALL_TECHNIQUES[name].solve
-    if scene.joint is None or name not in TECHNIQUES:
+    if name not in TECHNIQUES:
         return solve(task_of(sensor, scene, frames, known_of(scene, sensor)))
+    if scene.joint is None:
+        result = solve(task_of(sensor, scene, frames, known_of(scene, sensor)))
+        return _doubted(result, sensor, scene, frames, name)
 
     def at(of: Sensor, stated: Scene) -> TechniqueResult:
         known = known_of(stated, of)
@@ -164,4 +171,21 @@ def _solved(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> Techniqu
     of, middle = centre(sensor, scene)
     result = solve(task_of(of, middle, frames, known_of(middle, of)))
     pairs = ((at(*plus), at(*minus)) for plus, minus in around(sensor, scene))
-    return with_shared_error(result, pairs)
+    return _doubted(with_shared_error(result, pairs), of, middle, frames, name)
+
+
+def _doubted(
+    result: TechniqueResult, sensor: Sensor, scene: Scene, frames: Frames, name: str
+) -> TechniqueResult:
+    """Mark ranges of light that may have been moved out of the late window.
+
+    Before a background they are left alone: its light is late, too.
+    """
+    known = known_of(scene, sensor)
+    if name in _WHOLE_ALONE or known.crosstalk is None or scene.background is not None:
+        return result
+    beside = beside_ends(sensor, frames, known.crosstalk, known.support)
+    if beside is None:
+        return result
+    near = result.near_fold | (beside & (result.root_count > 0))
+    return dataclasses.replace(result, near_fold=near)

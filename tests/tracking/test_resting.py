@@ -32,7 +32,7 @@ def followed(
     wave = 4 * np.pi * 1e7 / 299792458.0
     there = np.isfinite(range_m)
     r = np.where(there, range_m, 1.0)
-    light = np.where(there, object_flux(r, C0 * C2, C0, C1), 0.0)
+    light = np.where(there, object_flux(r, C0 * C2, C0, C1), 0.0)  # type: ignore[arg-type]
     most = float(object_flux(0.5, C0 * C2, C0, C1))
     noise, turn = most / snr, np.exp(2j * np.pi * rng.random())
     y = light * np.exp(1j * wave * r) + crosstalk * most * turn
@@ -44,9 +44,7 @@ def followed(
         {"kind": "sine_wave", "frequency_hz": 1e7, "noise": {"read": [noise, noise]}}
     )
     prior = {"prior": "normal", "mean": 0.0, "sd": 2 * crosstalk * most}
-    scene = parse_scene(
-        {"object": {"c0": C0, "c1": C1, "c2": C2}, "crosstalk": [prior] * 2}
-    )
+    scene = parse_scene({"object": {"c0": C0, "c1": C1, "c2": C2}, "crosstalk": [prior] * 2})
     return track(sensor, scene, frames_from_columns(sensor, columns), TrackingSettings())
 
 
