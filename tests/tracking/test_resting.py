@@ -74,6 +74,27 @@ def test_what_came_and_went_tells_that_the_way_is_free() -> None:
     assert np.mean(after < FREE) > 0.8
 
 
+def test_a_little_light_that_came_and_went_tells_it_too() -> None:
+    """Less than 100 of the noise: the crosstalk is again what it was before."""
+    time = STEP * np.arange(900)
+    passing = np.where(np.abs(time - 8.0) < 4.0, 0.4 * np.exp(np.abs(time - 8.0) / 4.0), np.nan)
+    shares = []
+    for seed in range(3):
+        found = followed(passing, 40.0, 1.0, seed)
+        assert found.present[time < 3.9].min() > 0.1
+        shares.append(np.mean(found.present[time > 14.0] < FREE))
+    assert max(shares) > 0.2
+
+
+def test_much_light_that_has_gone_for_good_tells_it_too() -> None:
+    """An object that is there from the first frame on, and leaves."""
+    time = STEP * np.arange(900)
+    leaving = np.where(time < 8.0, 0.4 * np.exp(np.maximum(time - 3.0, 0.0) / 3.0), np.nan)
+    found = followed(leaving, 1e3, 1.0, 0)
+    assert found.present[time < 7.5].min() > 0.1
+    assert np.mean(found.present[time > 14.0] < FREE) > 0.8
+
+
 def test_one_empty_frame_tells_it_too() -> None:
     nothing = np.full(FRAMES, np.nan)
     assert followed(nothing, 40.0, 1.0, 2).present.min() > 0.1
