@@ -17,7 +17,9 @@ from inference.posterior.criticism.discrepancy_check import (
 from inference.posterior.criticism.predictive_check import (
     FLUX_ERROR,
     MISFIT_P,
+    NEIGHBOURS,
     TOTAL,
+    WANDER,
     predictive_check,
 )
 from inference.posterior.job import Job
@@ -26,6 +28,7 @@ __all__ = [
     "LARGEST",
     "asked_for",
     "flux_error_asked_for",
+    "lasts_from_frame_to_frame",
     "model_check",
     "noise_asked_for",
 ]
@@ -138,6 +141,17 @@ def noise_asked_for(fit: Fit) -> float:
     if not fit.p_value < MISFIT_P or total.p_value > _BY_CHANCE or not total.expected > 0:
         return 1.0
     return max(1.0, total.statistic / total.expected)
+
+
+def lasts_from_frame_to_frame(fit: Fit) -> bool:
+    """Tell whether residuals are smoother than replicates' by more than chance in one of twenty.
+
+    Parameters
+    ----------
+    fit : Fit
+        Against replicates whose noise explains how large residuals are.
+    """
+    return any(_check(fit, name).p_value < _BY_CHANCE for name in (NEIGHBOURS, WANDER, FLUX_ERROR))
 
 
 def _check(fit: Fit, name: str) -> FitCheck:

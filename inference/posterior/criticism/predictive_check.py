@@ -14,7 +14,7 @@ from inference.posterior.criticism.fit_residuals import FitResiduals, fit_residu
 from inference.posterior.job import Job
 from simulator.discrepancy import matern
 
-__all__ = ["FLUX_ERROR", "MISFIT_P", "TOTAL", "predictive_check"]
+__all__ = ["FLUX_ERROR", "MISFIT_P", "NEIGHBOURS", "TOTAL", "WANDER", "predictive_check"]
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ _FEWEST = 40  # of the frames of each part, where they were dealt out
 _TAIL = 0.1  # share of the replicates that tell how the tail falls
 _LENGTH = 0.5  # in log r, of a smooth error
 TOTAL, FLUX_ERROR = "total", "flux_error"
-_NEIGHBOURS = "neighbours"
+NEIGHBOURS, WANDER = "neighbours", "wander"
 
 
 def _total(of: FitResiduals) -> Array:
@@ -62,14 +62,14 @@ def _flux_error(of: FitResiduals) -> Array:
 _CHECKS: dict[str, Callable[[FitResiduals], Array]] = {
     TOTAL: _total,
     "worst_frame": _worst,
-    _NEIGHBOURS: _neighbours,
-    "wander": _wander,
+    NEIGHBOURS: _neighbours,
+    WANDER: _wander,
     FLUX_ERROR: _flux_error,
 }
 
 
 # how a statistic of all frames is made from those of parts; others are sums
-_TOGETHER: dict[str, Callable[..., Array]] = {"worst_frame": np.max, _NEIGHBOURS: np.mean}
+_TOGETHER: dict[str, Callable[..., Array]] = {"worst_frame": np.max, NEIGHBOURS: np.mean}
 
 
 def _survival(anew: Array, seen: Array) -> float:
@@ -135,7 +135,7 @@ def predictive_check(
     checks = []
     for name in _CHECKS:
         values = _TOGETHER.get(name, np.sum)([of[name] for of in found], axis=0)
-        noisier = 1.0 if name == _NEIGHBOURS else job.noise_times  # a correlation has no size
+        noisier = 1.0 if name == NEIGHBOURS else job.noise_times  # a correlation has no size
         p = _survival(values[:, 1:].ravel(), values[:, 0] / noisier)
         mean = float(values[:, 1:].mean())
         checks.append(FitCheck(name, float(np.median(values[:, 0])), mean, p))
@@ -179,7 +179,7 @@ def _words(check: FitCheck, outliers: tuple[int, ...]) -> str:
         more = f" and {len(outliers) - 10} more" if len(outliers) > 10 else ""
         named = f" (frames {which}{more}, counted from 0)" if outliers else ""
         return f"the worst frame lies {size:.3g} standard deviations off the model{named}"
-    if check.name == _NEIGHBOURS:
+    if check.name == NEIGHBOURS:
         return (
             f"residuals of neighbouring ranges go together (correlation {check.statistic:.2g}): "
             "the model has a smooth error along the range beyond what `discrepancy` allows"

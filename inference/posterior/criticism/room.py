@@ -2,7 +2,8 @@
 
 What the errors that are granted explain is an honest answer, only wider. Noise that is larger than
 stated asks for an error of the flux too, since a fit takes it for one: what the first room leaves
-unexplained the second may explain. One frame of something else, or light that drifts, is neither.
+unexplained the second may explain, unless what is left lasts from frame to frame, as no noise does.
+One frame of something else, or light that drifts, is neither.
 """
 
 import dataclasses
@@ -15,7 +16,12 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.answer.fit import Fit
 from inference.posterior.answer.whole import Whole
 from inference.posterior.criticism.discrepancy_check import LargerDiscrepancy
-from inference.posterior.criticism.model_check import asked_for, model_check, noise_asked_for
+from inference.posterior.criticism.model_check import (
+    asked_for,
+    lasts_from_frame_to_frame,
+    model_check,
+    noise_asked_for,
+)
 from inference.posterior.job import Job
 
 __all__ = ["Room", "room_for", "with_room"]
@@ -88,8 +94,8 @@ def room_for(
     noise = noise_asked_for(fit)
     if first.explained or not (of_flux > 1 and noise > 1):
         return first
-    second = checked_again(1.0, noise)[0]
-    if second.explained:
+    second, left_by_noise = checked_again(1.0, noise)
+    if second.explained and not lasts_from_frame_to_frame(left_by_noise):
         return second
     rest = noise_asked_for(left)
     return checked_again(of_flux, rest)[0] if rest > 1 else first
