@@ -62,9 +62,9 @@ def beside_ends(
 
 def _shift_m(sensor: PulsedSensor, frames: Frames) -> NDArray[np.float64] | None:
     """Return by which length light comes late, shape (n,) [m]; None where it never does."""
-    shift = np.full(len(frames), sensor.known_shift_m)
-    warm = warmth(sensor, frames)
-    if sensor.temperature is not None and warm is not None:
-        drift = sensor.temperature.known[1]
-        shift = shift + shift_of(drift) * np.where(np.isfinite(warm), warm, 0.0)
-    return shift if np.any(shift != 0.0) else None
+    always, warm = sensor.known_shift_m, warmth(sensor, frames)
+    drift = 0.0 if sensor.temperature is None else sensor.temperature.known[1]
+    if warm is None or drift == 0.0:
+        # nothing is made for every frame where there is nothing to say
+        return None if always == 0.0 else np.full(len(frames), always)
+    return np.asarray(always + shift_of(drift) * np.where(np.isfinite(warm), warm, 0.0))
