@@ -10,7 +10,7 @@ from inference.empty_frames import Contradiction
 from inference.estimates import LeftOut, TechniqueResult
 from inference.known import known_of
 from inference.plan import asked_with, obstacle
-from inference.realtime.clipped_light import beside_ends
+from inference.realtime.clipped_light import beside_ends, may_come_late
 from inference.realtime.registry import TECHNIQUES
 from inference.shared_error import with_shared_error
 from inference.stated_light import StatedLight, faint, with_scene_part
@@ -20,7 +20,7 @@ from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.joint_scene import around, centre
 from simulator.scene import Scene
-from simulator.sensor import Sensor
+from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = ["NOT_SMALL", "Said", "by_prior", "obstacle_by_prior", "run"]
 
@@ -181,6 +181,8 @@ def _doubted(
 
     Before a background they are left alone: its light is late, too.
     """
+    if not (isinstance(sensor, PulsedSensor) and may_come_late(sensor)):
+        return result
     known = known_of(scene, sensor)
     if name in _WHOLE_ALONE or known.crosstalk is None or scene.background is not None:
         return result

@@ -13,15 +13,20 @@ from inference.realtime.assemble import END_BAND
 from inference.realtime.net import net_readings
 from simulator.at_temperature import warmth
 from simulator.frames import Frames
-from simulator.sensor import PulsedSensor, Sensor, shift_of
+from simulator.sensor import PulsedSensor, shift_of
 
-__all__ = ["beside_ends"]
+__all__ = ["beside_ends", "may_come_late"]
 
 _SLACK = 1e-9  # of r0: with a known offset the ranges allowed end where the windows do
 
 
+def may_come_late(sensor: PulsedSensor) -> bool:
+    """Tell whether a sensor states anything that moves its light in time."""
+    return sensor.timing_offset_s is not None or sensor.temperature is not None
+
+
 def beside_ends(
-    sensor: Sensor,
+    sensor: PulsedSensor,
     frames: Frames,
     crosstalk: tuple[float, float],
     support: tuple[float, float],
@@ -30,7 +35,7 @@ def beside_ends(
 
     Parameters
     ----------
-    sensor, frames : Sensor, Frames
+    sensor, frames : PulsedSensor, Frames
         As stated and as read, n of them.
     crosstalk : (float, float)
         Known crosstalk [reading units].
@@ -40,10 +45,8 @@ def beside_ends(
     Returns
     -------
     ndarray of bool, shape (n,), or None
-        None of a sensor whose light comes when it should: that a range ends is its technique's.
+        None where light comes when it should: that a range ends is its technique's.
     """
-    if not isinstance(sensor, PulsedSensor):
-        return None
     shift = _shift_m(sensor, frames)
     if shift is None:
         return None

@@ -121,7 +121,8 @@ def run_filter(
             numbers[ROUGHNESS] += (min(own, 1.0) - numbers[ROUGHNESS]) / _LATE
         report(out, rows, i, of, rules)
         told_empty = kinds[i] == EMPTY or kinds[i] == EMPTY_SATURATED
-        least = least_present(of, frame, model.table, told_empty, outlier)
+        usual = 1.0 - outlier if kinds[i] == USABLE else 0.0
+        least = least_present(of, frame, model.table, usual, told_empty)
         out[i, PRESENT] = max(out[i, PRESENT], least)
         out[i, OUTLIER], out[i, SURPRISE] = outlier, numbers[RUNNING]
         out[i, STUCK] = stuck_for(numbers)

@@ -28,8 +28,7 @@ _CHANGED = 1e-3  # weight of the empty scene below which something has moved, or
 _BACK = 0.5  # weight of the empty scene from which on what came has gone
 # of the noise: as near to what the crosstalk was before is as it was
 _NEAR = 2.0
-# of the noise: a change that tells the crosstalk by its curve; of 16 the empty scene was sure in
-# 4 of 30 tracks, an object at rest in each, of 50 to 80 in 2 of 30, of 180 and more in none
+# of the noise: a change that is large enough to tell the crosstalk by its curve
 _TELLING = 100.0
 # values of `RESTING`
 _NO, _STILL, _MOVED = 0.0, 1.0, 2.0
@@ -38,7 +37,7 @@ _NO, _STILL, _MOVED = 0.0, 1.0, 2.0
 @borrowed
 @compiled
 def least_present(
-    of: Hypotheses, frame: TrackedFrame, table: ReadingsTable, told_empty: bool, outlier: float
+    of: Hypotheses, frame: TrackedFrame, table: ReadingsTable, usual: float, told_empty: bool
 ) -> float:
     """Return the least probability that an object is there, and note what a frame has told.
 
@@ -53,10 +52,10 @@ def least_present(
         The frame.
     table : ReadingsTable
         Known crosstalk.
+    usual : float
+        Probability that its readings are no outlier; 0 of a frame without readings.
     told_empty : bool
         Whether the frame was said to hold no object.
-    outlier : float
-        Probability that it is an outlier.
     """
     numbers, empty = of.numbers, of.weight[0]
     if numbers[RESTING] == _NO:
@@ -71,7 +70,7 @@ def least_present(
     numbers[RESTING] = _MOVED
     change1 = frame.first - table.crosstalk1 - numbers[LEVEL1]
     change2 = frame.second - table.crosstalk2 - numbers[LEVEL2]
-    large = outlier < 0.5 and math.hypot(change1, change2) > _TELLING
+    large = usual > 0.5 and math.hypot(change1, change2) > _TELLING
     away = math.hypot(first - numbers[LEVEL1], second - numbers[LEVEL2])
     known = unknown_crosstalk(of, 0) < 1.0
     if large or (empty > _BACK and known and away < _NEAR):

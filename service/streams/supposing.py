@@ -80,6 +80,7 @@ def _rows(frames: Frames, count: int) -> Sequence[Sequence[float]]:
 
 
 def _doubts(sensor: Sensor, early: Sequence[Sequence[float]]) -> Iterator[str]:
-    """Yield what looks like a mistake; a stream of an earlier version kept no times at first."""
-    yield from noise_doubts(sensor, np.array([row[:2] for row in early]))
-    yield from time_doubts(np.array([time for row in early for time in row[2:]]))
+    """Yield what looks like a mistake."""
+    rows = np.array(early)
+    yield from noise_doubts(sensor, rows[:, :2])
+    yield from time_doubts(rows[:, 2:].ravel())

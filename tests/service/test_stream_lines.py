@@ -24,11 +24,9 @@ from service.streams.kept import Kept
 from service.streams.lines import WINDOW, Line, Place
 from service.streams.room import STALE_S, Room
 from service.streams.said import MARKS
-from service.streams.supposing import Supposing, told_with
 from service.streams.taking import take
 from service.strict_json import decode
 from simulator.errors import InvalidInputError
-from simulator.frames import frames_from_columns
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
 from tests.service.conftest import SCENE, SENSOR
@@ -331,7 +329,7 @@ def test_noise_below_the_rounding_is_told_once(model: Tracker) -> None:
 
 
 def test_times_in_milliseconds_are_told_once(model: Tracker) -> None:
-    """With the 32nd frame, however the lines are cut; also where the first kept no times."""
+    """With the 32nd frame, however the lines are cut."""
     fine = [{"w1": 0.02 + math.sin(n) / 1e6, "w2": 1.7 + math.cos(n) / 1e6} for n in range(50)]
     lines = [frame(n, time_s=33 * n + n // 3, **fine[n]) for n in range(1, 50)]
     whole = answered(model, [lines])
@@ -343,13 +341,6 @@ def test_times_in_milliseconds_are_told_once(model: Tracker) -> None:
         assert answered(model, cut) == whole
     seconds = [frame(n, time_s=n, **fine[n]) for n in range(1, 50)]
     assert not any("assumptions" in line for line in answered(model, [seconds]))
-    frames = frames_from_columns(
-        model.sensor, {"w1": [0.1] * 40, "w2": [1.0] * 40, "time_s": [33.0 * n for n in range(40)]}
-    )
-    earlier = Supposing(False, [[0.1, 1.0]] * 20)
-    _, more = told_with(earlier, model.sensor, frames, None)
-    assert more is not None
-    assert [n for n, each in enumerate(more) if each] == [11]
 
 
 def test_a_temperature_that_nothing_uses_is_told_once(model: Tracker) -> None:

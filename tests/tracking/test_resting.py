@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from inference.estimates import Status
 from inference.tracking.hypotheses import RESTING
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.track import Track, track
@@ -22,7 +23,13 @@ FREE = 0.05  # an object is absent below it
 
 
 def followed(
-    range_m: Array, snr: float, crosstalk: float, seed: int, *, empty: bool = False
+    range_m: Array,
+    snr: float,
+    crosstalk: float,
+    seed: int,
+    *,
+    empty: bool = False,
+    blinded: bool = False,
 ) -> Track:
     """Follow a sine wave's object; nan where there is none.
 
@@ -40,8 +47,15 @@ def followed(
     columns: dict[str, Any] = {"time_s": STEP * np.arange(r.size), "i": y.real, "q": y.imag}
     if empty:
         columns["object_present"] = there | (np.arange(r.size) > 0)
+    if blinded:
+        y[200] = 1e3 * most * (1.0 + 1.0j)
     sensor = parse_sensor(
-        {"kind": "sine_wave", "frequency_hz": 1e7, "noise": {"read": [noise, noise]}}
+        {
+            "kind": "sine_wave",
+            "frequency_hz": 1e7,
+            "noise": {"read": [noise, noise]},
+            "full_scale": [1e2 * most, 1e2 * most],
+        }
     )
     prior = {"prior": "normal", "mean": 0.0, "sd": 2 * crosstalk * most}
     scene = parse_scene({"object": {"c0": C0, "c1": C1, "c2": C2}, "crosstalk": [prior] * 2})
@@ -61,6 +75,15 @@ def test_nor_is_one_that_has_moved_a_little() -> None:
     time = STEP * np.arange(FRAMES)
     for seed in range(4):
         found = followed(0.5 * 1.05 ** np.clip(time - 3.0, 0.0, 1.0), 20.0, 1.0, seed)
+        assert found.present.min() > 0.1
+
+
+def test_a_saturated_frame_tells_nothing() -> None:
+    """Its readings are far from all others, and none; after a small motion they would count."""
+    path = 0.5 * 1.05 ** np.clip(STEP * np.arange(FRAMES) - 3.0, 0.0, 1.0)
+    for seed in range(4):
+        found = followed(path, 20.0, 1.0, seed, blinded=True)
+        assert np.sum(found.status == int(Status.SATURATED)) == 1
         assert found.present.min() > 0.1
 
 
