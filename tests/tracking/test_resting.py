@@ -64,7 +64,7 @@ def followed(
 
 @pytest.mark.parametrize(("snr", "crosstalk"), [(10.0, 1.0), (20.0, 0.3), (40.0, 1.0), (1e3, 4.0)])
 def test_an_object_at_rest_is_never_absent(snr: float, crosstalk: float) -> None:
-    """It is as well there as not. Without the rule 3 of 4 tracks at a ratio of 10 to 40 fail."""
+    """It is as well there as not. Without the rule it is absent, but at the highest ratio."""
     for seed in range(3):
         found = followed(np.full(FRAMES, 0.5), snr, crosstalk, seed)
         assert found.present.min() > 0.1
