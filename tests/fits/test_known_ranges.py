@@ -100,6 +100,8 @@ def test_known_ranges_are_residuals_of_the_fit(kind: str) -> None:
         said = found.parameters[name]
         assert said["value"] == pytest.approx(value, abs=0.1 * said["sd"])
     told = np.isfinite(plain.sd_m)  # else as open as all ranges are
+    assert told.any()
+    assert np.isfinite(found.sd_m).all()
     assert np.median(found.sd_m[told]) < 0.5 * np.median(plain.sd_m[told])
 
 

@@ -56,7 +56,7 @@ def asked(
 def test_what_the_windows_cut_is_near_a_fold(
     range_m: float, warm_k: float, offset_s: float
 ) -> None:
-    """Without the rule all frames but those of the last offset are sure, and up to 72 sd off."""
+    """Without the rule all but those of the positive offset are sure, and up to 72 sd off."""
     found = asked(range_m, warm_k, offset_s)
     unique = found.status == _UNIQUE
     assert unique.any()
