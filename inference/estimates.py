@@ -66,7 +66,8 @@ class TechniqueResult:
     near_fold : ndarray of bool, shape (n,)
         Whether the noise could merge, part or remove a pair of roots, or reaches the r0 of a
         pulse, from where on all ranges read alike. Where noise or errors of the model may have
-        merged a pair into none, the place of its fold is a root beside those that are left.
+        merged a pair into none, the place of its fold is a root beside those that are left; so is
+        the end of the ranges where they may have moved a root beyond it.
     reason : ndarray of uint8, shape (n,)
         Index into ``reasons``; 0 says nothing.
     reasons : tuple of str

@@ -73,7 +73,8 @@ class Candidates:
     model : ndarray, shape (n, m), optional
         First-order standard deviations by errors of the model [m]; None where it is exact.
     merged : ndarray of bool, shape (n, m), optional
-        Which are places of folds, a pair of whose roots errors may have merged into none.
+        Which are places of folds, a pair of whose roots errors may have merged into none, or ends
+        beyond which errors may have moved a root.
     """
 
     roots: Array
@@ -104,6 +105,25 @@ class Outcome:
     support: tuple[float, float]
     reason: NDArray[np.uint8]
     reasons: tuple[str, ...]
+
+
+def _moved_back(
+    candidates: Candidates, outside: Flags, support: tuple[float, float]
+) -> tuple[Array, Flags]:
+    """Return roots, and which of those ``outside`` errors may have moved out of the scene's ranges.
+
+    Without them another root would be the only one. They are put at the end that they left by, one
+    at each.
+    """
+    ends = np.clip(candidates.roots, *support)
+    sd = candidates.noise
+    if candidates.model is not None:
+        sd = np.hypot(sd, candidates.model)
+    moved = outside & (np.abs(candidates.roots - ends) < NOISE_BAND * sd)
+    for end in support:
+        here = moved & (ends == end)
+        moved &= ~here | (np.cumsum(here, axis=1) == 1)
+    return np.where(moved, ends, candidates.roots), moved
 
 
 def assemble(
@@ -139,10 +159,15 @@ def assemble(
             single = ~candidates.merged
             found, physical = found & single, physical & single
             keep &= (keep & single).any(axis=1)[:, None] | single
+        places, beside = candidates.roots, candidates.near
+        moved_out = physical & ~inside & keep.any(axis=1)[:, None]
+        if moved_out.any():
+            places, moved_out = _moved_back(candidates, moved_out, outcome.support)
+            keep, beside = keep | moved_out, beside | moved_out
         count = np.count_nonzero(keep, axis=1)
         width = max(int(count.max(initial=0)), 1)
-        roots = np.where(keep, candidates.roots, np.nan)
-        linear = keep & ~candidates.near
+        roots = np.where(keep, places, np.nan)
+        linear = keep & ~beside
         noise = np.where(linear & np.isfinite(candidates.noise), candidates.noise, np.nan)
         # readings are rounded, however little noise they have
         noise = np.maximum(noise, np.finfo(float).eps * candidates.roots)
@@ -158,7 +183,7 @@ def assemble(
                 np.take_along_axis(columns, order, axis=1) for columns in (roots, sd, noise, model)
             )
     status = status_of_counts(count)
-    near = (candidates.near_frame | (keep & candidates.near).any(axis=1)) & (state == 0)
+    near = (candidates.near_frame | (keep & beside).any(axis=1)) & (state == 0)
     # the most specific reason that holds: the technique's own, then what removed its solutions
     reason = np.zeros(state.size, dtype=np.uint8)
     none = count == 0

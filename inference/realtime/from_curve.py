@@ -60,8 +60,9 @@ def candidates_of(
     sd: Array,
     bottom: Array | None = None,
     beside: Callable[[Array], Array] | None = None,
+    end_band: float = NOISE_BAND,
 ) -> tuple[Candidates, Array]:
-    """Find all roots of a curve for every frame, and folds whose roots errors may have merged.
+    """Find all roots of a curve for every frame, and where errors may have taken others away.
 
     Parameters
     ----------
@@ -76,6 +77,9 @@ def candidates_of(
     beside : callable, optional
         Ranges [m], shape (n, m) or (1, m), to standard deviations of the target, shape (n, m), by
         errors of the model beside those of the object's flux and time of flight.
+    end_band : float
+        Standard deviations within which a target beyond the curve's last value is that of an object
+        at the interval's upper end.
 
     Returns
     -------
@@ -90,7 +94,7 @@ def candidates_of(
     intervals = monotone_intervals(curve, p, 0.0, high)
     bottom = np.ones_like(top) if bottom is None else bottom
     nearest_m, farthest_m = task.known.support if task.physical else (0.0, math.inf)
-    span = Span(nearest_m / unit, min(high, farthest_m / unit), NOISE_BAND)
+    span = Span(nearest_m / unit, min(high, farthest_m / unit), NOISE_BAND, end_band)
     error = point_error(task, unit)
     errors = _at_ends(curve, p, intervals, error, None if beside is None else (beside, unit))
     step = max(_CHUNK // max(intervals.low.size, 1), 1)
@@ -139,9 +143,11 @@ def _at_ends(
     error: PointError,
     beside: tuple[Callable[[Array], Array], float] | None,
 ) -> Array:
-    """Return what errors of the model do to a curve where it turns, shape (n or 1, k, 2)."""
+    """Return what errors of the model do to a curve at turns and its end, (n or 1, k, 2)."""
+    high = intervals.turns_high.copy()
+    high[-1] |= high.size > 1  # where there is one interval alone, nothing is asked of its end
     ends = np.where(
-        np.column_stack([intervals.turns_low, intervals.turns_high]),
+        np.column_stack([intervals.turns_low, high]),
         np.column_stack([intervals.low, intervals.high]),
         np.nan,
     ).reshape(1, -1)

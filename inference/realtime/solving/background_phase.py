@@ -24,7 +24,7 @@ from inference.realtime.solving.known_background import Found, KnownBackground
 from simulator.background import shadow, shadow_slope
 from simulator.compiled import compiled
 
-__all__ = ["Phase", "solve_phase"]
+__all__ = ["End", "Phase", "solve_phase"]
 
 
 class Phase(NamedTuple):
@@ -41,6 +41,25 @@ class Phase(NamedTuple):
     wave: float
     offset: float
     far: float
+
+
+class End(NamedTuple):
+    """What may have moved a root beyond the background, where the search ends.
+
+    Attributes
+    ----------
+    band : float
+        Standard deviations within which a frame is that of an object there.
+    late : float
+        Standard deviation of the object's phase by errors of the model [rad].
+    shadow : float
+        That of the readings across the background's direction by errors of the shadow, in units of
+        its strength.
+    """
+
+    band: float
+    late: float
+    shadow: float
 
 
 @compiled
@@ -105,7 +124,38 @@ def _reach(
 
 
 @compiled
-def solve_phase(net: Net, back: KnownBackground, phase: Phase, band: float, found: Found) -> None:
+def _left(
+    before: float,
+    at_end: float,
+    frame: ScaledFrame,
+    far: Direction,
+    back: KnownBackground,
+    end: End,
+) -> bool:
+    """Say whether errors may have moved a root beyond the background.
+
+    Parameters
+    ----------
+    before, at_end : float
+        theta where the last interval begins, and at the background.
+    """
+    # an even multiple of pi, of light that is not negative
+    gap = 2.0 * math.pi * math.floor(at_end / (2.0 * math.pi) + 0.5) - at_end
+    if not gap * (at_end - before) > 0.0:
+        return False  # that root lies before the background
+    hidden = frame.b * shadow(back.distance, back.c0, back.c1)
+    x, y = frame.x - hidden * far.cosine, frame.y - hidden * far.sine
+    flux = x * far.cosine + y * far.sine
+    if flux < -end.band * _spread(Direction(-far.sine, far.cosine), frame):
+        return False  # a negative object beyond any noise
+    across = math.hypot(_spread(far, frame), end.late * flux)
+    return abs(y * far.cosine - x * far.sine) < end.band * math.hypot(across, end.shadow * frame.b)
+
+
+@compiled
+def solve_phase(
+    net: Net, back: KnownBackground, phase: Phase, band: float, end: End, found: Found
+) -> None:
     """Find all roots of every frame with an object that is not negative beyond noise.
 
     Parameters
@@ -118,8 +168,11 @@ def solve_phase(net: Net, back: KnownBackground, phase: Phase, band: float, foun
         Wave number and phases.
     band : float
         Standard deviations that count as within the noise.
+    end : End
+        What may have moved a root beyond the background.
     found : Found
-        Receives the results.
+        Receives the results; beside a root the background's own place, without a standard
+        deviation, where another may have been moved beyond it.
     """
     k = phase.wave
     angle = phase.far + phase.offset
@@ -173,3 +226,6 @@ def solve_phase(net: Net, back: KnownBackground, phase: Phase, band: float, foun
                 )
                 if gap * _length(high, frame, far, back) < band * _spread(there, frame):
                     found.near_frame[i] = True
+            elif 0 < roots < found.roots.shape[1] and _left(left, right, frame, far, back, end):
+                found.roots[i, roots], found.late[i, roots] = back.distance, 0.0
+                found.near[i, roots], found.physical[i, roots] = True, True

@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 
 @compiled
 def _capacity(intervals: MonotoneIntervals, period: float) -> int:
-    """Return the largest possible number of roots and folds of one frame."""
-    total = 0
+    """Return the largest possible number of roots, folds and ends of one frame."""
+    total = int(intervals.low.size > 1)
     for j in range(intervals.low.size):
         total += 1 + int(_own_fold(intervals, j)) + int(intervals.turns_high[j])
         if period > 0.0:
@@ -66,7 +66,10 @@ def invert(
     span: Span,
     errors: Array,
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Find all roots of value(u) = top / bottom, and folds whose roots errors may have merged.
+    """Find all roots of value(u) = top / bottom, and where errors may have taken others away.
+
+    Errors merge a pair of roots at a fold, and move one beyond the end of the last interval. These
+    places are listed among the roots: an end only beside a root, which it is not the only one of.
 
     Parameters
     ----------
@@ -92,7 +95,8 @@ def invert(
     roots : ndarray, shape (n, m)
         nan-padded, in the order in which they are found.
     slopes : ndarray, shape (n, m)
-        d value / du at the roots; 0 at a fold that the target misses by less than ``span.band``.
+        d value / du at the roots; 0 at a fold that the target misses by less than ``span.band``,
+        and at an end that it misses by less than ``span.end_band``.
     gaps : ndarray, shape (n, m)
         Distance of the target from the nearer turning value of the root's interval, inf without.
     nearest : ndarray, shape (n,)
@@ -161,4 +165,13 @@ def invert(
                 if 0.0 < beyond < span.band * by_high and found < m:
                     roots[i, found], slopes[i, found], gaps[i, found] = high, 0.0, 0.0
                     found += 1
+        # last is a root's place: there is one
+        if last > 0.0 and k > 1 and not intervals.turns_high[k - 1] and found < m:
+            at_end = intervals.at_high[k - 1]
+            beyond = _beyond(at_end, intervals.at_low[k - 1], target, period)
+            by_end = math.hypot(sd[i], errors[row, k - 1, 1])
+            if 0.0 < beyond < span.end_band * by_end:
+                roots[i, found], slopes[i, found] = intervals.high[k - 1], 0.0
+                gaps[i, found] = 0.0
+                found += 1
     return roots, slopes, gaps, nearest, reaches

@@ -30,11 +30,14 @@ class Span(NamedTuple):
         The ranges [the curve's unit of length]; ``high`` may be infinite.
     band : float
         Standard deviations of the target; 0 where none is asked for.
+    end_band : float
+        Those within which a target beyond the curve's last value is that of an object at its end.
     """
 
     low: float
     high: float
     band: float
+    end_band: float = 0.0
 
 
 @compiled

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.realtime.assemble import NOISE_BAND, Outcome, assemble, reasons_of
+from inference.realtime.assemble import END_BAND, NOISE_BAND, Outcome, assemble, reasons_of
 from inference.realtime.from_curve import candidates_of, curve_parameters
 from inference.realtime.model_error import model_error_of, point_error, sd_of_roots
 from inference.realtime.net import UNREPRESENTABLE, Form, Net, known_net_readings
@@ -122,7 +122,10 @@ def _solve(task: Task) -> TechniqueResult:
         beside = None
         if model_error_of(task).shadow > 0:
             beside = functools.partial(_by_shadow, task, parts.whole * scale, scale)
-        candidates, slopes = candidates_of(task, curve, distance, target, sd, beside=beside)
+        # what frames of the bare background read is at the end: not seldom, and far from the rest
+        candidates, slopes = candidates_of(
+            task, curve, distance, target, sd, beside=beside, end_band=END_BAND
+        )
         physical = None
         if task.physical and known.has("background.strength"):
             scene = _Scene(
@@ -194,8 +197,8 @@ def _physical(
     """Say at which roots the background is between nothing and its strength, within its errors.
 
     The background is whole - C Phi(r), with C = 1 or cos k (R - r), and its first-order error
-    d whole - (C Phi)' d free / free'(r). Errors of the model move r by ``by_model``. At a fold the
-    slope is 0, and any background is possible.
+    d whole - (C Phi)' d free / free'(r). Errors of the model move r by ``by_model``. At a fold or
+    an end the slope is 0, and any background is possible.
     """
     n, m = roots.shape
     accepted = np.zeros((n, m), dtype=np.bool_)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
 from inference.realtime.assemble import (
+    END_BAND,
     NEGATIVE,
     NOISE_BAND,
     Candidates,
@@ -19,7 +20,7 @@ from inference.realtime.model_error import model_error_of
 from inference.realtime.nearest_roots import nearest
 from inference.realtime.net import Net, known_net_readings
 from inference.realtime.solving.background_balance import solve_balance
-from inference.realtime.solving.background_phase import Phase, solve_phase
+from inference.realtime.solving.background_phase import End, Phase, solve_phase
 from inference.realtime.solving.exact import cycles_phase
 from inference.realtime.solving.known_background import Found, KnownBackground
 from inference.realtime.solving.pulse_ratio import CONTRADICTED
@@ -61,9 +62,9 @@ def _solve(task: Task) -> TechniqueResult:
     width = 3
     if isinstance(sensor, SineWaveSensor):
         width = int(sensor.wave_number * unit * background.distance / math.pi) + 12
-    step = max(_CHUNK // width, 1)
+    end, step = _end_of(task, background, unit), max(_CHUNK // width, 1)
     parts = [
-        _part(sensor, net.select(slice(i, i + step)), background, unit, width)
+        _part(sensor, net.select(slice(i, i + step)), background, unit, width, end)
         for i in range(0, n, step)
     ]
     roots, sds, late, near, near_frame, physical = zip(*parts, strict=True)
@@ -79,6 +80,7 @@ def _solve(task: Task) -> TechniqueResult:
             stacked(near),
             np.concatenate(near_frame),
             model=np.abs(model) if error.range_m > 0 or error.shadow > 0 else None,
+            merged=np.isnan(stacked(sds)) & stacked(near),
         )
     if isinstance(sensor, PulsedSensor):
         reason = np.full(n, _BEYOND)
@@ -93,6 +95,18 @@ def _solve(task: Task) -> TechniqueResult:
         stacked(physical) if task.physical else None, support, reason.astype(np.uint8), _REASONS
     )
     return assemble("background_intensity", net.state, candidates, outcome)
+
+
+def _end_of(task: Task, far: KnownBackground, unit: float) -> End | None:
+    """Return what may have moved a root beyond the background; of a pulse it is the only one."""
+    sensor, error = task.sensor, model_error_of(task)
+    if isinstance(sensor, PulsedSensor):
+        return None
+    seen = shadows(np.array([far.distance]), far.c0, far.c1)
+    turned = sensor.wave_number * far.distance * unit * shadow_errors(seen)[1]
+    return End(
+        END_BAND, sensor.wave_number * error.range_m, float((error.shadow * seen * turned)[0])
+    )
 
 
 def _moved_by_shadow(
@@ -120,9 +134,11 @@ def _moved_by_shadow(
     return np.asarray(seen * np.hypot(across * by_light, turned * by_distance) / np.abs(steep))
 
 
-def _part(sensor: Sensor, net: Net, background: KnownBackground, unit: float, width: int) -> Found:
+def _part(
+    sensor: Sensor, net: Net, background: KnownBackground, unit: float, width: int, end: End | None
+) -> Found:
     """Solve some of the frames, and widen the standard deviations that noise bends."""
-    found = _solved(sensor, net, background, unit, width)
+    found = _solved(sensor, net, background, unit, width, end)
     with np.errstate(invalid="ignore"):
         bent = np.flatnonzero((found.sds > _SMALL * found.roots).any(axis=1))
     if not bent.size:
@@ -134,7 +150,7 @@ def _part(sensor: Sensor, net: Net, background: KnownBackground, unit: float, wi
         moves = np.zeros_like(roots)
         for side in (-NOISE_BAND, NOISE_BAND):
             moved = some._replace(first=some.first + side * d1, second=some.second + side * d2)
-            others = _solved(sensor, moved, background, unit, width).roots
+            others = _solved(sensor, moved, background, unit, width, end).roots
             moves = np.fmax(moves, _move(roots, others, background.distance))
         square += (moves / NOISE_BAND) ** 2
     found.sds[bent] = np.maximum(found.sds[bent], np.sqrt(square))
@@ -157,7 +173,7 @@ def _move(roots: Array, others: Array, distance: float) -> Array:
 
 
 def _solved(
-    sensor: Sensor, net: Net, background: KnownBackground, unit: float, width: int
+    sensor: Sensor, net: Net, background: KnownBackground, unit: float, width: int, end: End | None
 ) -> Found:
     """Solve some of the frames, and drop the columns that none of them uses."""
     n = net.first.size
@@ -169,15 +185,15 @@ def _solved(
         near_frame=np.zeros(n, np.bool_),
         physical=np.zeros((n, width), np.bool_),
     )
-    if isinstance(sensor, PulsedSensor):
-        solve_balance(net, background, sensor.r0 / unit, NOISE_BAND, found)
+    if isinstance(sensor, PulsedSensor) or end is None:
+        solve_balance(net, background, sensor.max_range_m / unit, NOISE_BAND, found)
     else:
         phase = Phase(
             wave=sensor.wave_number * unit,
             offset=sensor.known_phase_rad,
             far=cycles_phase(sensor.frequency_hz, background.distance * unit),
         )
-        solve_phase(net, background, phase, NOISE_BAND, found)
+        solve_phase(net, background, phase, NOISE_BAND, end, found)
     used = max(int(np.count_nonzero(np.isfinite(found.roots).any(axis=0))), 1)
     return Found(
         found.roots[:, :used],
