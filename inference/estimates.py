@@ -76,7 +76,8 @@ class TechniqueResult:
     sd_parts_m : SdParts, optional
         Their parts; without meaning where the whole is nan.
     range_bounds_m : ndarray, shape (n, 2), optional
-        Bounds where the object is unknown (differential) [m], nan where there are none.
+        Bounds where the object is unknown (differential) [m], which hold noise of two standard
+        deviations, nan where there are none.
     power_law, power_law_sd, zeta, zeta_sd : ndarray, shape (n,), optional
         Exponent b of Phi ~ r^b and distortion 1 + 1/b with their standard deviations, nan where
         unavailable; only of techniques that see motion.

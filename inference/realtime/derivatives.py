@@ -18,7 +18,7 @@ from simulator.errors import InvalidInputError
 from simulator.frames import Frames, check_increasing
 from simulator.sensor import Sensor
 
-__all__ = ["DERIVATIVE_REASONS", "LONELY", "UNEVEN_GAIN", "derivatives_of"]
+__all__ = ["DERIVATIVE_REASONS", "DROWNED_CHANGE", "LONELY", "UNEVEN_GAIN", "derivatives_of"]
 
 Array = NDArray[np.float64]
 

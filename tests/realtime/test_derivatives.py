@@ -236,7 +236,8 @@ def test_an_unknown_object_has_bounds_and_no_answer(sensor: Sensor) -> None:
     bounds = result.range_bounds_m
     assert bounds is not None
     assert ((bounds[:, 0] <= r) & (r <= bounds[:, 1])).all()
-    assert (bounds[:, 1] / bounds[:, 0] <= 0.754 / 0.485 + 1e-9).all()
+    # what the window errs by is of the noise, here the most of it
+    assert (bounds[:, 1] / bounds[:, 0] <= 1.001 * 0.754 / 0.485).all()
 
 
 def test_power_law_and_zeta_of_motion() -> None:

@@ -135,13 +135,18 @@ def test_the_noise_of_readings_is_part_of_the_distortion() -> None:
 
 
 def test_bounds_of_an_unknown_object_are_those_of_its_distortion() -> None:
-    """zeta lies in 0.485 to 0.754 for s >= -0.648; the range is r0 w1' / w2' over it (4.66)."""
+    """zeta lies in 0.485 to 0.754 for s >= -0.648; the range is r0 w1' / w2' over it (4.66).
+
+    Two standard deviations of noise besides, of first order: of the second the square of 5e-11.
+    """
     sensor = pulsed(1e-9, derivative=[1e-12, 1e-12])
     frames = Frames(np.array([[1.0, 2.0]]), derivatives=np.array([[0.02, 0.5]]))
     (found,) = estimate(sensor, parse_scene({"discrepancy": 0}), frames, ["differential"]).results
     assert found.range_bounds_m is not None
     ratio = sensor.r0 * 0.02 / 0.5
-    np.testing.assert_allclose(found.range_bounds_m, [[ratio / 0.754, ratio / 0.485]], rtol=1e-12)
+    noise = 2 * sensor.r0 * 1e-12 / 0.5 * np.hypot(1.0, 0.02 / 0.5)
+    expected = [[(ratio - noise) / 0.754, (ratio + noise) / 0.485]]
+    np.testing.assert_allclose(found.range_bounds_m, expected, rtol=1e-14)
 
 
 @pytest.mark.parametrize("at", range(5))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from simulator.compiled import compiled
 
-__all__ = ["FEW", "ratio_reach", "ratio_reaches"]
+__all__ = ["FEW", "ratio_ends", "ratio_reach", "ratio_reaches"]
 
 Array = NDArray[np.float64]
 
@@ -29,11 +29,12 @@ def _ends(
     determinant: float,
     bottom: float,
     top: float,
+    band: float,
 ) -> tuple[float, float]:
-    """Return the ends of the ratios s that noise of three standard deviations explains.
+    """Return the ends of the ratios s that noise of ``band`` standard deviations explains.
 
-    Those with ``(x - s y)² <= 9 (var1 - 2 s cov + s² var2)`` (Fieller 1954), which go on for ever
-    where y is within its noise of zero.
+    Those with ``(x - s y)² <= band² (var1 - 2 s cov + s² var2)`` (Fieller 1954), which go on for
+    ever where y is within its noise of zero.
 
     Parameters
     ----------
@@ -43,8 +44,10 @@ def _ends(
         Covariance of their noise in these units, and its determinant.
     bottom, top : float
         Between which a ratio lies.
+    band : float
+        Standard deviations.
     """
-    few = _BAND * _BAND
+    few = band * band
     left, middle = 1.0 - few * var2, ratio - few * cov
     rest = ratio * ratio - few * var1
     first = var1 - 2.0 * ratio * cov + ratio * ratio * var2
@@ -87,7 +90,7 @@ def ratio_reach(
     share = late / whole
     own1, own2, shared = own1 / whole / whole, own2 / whole / whole, shared / whole / whole
     determinant = own1 * own2 + shared * (own1 + own2)
-    low, high = _ends(share, own1 + shared, shared, own2 + shared, determinant, 0.0, end)
+    low, high = _ends(share, own1 + shared, shared, own2 + shared, determinant, 0.0, end, _BAND)
     return max(min(high, end) - share, share - max(low, 0.0), 0.0) / _BAND
 
 
@@ -115,6 +118,41 @@ def ratio_reaches(x: Array, y: Array, var1: Array, cov: Array, var2: Array) -> A
         if math.isnan(a + b + c):
             reaches[i] = math.nan
             continue
-        low, high = _ends(ratio, a, b, c, max(a * c - b * b, 0.0), -math.inf, math.inf)
+        low, high = _ends(ratio, a, b, c, max(a * c - b * b, 0.0), -math.inf, math.inf, _BAND)
         reaches[i] = max(high - ratio, ratio - low) / _BAND
     return reaches
+
+
+@compiled
+def ratio_ends(
+    x: Array, y: Array, var1: Array, cov: Array, var2: Array, band: float
+) -> tuple[Array, Array]:
+    """Return between which ratios x / y lie, if noise is below a number of standard deviations.
+
+    Parameters
+    ----------
+    x, y, var1, cov, var2 : ndarray, shape (n,)
+        As of `ratio_reaches`.
+    band : float
+        Standard deviations.
+
+    Returns
+    -------
+    low, high : ndarray, shape (n,)
+        [1]; infinite where y may be zero, and nan where it is, or where the noise is not known.
+    """
+    lows, highs = np.full(x.size, np.nan), np.full(x.size, np.nan)
+    for i in range(x.size):
+        if not abs(y[i]) > 0.0:
+            continue
+        ratio = x[i] / y[i]
+        a, b, c = var1[i] / y[i] / y[i], cov[i] / y[i] / y[i], var2[i] / y[i] / y[i]
+        if math.isnan(a + b + c):
+            continue
+        if a == 0.0 and c == 0.0:
+            lows[i], highs[i] = ratio, ratio
+            continue
+        determinant = max(a * c - b * b, 0.0)
+        low, high = _ends(ratio, a, b, c, determinant, -math.inf, math.inf, band)
+        lows[i], highs[i] = min(low, ratio), max(high, ratio)
+    return lows, highs

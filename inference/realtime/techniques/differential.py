@@ -15,12 +15,13 @@ from inference.realtime.assemble import (
     assemble,
     reasons_of,
 )
-from inference.realtime.derivatives import DERIVATIVE_REASONS, derivatives_of
+from inference.realtime.derivatives import DERIVATIVE_REASONS, DROWNED_CHANGE, derivatives_of
 from inference.realtime.from_curve import candidates_of
 from inference.realtime.model_error import model_error_of
 from inference.realtime.motion import MotionLaw, law_of_model, law_of_motion
 from inference.realtime.net import Net, net_readings
 from inference.realtime.phase_reach import phase_reach
+from inference.realtime.range_bounds import Bounds, bounds_of
 from inference.realtime.solving.curves import differential_phase, differential_ratio
 from inference.realtime.solving.ratio_reach import FEW, ratio_reaches
 from inference.technique import Task, Technique
@@ -38,17 +39,18 @@ __all__ = [
 Array = NDArray[np.float64]
 
 OWN = len(reasons_of())
-# zeta of objects with c1 >= -0.648 sqrt(c0), all of Appendix B (docs/model.md, eq-4-19)
-_LEAST, _MOST = 0.485, 0.754
 _REASONS = reasons_of(
     *DERIVATIVE_REASONS,
     "the readings do not change",
     "the derivatives point below zero range within their noise: at or near contact",
     "no range has derivatives of this direction",
-    "c0 and c1 are not known: the range lies between the bounds, if c1 >= 0",
+    "c0 and c1 are not known: the range lies between the bounds, which noise of two standard "
+    "deviations does not pass, if c1 >= 0",
+    "c0 and c1 are not known: the range lies between the bounds, if c1 >= 0 and the derivatives, "
+    "whose noise is not stated, have none",
 )
 STILL, CONTACT, NO_RANGE = (OWN + len(DERIVATIVE_REASONS) + i for i in range(3))
-_BOUNDS = NO_RANGE + 1
+_BOUNDS, _EXACT = NO_RANGE + 1, NO_RANGE + 2
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -181,11 +183,15 @@ def ranges_by_derivatives(task: Task, uneven_too: bool) -> TechniqueResult:
     else:
         nothing = np.full((targets.top.size, 1), np.nan)
         candidates = _without_folds(nothing, nothing)
-        bounds = _bounds(task, targets, high)
+        bounds = bounds_of(
+            task, (targets.top, targets.bottom, targets.sd), rate, targets.contact, high
+        )
     if task.physical and not pulsed:
         candidates.roots[targets.contact] = np.nan
     reason = np.where(targets.contact, CONTACT, NO_RANGE)
     reason[targets.still] = STILL
+    if bounds is not None:
+        reason[bounds.open] = OWN + DROWNED_CHANGE
     support = known.support if task.physical else (0.0, np.inf)
     outcome = Outcome(None, support, reason.astype(np.uint8), _REASONS)
     result = assemble("differential", rate.state, candidates, outcome)
@@ -216,48 +222,19 @@ def _without_folds(roots: Array, sd: Array) -> Candidates:
     return Candidates(roots, sd, np.zeros((n, m), np.bool_), np.zeros(n, np.bool_))
 
 
-def _bounds(task: Task, targets: Targets, high: float) -> tuple[Array, Array]:
-    """Bounds of the range for objects whose zeta lies within `_LEAST` and `_MOST`, each (n,)."""
-    with np.errstate(all="ignore"):
-        if isinstance(task.sensor, PulsedSensor):
-            q = targets.top / targets.bottom
-            near, far = q / _MOST, q / _LEAST
-        else:
-            # exactly: psi = k r - atan(k r / N) with N = 1 / (1 - zeta)
-            k = task.sensor.wave_number
-            near, far = (_turn_of(targets.top, 1.0 / (1.0 - z)) / k for z in (_MOST, _LEAST))
-        far = np.minimum(far, high)
-        good = (near > 0) & (near <= far)
-        if task.physical:
-            good &= ~targets.contact
-    return np.where(good, near, np.nan), np.where(good, far, np.nan)
-
-
-def _turn_of(psi: Array, power: float) -> Array:
-    """Solve x - atan(x / N) = psi for x in (psi, psi + pi/2) by bisection: the left increases."""
-    low, high = psi.copy(), psi + 0.5 * math.pi
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        below = middle - np.arctan(middle / power) < psi
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    # near zero the bisection is absolute; one Newton step makes it relative
-    x = 0.5 * (low + high)
-    small = psi < 1e-6
-    return np.where(small, psi * power / (power - 1.0), x)
-
-
 def _bounded(
-    result: TechniqueResult, bounds: tuple[Array, Array], support: tuple[float, float]
+    result: TechniqueResult, bounds: Bounds, support: tuple[float, float]
 ) -> TechniqueResult:
     """Answer with bounds: ambiguous where there are any, of the ranges that the scene allows."""
-    (near, far), (nearest, farthest) = bounds, support
+    nearest, farthest = support
     with np.errstate(invalid="ignore"):
-        low, high = np.maximum(near, nearest), np.minimum(far, farthest)
+        low, high = np.maximum(bounds.near, nearest), np.minimum(bounds.far, farthest)
         inside = (low <= high) & ((result.reason == 0) | (result.reason >= OWN))
         inside &= result.status == Status.NONE
     cut = np.where(inside[:, None], np.column_stack([low, high]), np.nan)
     status = np.where(inside, Status.AMBIGUOUS, result.status).astype(np.uint8)
-    reason = np.where(inside, _BOUNDS, result.reason).astype(np.uint8)
+    said = np.where(bounds.exact, _EXACT, _BOUNDS)
+    reason = np.where(inside, said, result.reason).astype(np.uint8)
     return dataclasses.replace(result, status=status, reason=reason, range_bounds_m=cut)
 
 
