@@ -73,8 +73,9 @@ def bounds_of(
     with np.errstate(all="ignore"):
         q = top / bottom
         if isinstance(task.sensor, PulsedSensor):
-            noise = (rate.var1, rate.cov, rate.var2)
-            low, up = ratio_ends(rate.first, rate.second, *noise, _COVERED)
+            # copied, so that the machine code is one, however columns lie in memory
+            own = rate.select(np.arange(q.size))
+            low, up = ratio_ends(own.first, own.second, own.var1, own.cov, own.var2, _COVERED)
             exact = np.isnan(low)
             low, up = (np.where(exact | np.isnan(q), q, task.sensor.r0 * end) for end in (low, up))
             near, far = np.maximum(low, 0.0) / _MOST, up / _LEAST
