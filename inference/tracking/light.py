@@ -14,9 +14,8 @@ from simulator.compiled import compiled
 
 __all__ = ["noise_at_light"]
 
-# the first finds the light by the noise of the prior's mean, the second weighs it beside its own,
-# the third is for noise much like what is open
-_STEPS = 3
+# the first finds the light by the noise of the prior's mean, the second weighs it beside its own
+_STEPS = 2
 
 
 @compiled
