@@ -17,9 +17,10 @@ from inference.tracking.hypotheses import (
     learns_crosstalk,
     log_of,
 )
+from inference.tracking.light import noise_at_light
 from inference.tracking.motion import Rules
 from inference.tracking.outliers import log_outlier
-from inference.tracking.readings_table import FIRST, SECOND, ReadingsTable, noise_root
+from inference.tracking.readings_table import FIRST, SECOND, ReadingsTable
 from inference.tracking.roots import UNIT, Root, add_factor, solve
 from inference.tracking.square_root import Linear, update
 from simulator.compiled import compiled
@@ -83,9 +84,13 @@ def expect_empty(
     m2 = gain * empty[SECOND, 0] + table.crosstalk2
     if learns:
         m1, m2 = m1 + x[0, CROSSTALK1], m2 + x[0, CROSSTALK2]
+    e1, e2 = frame.first - m1, frame.second - m2
     noise = UNIT
     if not table.noise.plain and not table.by_rate:
-        noise = noise_root(m1, m2, 0.0, 0.0, table.noise)
+        unknown = Root(0.0, 0.0, 0.0)
+        for j in range(n if learns else 0):
+            unknown = add_factor(unknown, X[0, CROSSTALK1, j], X[0, CROSSTALK2, j])
+        noise = noise_at_light((m1, m2), (0.0, 0.0), (e1, e2), unknown, table.noise)
     root = noise
     for j in range(m):
         f1, f2 = 0.0, 0.0
@@ -96,7 +101,6 @@ def expect_empty(
             nuisance[FIRST, j - n], nuisance[SECOND, j - n] = g1, g2
             f1, f2 = f1 + g1, f2 + g2
         root = add_factor(root, f1, f2)
-    e1, e2 = frame.first - m1, frame.second - m2
     pull1, pull2 = solve(root, e1, e2)
     surprise = e1 * pull1 + e2 * pull2
     log_density = -0.5 * surprise - math.log(root.r11 * root.r22)

@@ -119,7 +119,7 @@ def run_filter(
             own = min(surprise, rules.most_surprise) / model.table.channels
             numbers[RUNNING] += (1.0 - rules.memory) * (own - numbers[RUNNING])
             numbers[ROUGHNESS] += (min(own, 1.0) - numbers[ROUGHNESS]) / _LATE
-        report(out, rows, i, of, rules)
+        report(out, rows, i, of, rules, model.table)
         told_empty = kinds[i] == EMPTY or kinds[i] == EMPTY_SATURATED
         usual = 1.0 - outlier if kinds[i] == USABLE else 0.0
         least = least_present(of, frame, model.table, usual, told_empty)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from inference.tracking.borrowed import borrowed
 from inference.tracking.hypotheses import CROSSTALK1, CROSSTALK2, WITHOUT_CROSSTALK, U
+from inference.tracking.light import noise_at_light
 from inference.tracking.readings_table import (
     FIRST,
     LOG_PRIOR,
@@ -15,7 +16,6 @@ from inference.tracking.readings_table import (
     ReadingsTable,
     cell_of,
     mean_at,
-    noise_root,
     nuisance_at,
     nuisance_count,
     nuisance_root,
@@ -287,7 +287,9 @@ def log_density(u: float, frame: TrackedFrame, prior: Prior, table: ReadingsTabl
         e2 = frame.second - m2 - added.slope2 * away
         if not table.noise.plain:
             o1, o2 = object_at(u, table)
-            root = noise_root(m1, m2, o1 * frame.gain, o2 * frame.gain, table.noise)
+            mean = m1 + added.slope1 * away, m2 + added.slope2 * away
+            signal = o1 * frame.gain, o2 * frame.gain
+            root = noise_at_light(mean, signal, (e1, e2), added.own, table.noise)
         if position.born and nuisance_count(table) > 0:
             root = _add_at(root, u, frame.gain, added, table)
         elif added.root.r11 > 0.0 or added.root.r22 > 0.0:

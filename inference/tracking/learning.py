@@ -19,6 +19,7 @@ from inference.tracking.hypotheses import (
     variance_of,
 )
 from inference.tracking.known_range import take_known
+from inference.tracking.light import noise_at_light
 from inference.tracking.mode_refinement import bends
 from inference.tracking.readings_table import (
     FIRST,
@@ -26,7 +27,6 @@ from inference.tracking.readings_table import (
     ReadingsTable,
     cell_of,
     mean_at,
-    noise_root,
     nuisance_at,
     object_at,
 )
@@ -88,14 +88,17 @@ def _of_derivatives(
 @borrowed
 @compiled
 def _noise_of(
-    of: Hypotheses, tangent: Tangent, gain: float, prior: Prior, table: ReadingsTable
+    of: Hypotheses, tangent: Tangent, frame: TrackedFrame, prior: Prior, table: ReadingsTable
 ) -> Root:
     """Return the root of the covariance of a frame's own errors at a mode."""
-    t, noise = tangent, UNIT
+    t, noise, gain, added = tangent, UNIT, frame.gain, prior.added
     if not table.noise.plain:
-        m1, m2 = t.value1 + prior.added.offset1, t.value2 + prior.added.offset2
+        away = 0.0 if prior.position.born else t.u - prior.position.centre
+        m1 = t.value1 + added.offset1 + added.slope1 * away
+        m2 = t.value2 + added.offset2 + added.slope2 * away
         o1, o2 = object_at(t.u, table)
-        noise = noise_root(m1, m2, gain * o1, gain * o2, table.noise)
+        residual = frame.first - m1, frame.second - m2
+        noise = noise_at_light((m1, m2), (gain * o1, gain * o2), residual, added.own, table.noise)
     if learns_crosstalk(of) and not prior.position.born:
         noise = add_products(noise, t.u, gain, math.sqrt(1.0 / prior.position.precision), table)
     return noise
@@ -191,7 +194,7 @@ def learn(
     at = u if position.born else position.centre + (1.0 - prior.share) * (u - position.centre)
     value1, value2, d1, d2 = mean_at(at, table)
     tangent = Tangent(u, at, gain * value1, gain * value2, gain * d1, gain * d2)
-    noise = UNIT if table.by_rate else _noise_of(of, tangent, gain, prior, table)
+    noise = UNIT if table.by_rate else _noise_of(of, tangent, frame, prior, table)
     shares = learns_crosstalk(of) and not position.born
     shared = NOT_SHARED
     if shares:

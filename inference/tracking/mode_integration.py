@@ -176,6 +176,17 @@ def _fades(mode: PeakedMode, frame: TrackedFrame, prior: Prior, table: ReadingsT
 
 
 @compiled
+def _spills(mode: PeakedMode, prior: Prior) -> bool:
+    """Tell whether a mode of an object that may be anywhere is cut off before its parabola ends.
+
+    Its light drowns in the noise, or is the crosstalk's as well: the density is flat as far as the
+    ranges go, and the parabola would reach far beyond them.
+    """
+    reach = _ROOT3 * mode.scale
+    return prior.position.born and (mode.u - reach < mode.low or mode.u + reach > mode.high)
+
+
+@compiled
 def integrate(
     to: TrackCandidates,
     count: int,
@@ -221,7 +232,7 @@ def integrate(
     once = prior.position.born and not prior.position.again
     shared = prior.added.spread.shape[1] > WITHOUT_CROSSTALK
     if shared and not once and not _by_noise(u, _FAINT, frame, prior, table):
-        if _fades(mode, frame, prior, table):
+        if _spills(mode, prior) or _fades(mode, frame, prior, table):
             return _divide(to, count, parent, mode, frame, prior, table, nodes)
         if not prior.position.born and bends(prior.added.spread.shape[0], table):
             u, scale, top = refined(mode, frame, prior, table)

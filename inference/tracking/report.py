@@ -1,6 +1,7 @@
 """What the filter says of a frame."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from inference.tracking.hypotheses import (
     learns_crosstalk,
 )
 from inference.tracking.motion import Rules
+from inference.tracking.readings_table import ReadingsTable
 from simulator.compiled import compiled
 
 __all__ = [
@@ -53,10 +55,23 @@ CROSSTALK, UNSTEADY_MEAN, LASTING, OUTLIERS_RUN, STUCK, REPORT_COLUMNS = 12, 16,
 # given that an object is there)
 POSITION, SD, SCENE_SD, MODEL_SD, RATE, RATE_SD, WEIGHT, HYPOTHESIS_COLUMNS = range(8)
 _UNIQUE, _AMBIGUOUS, _NONE = int(Status.UNIQUE), int(Status.AMBIGUOUS), int(Status.NONE)
+_ROOT_12 = math.sqrt(12.0)
+# times as broad as the heaviest member of a group that another one may be
+_BROADER = 10.0
+
+
+class _Group(NamedTuple):
+    """Hypotheses that are one range."""
+
+    weight: float  # of all of them; negative where it is not one
+    seed: int  # the heaviest
+    # where they begin and end, those between that are far broader left out
+    first: int
+    last: int
 
 
 @compiled
-def _describe(row: Array, of: Hypotheses, j: int, from_scene: int) -> None:
+def _describe(row: Array, of: Hypotheses, j: int, from_scene: int, table: ReadingsTable) -> None:
     """Fill one row of the hypotheses."""
     x, X = of.x, of.X
     own, scene, model, rate = 0.0, 0.0, 0.0, 0.0
@@ -69,24 +84,65 @@ def _describe(row: Array, of: Hypotheses, j: int, from_scene: int) -> None:
             scene += square
         own += square
         rate += X[j, V, k] * X[j, V, k]
-    row[POSITION], row[SD] = x[j, U], math.sqrt(own)
-    row[SCENE_SD], row[MODEL_SD] = math.sqrt(scene), math.sqrt(model)
+    # no range is beyond the support, and none is less known than anywhere within it
+    row[POSITION] = min(max(x[j, U], table.start), table.end)
+    most = (table.end - table.start) / _ROOT_12
+    cut = min(1.0, most / math.sqrt(own)) if own > 0.0 else 1.0
+    row[SD] = cut * math.sqrt(own)
+    row[SCENE_SD], row[MODEL_SD] = cut * math.sqrt(scene), cut * math.sqrt(model)
     row[RATE], row[RATE_SD], row[WEIGHT] = x[j, V], math.sqrt(rate), of.weight[j]
 
 
 @compiled
-def _pool(out: Array, rows: Array, i: int, first: int, last: int, total: float) -> None:
+def _belongs(rows: Array, j: int, seed: int) -> bool:
+    """Tell whether a hypothesis is narrow enough to be one range with a heavier one."""
+    return bool(rows[j, SD] <= _BROADER * rows[seed, SD])
+
+
+@compiled
+def _around(rows: Array, count: int, seed: int) -> _Group:
+    """Return the range around a hypothesis: neighbours that overlap are one.
+
+    A mean is never taken over two that do not, nor with one that is far broader: however light, it
+    would be all of the standard deviation. Of a range whose heaviest member is another the weight
+    is negative.
+    """
+    weight, heaviest = rows[seed, WEIGHT], rows[seed, WEIGHT]
+    first, last = seed, seed
+    for side in range(2):
+        end, step = (-1, -1) if side == 0 else (count, 1)
+        at = seed
+        for j in range(seed + step, end, step):
+            if not _belongs(rows, j, seed):
+                continue
+            gap = abs(rows[j, POSITION] - rows[at, POSITION])
+            if gap > rows[j, SD] + rows[at, SD]:
+                break
+            if rows[j, WEIGHT] > heaviest:
+                return _Group(-1.0, seed, seed, seed)
+            weight += rows[j, WEIGHT]
+            first, last, at = min(first, j), max(last, j), j
+    return _Group(weight, seed, first, last)
+
+
+@compiled
+def _pool(out: Array, rows: Array, i: int, group: _Group) -> None:
     """Fill the mean and standard deviations of a group of hypotheses."""
     u, scene, model, rate = 0.0, 0.0, 0.0, 0.0
-    for j in range(first, last):
+    total, seed = group.weight, group.seed
+    for j in range(group.first, group.last + 1):
+        if not _belongs(rows[i], j, seed):
+            continue
         share = rows[i, j, WEIGHT] / total
-        u += share * (rows[i, j, POSITION] - rows[i, first, POSITION])
+        u += share * (rows[i, j, POSITION] - rows[i, seed, POSITION])
         scene += share * rows[i, j, SCENE_SD]
         model += share * rows[i, j, MODEL_SD]
         rate += share * rows[i, j, RATE]
-    u += rows[i, first, POSITION]
+    u += rows[i, seed, POSITION]
     square, rate_square = 0.0, 0.0
-    for j in range(first, last):
+    for j in range(group.first, group.last + 1):
+        if not _belongs(rows[i], j, seed):
+            continue
         share = rows[i, j, WEIGHT] / total
         sd, off = rows[i, j, SD], rows[i, j, POSITION] - u
         square += share * (sd * sd + off * off)
@@ -117,20 +173,24 @@ def _describe_crosstalk(out: Array, i: int, of: Hypotheses) -> None:
 
 
 @compiled
-def _sort_in(rows: Array, of: Hypotheses, count: int, from_scene: int) -> None:
+def _sort_in(
+    rows: Array, of: Hypotheses, count: int, from_scene: int, table: ReadingsTable
+) -> None:
     """Fill rows by ascending range, by insertion."""
     for j in range(1, count + 1):
         at = j - 1
-        while at > 0 and rows[at - 1, POSITION] > of.x[j, U]:
+        while at > 0 and rows[at - 1, POSITION] > min(max(of.x[j, U], table.start), table.end):
             for k in range(HYPOTHESIS_COLUMNS):
                 rows[at, k] = rows[at - 1, k]
             at -= 1
-        _describe(rows[at], of, j, from_scene)
+        _describe(rows[at], of, j, from_scene, table)
 
 
 @borrowed
 @compiled
-def report(out: Array, rows: Array, i: int, of: Hypotheses, rules: Rules) -> None:
+def report(
+    out: Array, rows: Array, i: int, of: Hypotheses, rules: Rules, table: ReadingsTable
+) -> None:
     """Describe the state after frame i.
 
     Parameters
@@ -147,26 +207,23 @@ def report(out: Array, rows: Array, i: int, of: Hypotheses, rules: Rules) -> Non
         The state.
     rules : Rules
         From what weight on a range is unique, and which nuisance parameters are the scene's.
+    table : ReadingsTable
+        Which ranges there are.
     """
     count, weight = int(of.numbers[COUNT]), of.weight
     out[i, PRESENT], out[i, HYPOTHESES], out[i, STATUS] = 1.0 - weight[0], count, _NONE
-    _sort_in(rows[i], of, count, rules.from_scene)
+    _sort_in(rows[i], of, count, rules.from_scene, table)
     if learns_crosstalk(of):
         _describe_crosstalk(out, i, of)
     if weight[0] > 0.5 or count == 0:
         return
-    # neighbours that overlap are one range; a mean is never taken over two that do not
-    heaviest, begin, group = -1.0, 0, 0.0
-    best_begin, best_end = 0, 0
-    for j in range(count):
-        if j > 0:
-            gap = rows[i, j, POSITION] - rows[i, j - 1, POSITION]
-            if gap > rows[i, j, SD] + rows[i, j - 1, SD]:
-                begin, group = j, 0.0
-        group += rows[i, j, WEIGHT]
-        if group > heaviest:
-            heaviest, best_begin, best_end = group, begin, j + 1
-    _pool(out, rows, i, best_begin, best_end, heaviest)
+    best = _Group(-1.0, 0, 0, 0)
+    for seed in range(count):
+        group = _around(rows[i], count, seed)
+        if group.weight > best.weight:
+            best = group
+    _pool(out, rows, i, best)
+    heaviest = best.weight
     out[i, BEST + WEIGHT] = heaviest / (1.0 - weight[0])
     unique = heaviest > rules.unique_above * (1.0 - weight[0])
     out[i, STATUS] = _UNIQUE if unique else _AMBIGUOUS
