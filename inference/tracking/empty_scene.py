@@ -126,7 +126,7 @@ def learn_empty(
     expected = expect_empty(of, frame, table, empty, scratch.nuisance)
     if learns_crosstalk(of):
         e1, e2 = frame.first - expected.mean1, frame.second - expected.mean2
-        update(of, 0, Linear(e1, e2, 0.0, 0.0, 0.0, 0.0, expected.noise), scratch)
+        update(of, 0, Linear(e1, e2, 0.0, 0.0, 0.0, 0.0, expected.noise), scratch, of.X.shape[1])
     return expected.surprise
 
 

@@ -19,6 +19,8 @@ from inference.tracking.hypotheses import (
     RUNNING,
     TIME,
     Hypotheses,
+    copy,
+    learns_crosstalk,
     stuck_for,
     take_readings,
 )
@@ -39,7 +41,8 @@ from inference.tracking.report import (
     UNSTEADY_MEAN,
     report,
 )
-from inference.tracking.resting import least_present
+from inference.tracking.resting import least_present, nothing_has_changed
+from inference.tracking.stillness import begin_anew, is_still, mean_at_rest, take_still
 from inference.tracking.unsteady import OUTLIERS, UNSTEADY, take_empty, take_unsteady
 from inference.tracking.weighing import Model, room_for, weigh_frame, weigh_known
 from simulator.closed import closed
@@ -94,6 +97,13 @@ def run_filter(
     rules, numbers = model.rules, of.numbers
     for i in range(times.size):
         seconds = 0.0
+        if learns_crosstalk(of) and kinds[i] == USABLE:
+            rest, untold = mean_at_rest(of), is_still(of) and nothing_has_changed(of)
+            now = TrackedFrame(frames[i, _FIRST], frames[i, _SECOND], frames[i, _GAIN], 0.0, 0.0)
+            take_still(of, now, times[i], rules, model.table)
+            if untold and not is_still(of) and begin_anew(of, model.first, room.empty):
+                weigh_frame(rest, 0.0, of, model, room, full)
+                copy(of, 0, room.empty, 0)
         if math.isfinite(numbers[TIME]):
             seconds = times[i] - numbers[TIME]
             predict(seconds, of, rules, model.table, room.scratch.work)

@@ -7,7 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.tracking.evenness import ROUGH, hides
-from inference.tracking.hypotheses import ANCHOR, CROSSTALK1, RESTING, Hypotheses
+from inference.tracking.hypotheses import (
+    ANCHOR,
+    BRIGHT,
+    CROSSTALK1,
+    RESTING,
+    STILL,
+    Hypotheses,
+)
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
 from inference.tracking.unsteady import first_unsteady
@@ -71,6 +78,7 @@ def first_state(
     weight[0] = 1.0 - there
     numbers = [math.nan, there, 1.0, 0.0, 0.0, ROUGH, 0.0]
     numbers += [math.nan, math.nan, math.inf, math.inf, 0.0, 0.0, 0.0]
+    numbers += [0.0] * (BRIGHT + 1 - STILL)
     if steady:
         numbers += first_unsteady(directions)
     first = Hypotheses(x, X, weight, np.array(numbers))

@@ -16,9 +16,12 @@ from simulator.compiled import compiled
 
 __all__ = [
     "ANCHOR",
+    "BRIGHT",
     "COUNT",
     "CROSSTALK1",
     "CROSSTALK2",
+    "LATE1",
+    "LATE2",
     "LEVEL1",
     "LEVEL2",
     "LOST",
@@ -27,6 +30,11 @@ __all__ = [
     "ROUGHNESS",
     "RUNNING",
     "SAME",
+    "SINCE",
+    "STAY1",
+    "STAY2",
+    "STAYED",
+    "STILL",
     "TIME",
     "WITHOUT_CROSSTALK",
     "Hypotheses",
@@ -52,6 +60,7 @@ WITHOUT_CROSSTALK = 2  # own states of a hypothesis that does not learn it
 # places in `Hypotheses.numbers`
 TIME, PENDING, RUNNING, COUNT, LOST, ROUGHNESS, SAME, _READ1, _READ2, _STEP1, _STEP2 = range(11)
 RESTING, LEVEL1, LEVEL2 = range(11, 14)
+STILL, SINCE, STAYED, STAY1, STAY2, LATE1, LATE2, BRIGHT = range(14, 22)
 _LEAST = -700.0  # log of a weight that underflows
 _ROOT_8 = math.sqrt(8.0)
 # probability of no change at all from which on readings that do not change say nothing: thirty
@@ -68,13 +77,15 @@ class Hypotheses(NamedTuple):
     x: Array
     X: Array  # (rows, n, n + p): roots of the covariances
     weight: Array  # (rows,): probabilities
-    # (14,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
+    # (22,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
     # the last frame [s] (nan: none yet), probability of an object of which nothing is known yet,
     # running surprise, number of hypotheses, whether an object that was there may be anywhere by
     # now, the surprise of the last frames, each cut at 1, how many frames up to the last had the
     # readings of the one before, these readings, the shortest step of each from one frame to
     # the next (inf: none yet), where crosstalk is learnt whether its light may be that of an object
-    # at rest (`inference.tracking.resting`), and what the crosstalk was before anything changed
+    # at rest (`inference.tracking.resting`), what the crosstalk was before anything changed, and
+    # of readings that stay as they are (`inference.tracking.stillness`) whether they do, since when
+    # [s], in how many frames, their mean, that of late, and the gain's factor
     numbers: Array
 
 

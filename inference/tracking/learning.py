@@ -11,6 +11,7 @@ from inference.tracking.candidates import TrackCandidate
 from inference.tracking.frame_density import Prior, TrackedFrame, bend_at, spread_at
 from inference.tracking.hypotheses import (
     ANCHOR,
+    WITHOUT_CROSSTALK,
     Hypotheses,
     Scratch,
     U,
@@ -166,6 +167,7 @@ def learn(
     prior: Prior,
     table: ReadingsTable,
     scratch: Scratch,
+    held: bool,
 ) -> float:
     """Update a hypothesis at one mode of a frame.
 
@@ -182,6 +184,8 @@ def learn(
         As for `log_density`.
     scratch : Scratch
         Overwritten.
+    held : bool
+        Whether crosstalk, where it is learnt, learns nothing (`inference.tracking.stillness`).
 
     Returns
     -------
@@ -196,12 +200,14 @@ def learn(
     tangent = Tangent(u, at, gain * value1, gain * value2, gain * d1, gain * d2)
     noise = UNIT if table.by_rate else _noise_of(of, tangent, frame, prior, table)
     shares = learns_crosstalk(of) and not position.born
+    held = held and shares
     shared = NOT_SHARED
     if shares:
         pull1, pull2 = solve(noise, tangent.slope1, tangent.slope2)
         told = pull1 * tangent.slope1 + pull2 * tangent.slope2
         unsure = slope_variance(at, gain, tangent.slope1, tangent.slope2, table)
-        bring_anchor(of, row, at, prior.share, told, unsure)
+        if not held:
+            bring_anchor(of, row, at, prior.share, told, unsure)
         along = at, tangent.slope1, tangent.slope2
         shared = straighten(of, row, gain, along, noise, table)
     if position.born:
@@ -213,10 +219,11 @@ def learn(
         readings = _of_derivatives(of, row, tangent, frame, prior)
     else:
         readings = _of_readings(of, row, tangent, noise, frame, prior, table, scratch.nuisance)
-    surprise = update(of, row, readings, scratch)
+    surprise = update(of, row, readings, scratch, WITHOUT_CROSSTALK if held else of.X.shape[1])
     if shares:
         follow(of, row, shared, gain, table)
-    _take_moments(of, row, candidate.mean, candidate.sd)
+    if not held:
+        _take_moments(of, row, candidate.mean, candidate.sd)
     if frame.known_rate > 0.0:
         # one number more is surprising; of an object that has just come it says where that is
         told = table.channels + (0.0 if position.born else 1.0)

@@ -21,7 +21,7 @@ from inference.tracking.hypotheses import (
 from inference.tracking.readings_table import ReadingsTable
 from simulator.compiled import compiled
 
-__all__ = ["least_present"]
+__all__ = ["least_present", "nothing_has_changed"]
 
 _LEAST = 0.2  # probability of an object that may rest
 _CHANGED = 1e-3  # weight of the empty scene below which something has moved, or come
@@ -32,6 +32,12 @@ _NEAR = 2.0
 _TELLING = 100.0
 # values of `RESTING`
 _NO, _STILL, _MOVED = 0.0, 1.0, 2.0
+
+
+@compiled
+def nothing_has_changed(of: Hypotheses) -> bool:
+    """Tell whether readings are still those of the first frame, of crosstalk or an object."""
+    return bool(of.numbers[RESTING] == _STILL)
 
 
 @borrowed

@@ -92,7 +92,7 @@ def move(of: Hypotheses, row: int, motion: Motion, work: Array) -> None:
 
 @borrowed
 @compiled
-def update(of: Hypotheses, row: int, readings: Linear, scratch: Scratch) -> float:
+def update(of: Hypotheses, row: int, readings: Linear, scratch: Scratch, taught: int) -> float:
     """Learn from two readings that are linear in the hypothesis.
 
     Parameters
@@ -106,6 +106,8 @@ def update(of: Hypotheses, row: int, readings: Linear, scratch: Scratch) -> floa
     scratch : Scratch
         ``nuisance`` holds the change of the readings with the nuisance parameters; the rest is
         overwritten.
+    taught : int
+        How many states, the first, learn; others are considered, as nuisance parameters are.
 
     Returns
     -------
@@ -137,6 +139,8 @@ def update(of: Hypotheses, row: int, readings: Linear, scratch: Scratch) -> floa
         for j in range(m):
             gain1 += X[row, i, j] * pulls[FIRST, j]
             gain2 += X[row, i, j] * pulls[SECOND, j]
+        if i >= taught:
+            gain1, gain2 = 0.0, 0.0
         work[i, n] = gain1 * noise.r11 + gain2 * noise.r21
         work[i, n + 1] = gain2 * noise.r22
         x[row, i] += gain1 * residual1 + gain2 * residual2

@@ -15,7 +15,7 @@ from simulator.errors import InvalidInputError
 
 __all__ = ["BROKEN", "TrackState", "check_state", "state_from_bytes", "state_to_bytes"]
 
-_MARK = b"track state 5\n"
+_MARK = b"track state 6\n"
 # that, a checksum of all that follows, and lengths: of the signature, of the rows, of a mean, of
 # both sides of a root, of the numbers
 _HEAD = struct.Struct("<14sI6I")

@@ -199,7 +199,7 @@ def tracker(
         is_felt(jacobian) and observed.channels == 2 and not observed.by_rate,
     )
     first = dataclasses.replace(first, signature=_signature(table, places, rules, first.hypotheses))
-    model = Model(table, places, rules)
+    model = Model(table, places, rules, first.hypotheses)
     added = sd_by_derivatives(sensor, erring, known.centre, knots, observed)
     by_table = sd_by_table(knots, observed.by_rate)
     if by_table is not None:

@@ -17,14 +17,17 @@ from inference.tracking.frame_density import Prior
 from inference.tracking.hypotheses import Hypotheses, U, unknown_crosstalk
 from inference.tracking.motion import Motion
 from inference.tracking.readings_table import ReadingsTable, mean_at
+from inference.tracking.resting import nothing_has_changed
 from inference.tracking.roots import Root
 from inference.tracking.square_root import move
+from inference.tracking.stillness import is_still
 from simulator.compiled import compiled
 
 __all__ = ["may_turn", "widening"]
 
 Array = NDArray[np.float64]
 
+_AT_REST = 0.1  # of it, while nothing has changed since the first frame
 _WIDER = 3.0  # times that is stated: the rate's standard deviation, where crosstalk is not known
 # variances of a reading by crosstalk, and by the motion until the next frame, in that of the noise,
 # at which either is half of the way to that
@@ -38,6 +41,9 @@ def widening(of: Hypotheses, row: int, reach: float, table: ReadingsTable) -> fl
 
     Crosstalk that is known better than a frame's noise cannot take up what motion does, and where
     frames tell no more of the range than the motion before them it is the motion that holds it.
+    While nothing has changed since the first frame the law is narrower than stated: the motion as
+    it is stated has to go somewhere, and hypotheses of an object at rest would move on to where the
+    curve is flat.
 
     Parameters
     ----------
@@ -49,6 +55,8 @@ def widening(of: Hypotheses, row: int, reach: float, table: ReadingsTable) -> fl
         Mean readings.
     """
     unknown = unknown_crosstalk(of, row)
+    if is_still(of) and nothing_has_changed(of):
+        return 1.0 - (1.0 - _AT_REST) * unknown / (unknown + _HALF)
     _, _, slope1, slope2 = mean_at(of.x[row, U], table)
     seen = (slope1 * slope1 + slope2 * slope2) * reach * reach
     return 1.0 + (_WIDER - 1.0) * unknown / (unknown + _HALF) * seen / (seen + _HALF)

@@ -50,6 +50,7 @@ from inference.tracking.motion import Rules
 from inference.tracking.places import Places, mass_bound
 from inference.tracking.prediction import born_prior, own_prior, prior_of
 from inference.tracking.readings_table import ReadingsTable
+from inference.tracking.stillness import crosstalk_is_held
 from inference.tracking.too_faint import MOST_EMPTY, doubt_the_faint
 from inference.tracking.turning import may_turn
 from inference.tracking.unread import add_unread, learn_unread, odd_weight
@@ -68,6 +69,7 @@ class Model(NamedTuple):
     table: ReadingsTable
     places: Places
     rules: Rules
+    first: Hypotheses  # before any frame
 
 
 class Room(NamedTuple):
@@ -78,6 +80,7 @@ class Room(NamedTuple):
     scanned: Scanned  # where they were looked for
     scratch: Scratch  # for learning
     at_rest: Array  # log masses of hypotheses, were there no motion
+    empty: Hypotheses  # what was known of the empty scene
 
 
 class Kept(NamedTuple):
@@ -101,7 +104,9 @@ def room_for(of: Hypotheses, places: Places) -> Room:
         np.zeros(of.numbers.size),
     )
     candidates = candidates_for(2 * _SPARE * capacity)
-    return Room(after, candidates, scanned_for(places.scan), scratch_for(of), np.zeros(capacity))
+    empty = Hypotheses(np.zeros((1, of.x.shape[1])), np.zeros((1, n, m)), np.zeros(1), np.zeros(1))
+    rest = np.zeros(capacity)
+    return Room(after, candidates, scanned_for(places.scan), scratch_for(of), rest, empty)
 
 
 @compiled
@@ -171,7 +176,8 @@ def _learnt(
         prior = born_prior(of, 0.0, model.rules.rate_sd, model.table)
     else:
         prior = own_prior(of, candidate.parent, frame.gain, 0.0, model.table)
-    return learn(room.after, row, candidate, frame, prior, model.table, room.scratch)
+    held = crosstalk_is_held(of)
+    return learn(room.after, row, candidate, frame, prior, model.table, room.scratch, held)
 
 
 @compiled

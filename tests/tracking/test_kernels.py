@@ -115,8 +115,12 @@ def _random(rng: np.random.Generator, n: int, p: int, rows: int = 4) -> Hypothes
     return Hypotheses(x, X, np.zeros(rows), np.zeros(4))
 
 
-@pytest.mark.parametrize(("n", "p"), [(2, 0), (4, 0), (2, 3), (4, 3)])
-def test_steps_are_those_of_a_filter_that_considers_the_nuisance(n: int, p: int) -> None:
+@pytest.mark.parametrize(
+    ("n", "p", "taught"), [(2, 0, 2), (4, 0, 4), (2, 3, 2), (4, 3, 4), (4, 0, 2), (4, 3, 2)]
+)
+def test_steps_are_those_of_a_filter_that_considers_the_nuisance(
+    n: int, p: int, taught: int
+) -> None:
     rng = np.random.default_rng(n + p)
     of = _random(rng, n, p)
     x, X, scratch = of.x, of.X, scratch_for(of)
@@ -150,7 +154,8 @@ def test_steps_are_those_of_a_filter_that_considers_the_nuisance(n: int, p: int)
     S = both @ joint @ both.T + lower @ lower.T
     residual = np.array([0.7, -1.1])
     gain = (joint @ both.T @ linalg.inv(S))[:n]
-    surprise = update(of, 1, readings, scratch)
+    gain[taught:] = 0.0  # considered, too
+    surprise = update(of, 1, readings, scratch, taught)
     assert surprise == pytest.approx(residual @ linalg.solve(S, residual), rel=1e-12)
     assert x[1] == pytest.approx(mean + gain @ residual, abs=1e-12)
     whole = np.vstack([gain, np.zeros((p, 2))])
