@@ -14,8 +14,10 @@ from inference.realtime.clipped_light import beside_ends, may_come_late
 from inference.realtime.registry import TECHNIQUES
 from inference.shared_error import with_shared_error
 from inference.stated_light import StatedLight, faint, with_scene_part
+from inference.technique import Task
 from inference.techniques import ALL_TECHNIQUES
 from inference.temperature import solved_where_told, task_of
+from inference.without_sd import explained
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.joint_scene import around, centre
@@ -76,7 +78,7 @@ def run(
         start = time.perf_counter()
         result = without_moved(result, _beside(sensor, scene, frames, name, against))
         seconds += time.perf_counter() - start
-    return _taken(result, name, seconds)
+    return _taken(explained(result), name, seconds)
 
 
 def _rests_on_numbers(name: str, scene: Scene) -> bool:
@@ -129,7 +131,7 @@ def by_prior(
     result = with_scene_part(light, frames, wide, alone)
     if not np.isfinite(result.roots_sd_m).any():
         return LeftOut(name, NOT_SMALL if against is None else against.said)
-    return _taken(result, name, wide.runtime_s + alone.runtime_s)
+    return _taken(explained(result), name, wide.runtime_s + alone.runtime_s)
 
 
 def obstacle_by_prior(light: StatedLight, frames: Frames, name: str) -> str | None:
@@ -161,16 +163,17 @@ def _solved(sensor: Sensor, scene: Scene, frames: Frames, name: str) -> Techniqu
         result = solve(task_of(sensor, scene, frames, known_of(scene, sensor)))
         return _doubted(result, sensor, scene, frames, name)
 
-    def at(of: Sensor, stated: Scene) -> TechniqueResult:
+    def at(of: Sensor, stated: Scene) -> Task:
         known = known_of(stated, of)
         reason = obstacle(ALL_TECHNIQUES[name], of, stated, known, frames)
         if reason is not None:
             raise RefusedError(f"a standard deviation off the scene's centre it {reason}")
-        return solve(task_of(of, stated, frames, known, physical=False))
+        return task_of(of, stated, frames, known, physical=False)
 
     of, middle = centre(sensor, scene)
-    result = solve(task_of(of, middle, frames, known_of(middle, of)))
-    pairs = ((at(*plus), at(*minus)) for plus, minus in around(sensor, scene))
+    beside = tuple((at(*plus), at(*minus)) for plus, minus in around(sensor, scene))
+    result = solve(task_of(of, middle, frames, known_of(middle, of), around=beside))
+    pairs = ((solve(plus), solve(minus)) for plus, minus in beside)
     return _doubted(with_shared_error(result, pairs), of, middle, frames, name)
 
 

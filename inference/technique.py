@@ -33,6 +33,9 @@ class Task:
     exact : bool
         Whether the model is taken as exact, whatever the scene says of its error: what asks for
         the noise's part alone has its own way to the model's.
+    around : tuple of (Task, Task)
+        The same a standard deviation off to either side, a pair for each independent direction of
+        the scene's joint law: what a filter of roots must leave open.
     """
 
     sensor: Sensor
@@ -42,6 +45,7 @@ class Task:
     physical: bool = True
     high_m: float | None = None
     exact: bool = False
+    around: tuple[tuple["Task", "Task"], ...] = ()
 
 
 def _told_apart(sensor: Sensor) -> float:

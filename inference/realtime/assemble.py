@@ -47,7 +47,7 @@ _SHARED_REASONS = (
     "every solution needs a negative object, or a background below zero or above its strength",
     "every solution lies outside the ranges of the scene",
     "the noise is so many times the signal that its standard deviation is no number",
-    "the light is none within its noise: any farther range explains the readings too",
+    "the light is none within its errors: any farther range explains the readings too",
 )
 
 

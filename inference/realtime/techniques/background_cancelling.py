@@ -12,6 +12,14 @@ from inference.realtime.assemble import END_BAND, NOISE_BAND, Outcome, assemble,
 from inference.realtime.from_curve import candidates_of, curve_parameters
 from inference.realtime.model_error import model_error_of, point_error, sd_of_roots
 from inference.realtime.net import UNREPRESENTABLE, Form, Net, known_net_readings
+from inference.realtime.open_background import (
+    OpenBackground,
+    SeenScene,
+    Wave,
+    left_open,
+    or_none,
+    seen_scene,
+)
 from inference.realtime.solving.bracketing import EPSILON
 from inference.realtime.solving.curves import cancelling_quadrature, cancelling_ratio
 from inference.realtime.solving.curves.curve import Curve
@@ -56,26 +64,6 @@ class _Parts(NamedTuple):
     size: Array
 
 
-class _Wave(NamedTuple):
-    """Wave number [1/m] and the background's distance [m]."""
-
-    number: float
-    distance: float
-
-
-class _Scene(NamedTuple):
-    """What the background is computed from: gain c2, c0, c1, its strength, the relative error.
-
-    An error of the model's flux acts as one of the signal does.
-    """
-
-    gain: float
-    c0: float
-    c1: float
-    strength: float
-    relative: float
-
-
 def _parts(task: Task, net: Net) -> tuple[Curve, _Parts]:
     sensor, distance = task.sensor, task.known.get("background.distance_m")
     if isinstance(sensor, PulsedSensor):
@@ -100,6 +88,12 @@ def _parts(task: Task, net: Net) -> tuple[Curve, _Parts]:
         size=np.abs(net.first) * abs(to_free.first) + np.abs(net.second),
     )
     return curve, parts
+
+
+def _light(task: Task) -> tuple[Array, Array]:
+    """Return a frame's part that is free of background, and the one that holds all of it."""
+    _, parts = _parts(task, known_net_readings(task))
+    return parts.free, parts.whole
 
 
 def _solve(task: Task) -> TechniqueResult:
@@ -128,21 +122,14 @@ def _solve(task: Task) -> TechniqueResult:
         )
         physical = None
         if task.physical and known.has("background.strength"):
-            scene = _Scene(
-                gain=sensor.known_gain * known.get("object.c2"),
-                c0=known.get("object.c0"),
-                c1=known.get("object.c1"),
-                strength=known.get("background.strength"),
-                relative=math.hypot(net.relative, model_error_of(task).flux),
-            )
-            wave = None
-            if isinstance(sensor, SineWaveSensor):
-                wave = _Wave(sensor.wave_number, distance)
+            scene, wave = seen_scene(task, net.relative)
             by_model = _moved(task, curve, candidates.roots, slopes)
             if beside is not None:
                 by_model = np.hypot(by_model, beside(candidates.roots) / np.abs(slopes))
+            open_ = left_open(task, _light, candidates.roots, slopes / scale)
+            candidates = or_none(candidates, parts.free, open_)
             physical = _physical(
-                candidates.roots, slopes / scale, by_model, parts, scene, wave, NOISE_BAND
+                candidates.roots, slopes / scale, by_model, open_, parts, scene, wave, NOISE_BAND
             )
     reason = np.full(free.size, _NO_RANGE, dtype=np.uint8)
     if isinstance(sensor, PulsedSensor):
@@ -189,16 +176,18 @@ def _physical(
     roots: Array,
     slopes: Array,
     by_model: Array,
+    open_: OpenBackground,
     parts: _Parts,
-    scene: _Scene,
-    wave: _Wave | None,
+    scene: SeenScene,
+    wave: Wave | None,
     band: float,
 ) -> Flags:
     """Say at which roots the background is between nothing and its strength, within its errors.
 
     The background is whole - C Phi(r), with C = 1 or cos k (R - r), and its first-order error
-    d whole - (C Phi)' d free / free'(r). Errors of the model move r by ``by_model``. At a fold or
-    an end the slope is 0, and any background is possible.
+    d whole - (C Phi)' d free / free'(r). Errors of the model move r by ``by_model``, and the
+    scene's joint law leaves ``open_`` what the background is, and how far below its strength. At a
+    fold or an end the slope is 0, and any background is possible.
     """
     n, m = roots.shape
     accepted = np.zeros((n, m), dtype=np.bool_)
@@ -227,8 +216,10 @@ def _physical(
             moved = change * by_model[i, j]
             variance = max(variance, 0.0) + common * common + moved * moved
             rounding = 64.0 * EPSILON * (parts.size[i] * (1.0 + abs(lever)) + flux)
-            slack = band * math.sqrt(variance) + rounding
-            accepted[i, j] = not (background < -slack or background > scene.strength + slack)
+            below, above = open_.light[i, j], open_.left[i, j]
+            slack = band * math.sqrt(variance + below * below) + rounding
+            room = band * math.sqrt(variance + above * above) + rounding
+            accepted[i, j] = not (background < -slack or background > scene.strength + room)
     return accepted
 
 
