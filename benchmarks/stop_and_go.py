@@ -68,6 +68,12 @@ def _rests(_: Array, __: Array, rng: np.random.Generator) -> Array:
     return np.full(_TIMES.size, np.log(rng.uniform(0.4, 1.2)))
 
 
+def _starts_late(low: Array, high: Array, rng: np.random.Generator) -> Array:
+    """Rest for five seconds, move within two, and rest again."""
+    begin, end = (low, high) if rng.random() < 0.5 else (high, low)
+    return begin + (end - begin) * np.clip((_TIMES - 5.0) / 2.0, 0.0, 1.0)
+
+
 def _as_stated(_: Array, __: Array, rng: np.random.Generator) -> Array:
     """Follow the law of the rate by its default, turned back at both ends of the span."""
     u, rate, path = np.log(0.7), rng.normal(), []
@@ -88,6 +94,7 @@ PATHS: dict[str, Callable[[Array, Array, np.random.Generator], Array]] = {
     "swings": _swings,
     "slow": _slow,
     "rests": _rests,
+    "starts late": _starts_late,
     "as stated": _as_stated,
 }
 
@@ -135,13 +142,13 @@ def main() -> None:
     parser.add_argument("--rate-sd", type=float, default=1.0)
     parser.add_argument("--paths", nargs="+", default=list(PATHS), choices=list(PATHS))
     given = parser.parse_args()
-    print("sensor     path        lost in silence  farthest  held of 90 %  answered  width")
+    print("sensor     path         lost in silence  farthest  held of 90 %  answered  width")
     for kind, sensor in SENSORS.items():
         for path in given.paths:
             rows = [tracked(sensor, path, seed, given.rate_sd) for seed in range(given.tracks)]
             silent, farthest, held, answered, width = np.array(rows).T
             print(
-                f"{kind:<10} {path:<10} {(silent >= 5).sum():>8} of {len(rows):<5}"
+                f"{kind:<10} {path:<11} {(silent >= 5).sum():>8} of {len(rows):<5}"
                 f" {farthest.max():>8.1f}  {np.nanmean(held):>12.0%}  {answered.mean():>8.0%}"
                 f"  {np.nanmedian(width):.2%}",
                 flush=True,

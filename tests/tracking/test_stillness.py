@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from inference.tracking.hypotheses import STAY1, STAY2, Hypotheses
 from inference.tracking.stillness import is_still
-from inference.tracking.track import Track, step, track
+from inference.tracking.track import step, track
 from inference.tracking.tracker import Tracker, tracker
 from simulator.frames import Frames, frames_from_columns
 from simulator.object_model import object_flux
@@ -99,30 +99,29 @@ def test_the_mean_is_that_of_all_frames_that_stayed() -> None:
     assert [numbers[STAY1], numbers[STAY2]] == pytest.approx(mean, rel=1e-12)
 
 
-def rests_moves_and_rests(change: float, snr: float, seed: int) -> tuple[Track, Array]:
-    """Follow an object that rests for five seconds, moves within two, and rests again."""
-    path = 0.5 * change ** np.clip((TIME - 5.0) / 2.0, 0.0, 1.0)
-    return track(*recorded(path, snr, 1.0, seed)), path
-
-
 def test_ranges_after_a_rest_are_held() -> None:
-    """Of nine tracks in ten 90 % intervals hold the last rest, and none is far off in silence.
+    """Of an object that rests for five seconds, moves within two, and rests again.
 
-    Without the rule they hold it in 2 of these 24, and 9 are beyond five standard deviations. Were
-    each held with a probability of 0.85, fewer than 16 of 24 would be once in 100.
+    Intervals of 90 % hold nine tenths of the last rest, where one range is told. Were a track held
+    or not as a whole, by a probability of 0.9, the share of some thirty would be below 0.75 once in
+    200. Without the rule it is a half, and of such tracks one in seven is far off in silence.
     """
-    held = lost = 0
-    for change in (0.6, 1.2, 2.0):
-        for snr in (100.0, 1e3):
-            for seed in range(4):
-                found, path = rests_moves_and_rests(change, snr, seed)
-                late = TIME > 9.0
-                off = np.abs(found.best_m - path) / found.best_sd_m
-                told = late & ~found.misfit & np.isfinite(found.range_m)
-                held += bool(np.median(off[late]) < 1.645)
-                lost += int(np.sum(off[told] > 5.0) > 5)
-    assert held >= 16
-    assert lost <= 1
+    held, lost = [], 0
+    for change in (0.6, 2.0):
+        path = 0.5 * change ** np.clip((TIME - 5.0) / 2.0, 0.0, 1.0)
+        for crosstalk in (0.3, 2.0):
+            for snr in (30.0, 100.0, 1e3):
+                for seed in range(3):
+                    found = track(*recorded(path, snr, crosstalk, seed))
+                    off = np.abs(found.range_m - path) / found.sd_m
+                    told = np.isfinite(off) & ~found.misfit
+                    lost += int(np.sum(off[told] > 5.0) > 5)
+                    late = told & (TIME > 9.0)
+                    if late.sum() > 20:
+                        held.append(float(np.mean(off[late] < 1.645)))
+    assert len(held) >= 24
+    assert np.mean(held) > 0.75
+    assert lost <= 2
 
 
 def test_a_stream_says_the_same_however_it_is_cut() -> None:
