@@ -28,7 +28,7 @@ def recorded(
 ) -> tuple[Sensor, Scene, Frames]:
     """Return sensor, scene and frames of a sine wave; ratios are those of the first light."""
     rng = np.random.default_rng(seed)
-    light = object_flux(range_m, C0 * C2, C0, C1)  # type: ignore[arg-type]
+    light = np.asarray(object_flux(range_m, C0 * C2, C0, C1))  # type: ignore[arg-type]
     noise, other = float(light[0]) / snr, crosstalk * float(light[0])
     y = light * np.exp(1j * WAVE * range_m)
     if gain is not None:
