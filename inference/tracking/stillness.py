@@ -44,8 +44,13 @@ __all__ = ["begin_anew", "crosstalk_is_held", "is_still", "mean_at_rest", "take_
 _ONE_AWAY = 16.0
 _LATE_AWAY = 12.0
 _LATE = 25.0  # frames of the mean of late
-_FRAMES = 10.0  # from so many frames on that have stayed readings are still
-_SECONDS = 0.25  # and for so much of the time over which a rate is remembered
+# from so many frames on that have stayed, and so much of the time over which a rate is remembered,
+# readings are still
+_FRAMES, _SECONDS = 10.0, 0.25
+# and at rest: where an object turns round readings are still for a moment, too
+_REST_FRAMES, _REST_SECONDS = 20.0, 0.5
+# values of `STILL`
+_NO, _STILL, _REST = 0.0, 1.0, 2.0
 _MOST = 300.0  # frames of the mean: beyond them it follows what drifts
 # variance of a reading by crosstalk, in that of the noise, from which on nothing has told it
 _UNTOLD = 10.0
@@ -54,13 +59,13 @@ _UNTOLD = 10.0
 @compiled
 def is_still(of: Hypotheses) -> bool:
     """Tell whether the readings stay as they are."""
-    return bool(of.numbers[STILL] > 0.0)
+    return bool(of.numbers[STILL] > _NO)
 
 
 @compiled
 def crosstalk_is_held(of: Hypotheses) -> bool:
-    """Tell whether crosstalk learns nothing of a frame: after a rest that is not the first."""
-    return is_still(of) and not nothing_has_changed(of)
+    """Tell whether crosstalk learns nothing of a frame: at a rest that is not the first."""
+    return bool(of.numbers[STILL] == _REST) and not nothing_has_changed(of)
 
 
 @compiled
@@ -101,7 +106,7 @@ def _square(noise: Root, first: float, second: float) -> float:
 @compiled
 def _start(numbers: Array, frame: TrackedFrame, time: float) -> None:
     """Let a rest begin with a frame."""
-    numbers[STILL], numbers[SINCE], numbers[STAYED] = 0.0, time, 1.0
+    numbers[STILL], numbers[SINCE], numbers[STAYED] = _NO, time, 1.0
     numbers[STAY1], numbers[STAY2] = frame.first, frame.second
     numbers[LATE1], numbers[LATE2] = frame.first, frame.second
     numbers[BRIGHT] = frame.gain
@@ -147,8 +152,10 @@ def take_still(
     numbers[STAYED] = n
     numbers[STAY1] += first / n
     numbers[STAY2] += second / n
-    still = n >= _FRAMES and seconds >= _SECONDS * rules.rate_time
-    numbers[STILL] = 1.0 if still else 0.0
+    if n >= _REST_FRAMES and seconds >= _REST_SECONDS * rules.rate_time:
+        numbers[STILL] = _REST
+    elif n >= _FRAMES and seconds >= _SECONDS * rules.rate_time:
+        numbers[STILL] = _STILL
 
 
 @borrowed
