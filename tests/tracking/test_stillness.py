@@ -141,7 +141,7 @@ def test_what_a_first_rest_seemed_to_tell_is_forgotten() -> None:
         rng = np.random.default_rng(seed)
         c0 = float(np.exp(rng.uniform(np.log(0.005), np.log(0.3))))
         path = rng.uniform(0.3, 1.0) * 1.2 ** np.clip((time - 5.0) / 2.0, 0.0, 1.0)
-        light = np.asarray(object_flux(path, c0 * C2, c0, 0.0))  # type: ignore[arg-type]
+        light = np.asarray(object_flux(path, c0 * C2, c0, 0.0))
         noise, other = float(light[0]) / 1e3, 2.0 * float(light[0])
         y = light * np.exp(1j * WAVE * path) + other * np.exp(1j * rng.uniform(0.0, 6.28))
         y = y + noise * (rng.normal(size=time.size) + 1j * rng.normal(size=time.size))
