@@ -1,5 +1,7 @@
 """A range whose error is no number says why."""
 
+import dataclasses
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,10 +39,8 @@ def explained(result: TechniqueResult) -> TechniqueResult:
     unsaid, said = np.concatenate(found), result.reason.copy()
     fold = len(result.reasons)
     said[unsaid] = np.where(result.near_fold[unsaid], fold, fold + 1)
-    told = object.__new__(TechniqueResult)
     reasons = (*result.reasons, BESIDE_FOLD, NO_NUMBER)
-    vars(told).update(vars(result), reason=said, reasons=reasons)
-    return told
+    return dataclasses.replace(result, reason=said, reasons=reasons)
 
 
 def _unsaid(result: TechniqueResult, part: slice) -> NDArray[np.intp]:

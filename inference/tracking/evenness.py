@@ -20,9 +20,9 @@ from inference.tracking.borrowed import borrowed
 from inference.tracking.candidates import TrackCandidates
 from inference.tracking.frame_density import Prior, TrackedFrame, log_density
 from inference.tracking.hypotheses import (
-    COUNT,
     ROUGHNESS,
     Hypotheses,
+    heaviest,
     learns_crosstalk,
     unknown_crosstalk,
 )
@@ -62,14 +62,11 @@ def counted_widths(of: Hypotheses) -> float:
     law of the motion is wide (`inference.tracking.turning`), and motion mostly far smoother: as far
     as it is, widths say nothing of the curve.
     """
-    roughness, row = of.numbers[ROUGHNESS], 1
+    roughness = of.numbers[ROUGHNESS]
     counted = float(min(1.0, roughness / ROUGH))
     if not learns_crosstalk(of):
         return counted
-    for h in range(2, int(of.numbers[COUNT]) + 1):
-        if of.weight[h] > of.weight[row]:
-            row = h
-    unknown = unknown_crosstalk(of, row)
+    unknown = unknown_crosstalk(of, heaviest(of))
     return float((counted + unknown * _LEARNT * roughness) / (1.0 + unknown))
 
 

@@ -43,6 +43,7 @@ __all__ = [
     "V",
     "copied",
     "copy",
+    "heaviest",
     "learns_crosstalk",
     "log_of",
     "scratch_for",
@@ -143,6 +144,16 @@ def variance_of(of: Hypotheses, row: int, state: int) -> float:
 def unknown_crosstalk(of: Hypotheses, row: int) -> float:
     """Return the larger variance of a reading by crosstalk, in that of the noise."""
     return float(max(variance_of(of, row, CROSSTALK1), variance_of(of, row, CROSSTALK2)))
+
+
+@compiled
+def heaviest(of: Hypotheses) -> int:
+    """Return the row of the heaviest hypothesis of an object, 0 where none is."""
+    row = 0
+    for h in range(1, int(of.numbers[COUNT]) + 1):
+        if row == 0 or of.weight[h] > of.weight[row]:
+            row = h
+    return row
 
 
 @compiled

@@ -29,6 +29,7 @@ from inference.tracking.hypotheses import (
     Hypotheses,
     U,
     copy,
+    heaviest,
     unknown_crosstalk,
 )
 from inference.tracking.motion import Rules
@@ -76,21 +77,11 @@ def mean_at_rest(of: Hypotheses) -> TrackedFrame:
 
 
 @compiled
-def _heaviest(of: Hypotheses) -> int:
-    """Return the row of the heaviest hypothesis of an object, 0 where none is."""
-    row = 0
-    for h in range(1, int(of.numbers[COUNT]) + 1):
-        if row == 0 or of.weight[h] > of.weight[row]:
-            row = h
-    return row
-
-
-@compiled
 def _noise_of(of: Hypotheses, frame: TrackedFrame, table: ReadingsTable) -> Root:
     """Return the root of the noise's covariance at the readings themselves."""
     if table.noise.plain:
         return UNIT
-    o1, o2, row = 0.0, 0.0, _heaviest(of)
+    o1, o2, row = 0.0, 0.0, heaviest(of)
     if row > 0:
         o1, o2 = object_at(of.x[row, U], table)
     return noise_root(frame.first, frame.second, frame.gain * o1, frame.gain * o2, table.noise)
@@ -178,7 +169,7 @@ def begin_anew(of: Hypotheses, first: Hypotheses, empty: Hypotheses) -> bool:
     bool
         Whether they were forgotten.
     """
-    row = _heaviest(of)
+    row = heaviest(of)
     if row > 0 and unknown_crosstalk(of, row) < _UNTOLD:
         return False
     copy(empty, 0, of, 0)
