@@ -100,10 +100,10 @@ def add_shape(
         unknowns.append(
             Unknown(
                 name0,
-                lambda z, v: scale(v) * law.from_normal(z, least / scale(v)),
+                lambda z, v: scale(v) * law.from_normal(z, cut(v)),
                 lambda x, v: law.to_normal(x / scale(v), cut(v)),
                 None if least == 0.0 else (lambda v: law.log_mass(least / scale(v))),
-                deviation=lambda x, v: law.deviation(x / scale(v), least / scale(v)),
+                deviation=lambda x, v: law.deviation(x / scale(v), cut(v)),
             )
         )
     else:

@@ -131,13 +131,19 @@ class Distribution(abc.ABC):
             x, increasing in z; inf or 0 where the law reaches beyond what a number can hold.
         """
         z = np.asarray(z, dtype=float)
-        low = np.maximum(low, 0.0) if self.log else low
-        a, b = self._bounds(low, high)
+        if isinstance(low, float) and isinstance(high, float):
+            a, b = _ends(self, low, high)
+            least: Any = max(low, self.low)
+            most: Any = min(high, self.high)
+        else:
+            low = np.maximum(low, 0.0) if self.log else low
+            a, b = self._bounds(low, high)
+            least, most = np.maximum(low, self.low), np.minimum(high, self.high)
         with np.errstate(over="ignore", under="ignore", invalid="ignore"):
             position = self._position(z, a, b)
             x = np.exp(position) if self.log else position
         # exp(log(x)) may leave the support by a rounding, where the density is zero
-        return np.asarray(np.clip(x, np.maximum(low, self.low), np.minimum(high, self.high)))
+        return np.asarray(np.minimum(np.maximum(x, least), most))
 
     def to_normal(self, x: Any, low: Any = -np.inf, high: Any = np.inf) -> Array:
         """Inverse of `from_normal`: -inf or inf at the ends of the support.

@@ -88,24 +88,20 @@ class NormalDistribution(Distribution):
         return _log_normal_mass(self._standard(a), self._standard(b))
 
     def _position(self, z: Array, a: Array, b: Array) -> Array:
-        a, b = self._standard(a), self._standard(b)
-        if not _is_whole(a, b):
-            mass = _log_normal_mass(a, b)
+        whole, a, b, mass = self._cut_at(a, b)
+        if not whole:
+            mass = _log_normal_mass(a, b) if mass is None else mass
             lower = np.logaddexp(scipy.special.log_ndtr(a), scipy.special.log_ndtr(z) + mass)
             upper = np.logaddexp(scipy.special.log_ndtr(-b), scipy.special.log_ndtr(-z) + mass)
             z = np.where(
                 lower < upper, scipy.special.ndtri_exp(lower), -scipy.special.ndtri_exp(upper)
             )
-            z = np.clip(z, a, b)
+            z = np.minimum(np.maximum(z, a), b)
         return np.asarray(self.loc + self.scale * z)
 
     def _variate(self, position: Array, a: Array, b: Array) -> Array:
         standard = self._standard(position)
-        if a.ndim == b.ndim == 0:
-            whole, a, b, mass = _between(self, float(a), float(b))
-        else:
-            a, b = self._standard(a), self._standard(b)
-            whole, mass = _is_whole(a, b), None
+        whole, a, b, mass = self._cut_at(a, b)
         if whole:
             return standard
         mass = _log_normal_mass(a, b) if mass is None else mass
@@ -115,6 +111,13 @@ class NormalDistribution(Distribution):
         return np.asarray(
             np.where(lower < upper, scipy.special.ndtri_exp(lower), -scipy.special.ndtri_exp(upper))
         )
+
+    def _cut_at(self, a: Array, b: Array) -> tuple[bool, Array, Array, Array | None]:
+        """Return whether nothing is cut away, standardised ends, and the log mass of one cut."""
+        if a.ndim == b.ndim == 0:
+            return _between(self, float(a), float(b))
+        a, b = self._standard(a), self._standard(b)
+        return _is_whole(a, b), a, b, None
 
     def _log_density(self, position: Array, a: Array, b: Array) -> Array:
         standard = self._standard(position)
