@@ -24,7 +24,15 @@ from inference.identifiability.model_response import (
 )
 from inference.posterior.job import Job
 
-__all__ = ["Responses", "chosen_draws", "first_responses", "flux_leads", "repeated", "responses_at"]
+__all__ = [
+    "MEASURED",
+    "Responses",
+    "chosen_draws",
+    "first_responses",
+    "flux_leads",
+    "repeated",
+    "responses_at",
+]
 
 Array = NDArray[np.float64]
 
@@ -35,7 +43,7 @@ _STRAIGHT = 0.1  # share of the response that the next order adds, below which t
 _THINNED = 4  # of them one is followed further
 # errors that are followed beyond the first order at draws: to tell whether that is of any size, and
 # of what size, which few far draws decide
-_TRIED, _MEASURED = 24, 200
+_TRIED, MEASURED = 24, 200
 _OF_FLUX = 0.6  # of what all errors move the scale by, that those of the flux move it by alone
 
 
@@ -170,13 +178,17 @@ def first_responses(
     return Responses(z, log_r, experiments, each, readings, curvature, repeated=False)
 
 
-def repeated(job: Job, first: Responses, rng: np.random.Generator) -> Responses:
+def repeated(
+    job: Job, first: Responses, rng: np.random.Generator, tried: int = MEASURED
+) -> Responses:
     """Return responses of every fourth of the draws, steps repeated until they settle.
 
     Parameters
     ----------
     first : Responses
         Of one step.
+    tried : int
+        Errors at most that are followed beyond the first order.
 
     Returns
     -------
@@ -191,7 +203,7 @@ def repeated(job: Job, first: Responses, rng: np.random.Generator) -> Responses:
     fewer = slice(None, None, _THINNED)
     log_r, experiments = first.log_r[fewer], first.experiments[fewer]
     each = tuple(model_response(one, first.readings, pull) for one in experiments)
-    measured = int(np.clip(_FRAMES // max(log_r.shape[1], 1), len(experiments), _MEASURED))
+    measured = int(np.clip(_FRAMES // max(log_r.shape[1], 1), len(experiments), tried))
     curvature = _curvature(experiments, each, measured, rng)
     return Responses(
         first.z[fewer], log_r, experiments, each, first.readings, curvature, repeated=True

@@ -43,7 +43,7 @@ __all__ = ["STEP", "first_draws", "in_rounds", "next_draws", "taken_in"]
 
 Array = NDArray[np.float64]
 
-STEP = 1000  # draws: of a round, or some of those that count
+STEP = 1000  # draws: of a round once rounds tell, or some of those that count
 _LOCAL_SHARE = 0.25  # of a round's, from around the place that the others hold least of
 _WIDE_SHARE = 0.35  # of them, from the wider map
 _LEAST = 2000  # draws that count: the shape of their weights' tail is known to 0.13
@@ -111,7 +111,7 @@ def first_draws(
     ends = np.cumsum([len(one) for one in populations]).tolist()
     proposal = fitted(proposal, members, density)
     pool = Pool(members, np.empty(0), (), (), (), proposal.optima.log_density(members))
-    pool = with_laws(pool, (proposal,), (STEP,), rng)
+    pool = with_laws(pool, (proposal,), (wanted.first,), rng)
     return RoundsSoFar(wanted, proposal, pool, tuple(ends), 0)
 
 
@@ -142,8 +142,9 @@ def next_draws(
         drawn = drawn if last.drawn is None else joined(last.drawn, drawn)
         return dataclasses.replace(so_far, last=dataclasses.replace(last, drawn=drawn))
     laws = next_laws(density, so_far.proposal, so_far.pool, so_far.beyond, rng)
-    local, far = int(_LOCAL_SHARE * STEP), int(_WIDE_SHARE * STEP)
-    pool = with_laws(so_far.pool, laws, (STEP - local - far, far, local), rng)
+    size = STEP if so_far.telling else so_far.wanted.first
+    local, far = int(_LOCAL_SHARE * size), int(_WIDE_SHARE * size)
+    pool = with_laws(so_far.pool, laws, (size - local - far, far, local), rng)
     return dataclasses.replace(so_far, proposal=laws[0], pool=pool)
 
 

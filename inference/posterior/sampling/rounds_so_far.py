@@ -41,12 +41,15 @@ class Wanted:
     tail : float
         Share of all mass in these heaviest draws; 0, and the heaviest alone is meant, where members
         are none of the posterior.
+    first : int
+        Draws of each round until rounds tell what they left out.
     """
 
     target_ess: int
     most: int
     tolerated: float = _MOST_DISSENT
     tail: float = _TAIL
+    first: int = 1000
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from inference.posterior.archive import (
 )
 from inference.posterior.selection.selection import Selection
 from inference.posterior.stages.stage import Drawing, Settled, Stage, Weighted
+from inference.posterior.stages.standing import stands
 
 __all__ = ["Checkpoint"]
 
@@ -37,8 +38,8 @@ class Checkpoint:
         Whether errors of the flux are integrated out in full though the scene does not ask for
         that: which optimum is the best depends on them, or linear response to them bends.
     exact : Drawing or None
-        What the exact model came to, while errors are integrated out because linear response
-        around it bends: the answer until that is done.
+        What the exact model came to, or would begin with, while errors are integrated out because
+        linear response around it bends: the answer until there is a better one.
     linear : bool
         Whether linear response was looked at, and stands.
     """
@@ -54,7 +55,7 @@ class Checkpoint:
     @property
     def answering(self) -> "Checkpoint":
         """The checkpoint that an answer is made of."""
-        if self.exact is None:
+        if self.exact is None or (not self.exact.verdict.converged and stands(self.stage)):
             return self
         return dataclasses.replace(self, stage=self.exact, exact=None, integrated=False)
 

@@ -17,7 +17,7 @@ from inference.posterior.job import Job
 from inference.posterior.sampling.ensemble import WALKERS, warm_walkers
 from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.population import Population
-from inference.posterior.sampling.rounds import first_draws, next_draws, taken_in
+from inference.posterior.sampling.rounds import STEP, first_draws, next_draws, taken_in
 from inference.posterior.sampling.rounds_so_far import Rounds, RoundsSoFar, Wanted
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.sampling.warm import MAP_SHARE
@@ -52,6 +52,7 @@ _SHARE = 0.5  # of what the populations took, that importance sampling behind th
 _MOST_DRAWS = (12_000, 40_000)  # but so many at least, and at most
 SCOUTED_DRAWS = 20_000  # that rounds from scouts may take: as many as carry one population
 HALFWAY_DRAWS = 40_000  # and those from small populations, twice: as many as carry these
+_DEAR = 500  # draws of a round until rounds tell, where one takes long
 _FITTED = 2  # adaptations of a law that was held to weighted draws
 _LEADING = 50.0  # effective size of draws, from which on rounds may begin again at them
 _ERRING = 4  # number of the streams of rounds with errors of the model integrated out, the first
@@ -184,7 +185,8 @@ def _wanted(job: Job, stage: Tempering, members: Sequence[Population]) -> Wanted
     target = worth_wanted(job)
     if stage.early:
         most = SCOUTED_DRAWS if stage.scouted else HALFWAY_DRAWS
-        return Wanted(target, most, TOLERATED, 0.0)
+        first = _DEAR if job.scene.model_error.integrated else STEP
+        return Wanted(target, most, TOLERATED, 0.0, first)
     most = int(np.clip(_SHARE * sum(each.calls for each in members), *_MOST_DRAWS))
     return Wanted(target, most)
 

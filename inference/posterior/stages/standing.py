@@ -20,9 +20,9 @@ from inference.posterior.sampling.importance import (
 )
 from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.verdict import Verdict
-from inference.posterior.stages.stage import Drawing, Tempering, Walking, Weighted
+from inference.posterior.stages.stage import Drawing, Stage, Tempering, Walking, Weighted
 
-__all__ = ["best_known", "standing"]
+__all__ = ["best_known", "standing", "stands"]
 
 
 _LEAST_ESS = 50.0  # below it, quantiles of 5 and 95 % are those of two or three draws
@@ -55,6 +55,12 @@ def standing(stage: Drawing) -> Drawing:
         return dataclasses.replace(stage, verdict=Verdict(False, reasons))
     verdict = Verdict(False, (f"no ensemble has walked yet: the answer is made of {said}",))
     return Weighted(stage.proposal.optima, draws, verdict)
+
+
+def stands(stage: Stage) -> bool:
+    """Tell whether a stage on its way has weighted draws that can be trusted."""
+    found = best_known(stage) if isinstance(stage, Tempering | Walking) else None
+    return found is not None and _trusted(found[0])
 
 
 def best_known(stage: Tempering | Walking) -> tuple[WeightedDraws, str] | None:

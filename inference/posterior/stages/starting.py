@@ -25,6 +25,7 @@ from inference.posterior.stages.ensembles import (
     from_weighted,
     worth_wanted,
 )
+from inference.posterior.stages.integrating import at_once
 from inference.posterior.stages.looking import (
     Looked,
     LookTask,
@@ -134,6 +135,7 @@ def begin(job: Job, stage: Starting) -> Checkpoint:
         (reached,) = (one for one in found if isinstance(one, Checkpoint))
         calls += reached.calls
         if not isinstance(reached.stage, Starting):
+            integrated = integrated or reached.integrated
             return dataclasses.replace(reached, calls=calls, integrated=integrated)
         job, stage, integrated = job.with_error_integrated(), reached.stage, True
 
@@ -181,7 +183,14 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum], scouts: Sc
     check_ranges(whole, job.scene, optima[0].z)
     check_best_fit(whole, optima[0].z)
     stage, used = _first_stage(job, density, optima, scouts)
-    return Checkpoint(stage, calls + used, None, job.representatives)
+    reached = Checkpoint(stage, calls + used, None, job.representatives)
+    begun = at_once(job, density, optima, scouts) if isinstance(stage, Tempering) else None
+    if begun is None:
+        return reached
+    erring, used = begun
+    return dataclasses.replace(
+        reached, stage=erring, calls=reached.calls + used, integrated=True, exact=stage
+    )
 
 
 def _first_stage(

@@ -40,6 +40,6 @@ def stopped(job: Job, stage: Selecting | Starting, cpu_s: float) -> Checkpoint:
     stage = stage if isinstance(stage, Starting) else stage.starts[-1]
     optima = that_matter(stage.optima)
     if not optima or cpu_s < max(_LATE_S, job.settings.max_seconds):
-        return begin(job, stage)
+        return begin(job, stage).answering
     unbegun = Verdict(False, ("its time ended before sampling began",))
     return Checkpoint(Tempering(Proposal(mixture_of(optima), None, 0.0), (), unbegun), 0)
