@@ -16,8 +16,9 @@ not, rounds of weighted draws follow from the points from the prior, and where t
 populations that are carried from the prior to the posterior. Such draws are the answer with `auto`,
 where the points or populations agree with them; otherwise ensembles walk in the last map's
 coordinates. Where linear response to the model's errors bends around such draws, rounds follow from
-where it moves them, with the errors integrated out. With `emcee` many walkers make some steps from
-what `auto` would answer with. What each stage does is in `inference.posterior.stages`.
+where it moves them, with the errors integrated out; where it bends around draws of Laplace shapes
+that do not fit, they begin there. With `emcee` many walkers make some steps from what `auto` would
+answer with. What each stage does is in `inference.posterior.stages`.
 """
 
 import dataclasses

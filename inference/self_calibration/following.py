@@ -19,12 +19,12 @@ import numpy as np
 
 from inference.self_calibration.ageing import awake, old_from
 from inference.self_calibration.calibration import Asked, Outcome
-from inference.self_calibration.gathering import Kept, in_order, kinds_of, surprising
+from inference.self_calibration.gathering import EMPTY, Kept, in_order, kinds_of, surprising
 from inference.self_calibration.handing_over import hand_over
 from inference.self_calibration.looking import EVERY, look
 from inference.self_calibration.plan import Plan
 from inference.self_calibration.state import CalibrationState, Switch
-from inference.self_calibration.withholding import withheld
+from inference.self_calibration.withholding import not_free, withheld
 from inference.tracking.track import Track, step
 from simulator.frames import Frames
 
@@ -125,6 +125,8 @@ def _tracked(
     after, track = step(model, state.track, frames)
     if state.calibrated:
         track = withheld(model, frames, track)
+    else:
+        track = not_free(model, frames, _told_empty(state), track)
     kinds = kinds_of(plan.sensor, frames, track, state.trusts_empty)
     recent = in_order(state.recent, Kept(frames, numbers, kinds)).select(slice(-_RECENT, None))
     changed = dataclasses.replace(
@@ -135,6 +137,12 @@ def _tracked(
         surprises=state.surprises + int(surprising(track).sum()),
     )
     return changed, track
+
+
+def _told_empty(state: CalibrationState) -> Frames | None:
+    """Return the last frames without the object that tell of the scene as it is now."""
+    recent = state.recent.select(slice(-max(state.count - state.since, 1), None))
+    return recent.select(recent.kind == EMPTY).frames
 
 
 def conclude(state: CalibrationState, outcome: Outcome, applies_at: int) -> CalibrationState:

@@ -1,4 +1,4 @@
-"""Ranges that are withheld: what is read may be crosstalk alone, which has walked."""
+"""What is withheld: ranges of what may be crosstalk alone, and that a way is free."""
 
 import dataclasses
 
@@ -11,9 +11,11 @@ from inference.tracking.track import Track
 from inference.tracking.tracker import Tracker
 from simulator.frames import Frames
 
-__all__ = ["withheld"]
+__all__ = ["not_free", "withheld"]
 
 _MAY_BE_EMPTY = 0.05  # probability of readings as strange as these without an object
+# of an object beside crosstalk that is not known yet (docs/model.md, resting)
+_LEAST = 0.2
 
 
 def withheld(model: Tracker, frames: Frames, track: Track) -> Track:
@@ -49,6 +51,40 @@ def withheld(model: Tracker, frames: Frames, track: Track) -> Track:
     status = np.where(may, np.uint8(Status.AMBIGUOUS), track.status)
     present = np.where(may, np.minimum(track.present, 0.5), track.present)
     return dataclasses.replace(track, status=status.astype(np.uint8), present=present)
+
+
+def not_free(model: Tracker, frames: Frames, empty: Frames | None, track: Track) -> Track:
+    """Return answers in which no scene is free that crosstalk alone explains which is not known.
+
+    Until a scene is calibrated the tracker carries its crosstalk as an error as wide as its prior,
+    and learns nothing of it: the light of any object may be crosstalk then.
+
+    Parameters
+    ----------
+    model : Tracker
+        Of a scene that is not calibrated.
+    frames, track : Frames, Track
+        Frames, and what it said of them.
+    empty : Frames or None
+        The last that are known to be without the object.
+
+    Returns
+    -------
+    Track
+        With `present` not below a least probability, but of frames that are known to be empty, or
+        read what such frames read.
+    """
+    low = track.present < _LEAST
+    if frames.object_present is not None:
+        low &= frames.object_present
+    if not low.any():
+        return track
+    if empty is not None and not model.observed.by_rate:
+        used = np.asarray(model.observed.used)
+        off = (frames.readings - empty.readings.mean(axis=0)) * model.observed.scale
+        surprise = np.square(off[:, used]).sum(axis=1) / (1.0 + 1.0 / len(empty))
+        low &= surprise > scipy.stats.chi2.isf(_MAY_BE_EMPTY, int(used.sum()))
+    return dataclasses.replace(track, present=np.where(low, _LEAST, track.present))
 
 
 def surprise_of_empty(model: Tracker, frames: Frames) -> NDArray[np.float64]:

@@ -140,8 +140,8 @@ def at_once(
 ) -> tuple[Tempering, int] | None:
     """Begin with errors integrated out, where they are to be; with the evaluations it took.
 
-    Not where crosstalk and a background are confounded: rounds from so few points failed in one of
-    four sets there, and what they took was lost.
+    Not where crosstalk and a background are confounded: so few points are no beginning there, and
+    what rounds that fail have taken is lost.
 
     Parameters
     ----------

@@ -10,7 +10,8 @@
 A job without optional terms begins with `Starting`. Ensembles that hardly move call for
 populations, once. From weighted draws that could be the answer ensembles walk with the method
 `emcee`. Where errors of the model are integrated out behind an exact model, `Tempering`
-follows once more, on its moved draws, and the checkpoint keeps what the exact model came to.
+follows once more, on its moved draws, and the checkpoint keeps what the exact model came to, or
+would begin with.
 """
 
 import dataclasses

@@ -24,7 +24,7 @@ from inference.posterior.answer.posterior import Posterior
 from inference.posterior.answer.responses import Responses
 from inference.posterior.criticism.discrepancy_check import is_bent, may_be_bent
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages import responding
+from inference.posterior.stages import integrating
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.responding import RespondTask, decided, tasks
 from inference.posterior.stages.setting_out import EvaluateTask, SetOutTask
@@ -168,7 +168,7 @@ def _looked_at() -> tuple[fold.Job, Checkpoint, Checkpoint]:
 
 def test_what_is_straight_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its answer is that of the exact model's draws, and one step at them says so."""
-    monkeypatch.setattr(responding, "repeated", None)
+    monkeypatch.setattr(integrating, "repeated", None)
     job, before, after = _looked_at()
     assert after.linear
     assert after.stage is before.stage
@@ -179,9 +179,9 @@ def test_a_prior_that_is_contradicted_is_not_explained_by_errors(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Whatever the response misses: where the draws have left a prior, that is to be said."""
-    monkeypatch.setattr(responding, "repeated", None)
-    monkeypatch.setattr(responding, "misses", lambda *_: True)
-    monkeypatch.setattr(responding, "are_far_out", lambda *_: True)
+    monkeypatch.setattr(integrating, "repeated", None)
+    monkeypatch.setattr(integrating, "misses", lambda *_: True)
+    monkeypatch.setattr(integrating, "are_far_out", lambda *_: True)
     _, before, after = _looked_at()
     assert after.linear
     assert after.stage is before.stage

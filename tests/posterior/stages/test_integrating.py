@@ -1,0 +1,139 @@
+"""Rounds with errors of the model integrated out from the start: an object before a known wall.
+
+The exact model's posterior is thin and bent, and its Laplace shapes do not fit it.
+"""
+
+import dataclasses
+import functools
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks import hard_posteriors
+from inference.posterior import fold
+from inference.posterior.settings import SamplerSettings
+from inference.posterior.stages import starting
+from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.responding import RespondTask, decided
+from inference.posterior.stages.stage import Starting, Tempering, Weighted
+from simulator.scene import parse_scene
+from simulator.sensor import parse_sensor
+from simulator.simulate import simulate
+from simulator.trajectories import RadialTrajectory
+from tests.posterior.test_archive import same
+
+READ, FRAMES = 1e-4, 40
+BEYOND = 5.0  # standard errors: a false alarm in 1.7 million
+
+
+@functools.cache
+def _job(name: str = "background, R known", seed: int = 0) -> fold.Job:
+    terms = hard_posteriors.SCENES[name]
+    sensor = parse_sensor({**hard_posteriors.SENSORS["pulsed"], "noise": {"read": [READ, READ]}})
+    truth = {term: hard_posteriors.TRUTH[term] for term in ("object", *terms)}
+    path = RadialTrajectory(from_m=0.1, to_m=2.0, frames=FRAMES, spacing="log")
+    made = simulate(sensor, parse_scene({**truth, "discrepancy": 0}), path, 3)
+    settings = SamplerSettings(method="auto", seed=seed)
+    return fold.prepare(sensor, parse_scene(terms), made.frames, settings)
+
+
+def _next(job: fold.Job, checkpoint: Checkpoint) -> Checkpoint:
+    return fold.merge(job, checkpoint, [fold.run(task) for task in fold.tasks(job, checkpoint)])
+
+
+def _begun(job: fold.Job) -> Checkpoint:
+    """What the search for optima led to."""
+    checkpoint = fold.start(job)
+    while isinstance(checkpoint.stage, Starting):
+        checkpoint = _next(job, checkpoint)
+    return checkpoint
+
+
+@functools.cache
+def _steps() -> tuple[Checkpoint, ...]:
+    """Every checkpoint from there on."""
+    found = [_begun(_job())]
+    while fold.tasks(_job(), found[-1]):
+        found.append(_next(_job(), found[-1]))
+    return tuple(found)
+
+
+def test_rounds_begin_with_the_errors_integrated_out() -> None:
+    begun, last = _steps()[0], _steps()[-1]
+    assert begun.integrated
+    assert isinstance(begun.stage, Tempering)
+    assert isinstance(begun.exact, Tempering)
+    assert begun.exact.rounds is None  # nothing was drawn of the exact model
+    _, *scouts = (each for each in begun.stage.populations if each is not None)
+    # points that came from the prior can contradict what the moved draws leave out
+    assert [len(each.z) > 10 for each in scouts] == [True, True]
+    assert isinstance(last.stage, Weighted)
+    assert last.integrated
+    assert last.exact is None
+    assert not any(
+        isinstance(task, RespondTask) for each in _steps() for task in fold.tasks(_job(), each)
+    )
+
+
+def test_what_it_stores_goes_on_to_the_same_end() -> None:
+    stored = Checkpoint.from_bytes(_steps()[0].to_bytes())
+    assert same(_next(_job(), stored), _steps()[1])
+
+
+def test_rounds_answer_as_soon_as_they_tell() -> None:
+    """Before, what the exact model knows is no answer: nothing was sampled of it."""
+    drawn = [fold.summarise(_job(), _steps()[k], 1.0, 1.0) for k in (0, -2)]
+    assert not drawn[0].drawn
+    assert drawn[-1].drawn
+    assert not drawn[-1].verdict.converged
+    last = fold.summarise(_job(), _steps()[-1], 1.0, 1.0)
+    assert last.verdict.converged
+    for path, row in last.parameters.items():
+        assert drawn[-1].parameters[path].sd == pytest.approx(row.sd, rel=0.3), path
+
+
+def test_where_rounds_fail_the_exact_model_is_sampled_and_looked_at() -> None:
+    begun = _steps()[0]
+    stage = begun.stage
+    assert isinstance(stage, Tempering)
+    failed = dataclasses.replace(stage, populations=(None,), scouted=False)
+    left = decided(dataclasses.replace(begun, stage=failed))
+    assert left.stage is begun.exact
+    assert not left.integrated
+    assert left.exact is None
+    assert not left.linear  # its response is still to be looked at, around draws of it
+    assert fold.tasks(_job(), left)
+
+
+def test_what_is_confounded_begins_with_the_exact_model() -> None:
+    begun = _begun(_job("crosstalk, background, R known"))
+    assert isinstance(begun.stage, Tempering)
+    assert not begun.integrated
+    assert begun.exact is None
+
+
+def test_it_is_the_law_that_rounds_behind_an_exact_model_come_to(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(starting, "at_once", lambda *_: None)
+    job = _job(seed=1)
+    checkpoint = _begun(job)
+    assert not checkpoint.integrated
+    while fold.tasks(job, checkpoint):
+        checkpoint = _next(job, checkpoint)
+    assert checkpoint.integrated
+    one, other = (
+        fold.summarise(of, each, 1.0, 1.0)
+        for of, each in ((_job(), _steps()[-1]), (job, checkpoint))
+    )
+    sizes = []
+    for each in (_steps()[-1], checkpoint):
+        assert isinstance(each.stage, Weighted)
+        sizes.append(each.stage.draws.worth)
+    standard_error = math.sqrt(1 / sizes[0] + 1 / sizes[1])
+    for path, row in one.parameters.items():
+        there, sd = other.parameters[path], max(row.sd, other.parameters[path].sd)
+        assert abs(row.mean - there.mean) < BEYOND * standard_error * sd, path
+    ranges = np.abs(one.range_m.mean - other.range_m.mean) / one.range_m.sd
+    assert np.nanmax(ranges) < BEYOND * standard_error
