@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inference.self_calibration.ageing import awake, old_from
 from inference.self_calibration.calibration import Asked, Outcome
@@ -24,7 +25,7 @@ from inference.self_calibration.handing_over import hand_over
 from inference.self_calibration.looking import EVERY, look
 from inference.self_calibration.plan import Plan
 from inference.self_calibration.state import CalibrationState, Switch
-from inference.self_calibration.withholding import not_free, withheld
+from inference.self_calibration.withholding import faded, not_free, withheld
 from inference.tracking.track import Track, step
 from simulator.frames import Frames
 
@@ -106,7 +107,11 @@ def follow(
 
 
 def _time_of(frames: Frames, index: int) -> float:
-    return 0.0 if frames.time_s is None else float(frames.time_s[index])
+    return float(_times(frames)[index])
+
+
+def _times(frames: Frames) -> NDArray[np.float64]:
+    return np.zeros(len(frames)) if frames.time_s is None else frames.time_s
 
 
 def _outlived(state: CalibrationState, frames: Frames, start: int) -> int:
@@ -125,8 +130,11 @@ def _tracked(
     after, track = step(model, state.track, frames)
     if state.calibrated:
         track = withheld(model, frames, track)
+        widest, widest_at = 0.0, 0.0
     else:
         track = not_free(model, frames, _told_empty(state), track)
+        before = state.widest, state.widest_at
+        track, widest, widest_at = faded(track, _times(frames), *before)
     kinds = kinds_of(plan.sensor, frames, track, state.trusts_empty)
     recent = in_order(state.recent, Kept(frames, numbers, kinds)).select(slice(-_RECENT, None))
     changed = dataclasses.replace(
@@ -135,6 +143,8 @@ def _tracked(
         recent=recent,
         count=state.count + len(frames),
         surprises=state.surprises + int(surprising(track).sum()),
+        widest=widest,
+        widest_at=widest_at,
     )
     return changed, track
 

@@ -87,6 +87,9 @@ class CalibrationState:
         What is to change.
     steps, grew_at : int
         Different amplitudes that are gathered, and how many frames had come when they grew.
+    widest, widest_at : float
+        Before a calibration the largest standard deviation of late, as a share of the range, as of
+        the last frame with one range; and its time [s].
     drift : Drift or None
         How old what is known is; None before it is known.
     events : tuple of dict
@@ -115,6 +118,8 @@ class CalibrationState:
     switch: Switch | None = None
     steps: int = 0
     grew_at: int = 0
+    widest: float = 0.0
+    widest_at: float = 0.0
     drift: Drift | None = None
     events: tuple[Mapping[str, Any], ...] = ()
 
@@ -122,6 +127,7 @@ class CalibrationState:
 _PLAIN = (
     "calibrated", "known", "trusts_empty", "count", "since", "not_before", "points", "failures",
     "doubts", "surprises", "surprised", "number", "taken_at", "steps", "grew_at",
+    "widest", "widest_at",
 )  # fmt: skip
 
 

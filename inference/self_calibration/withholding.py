@@ -1,6 +1,7 @@
-"""What is withheld: ranges of what may be crosstalk alone, and that a way is free."""
+"""What is withheld: ranges of what may be crosstalk, free ways, and what is suddenly sharp."""
 
 import dataclasses
+import math
 
 import numpy as np
 import scipy
@@ -11,11 +12,12 @@ from inference.tracking.track import Track
 from inference.tracking.tracker import Tracker
 from simulator.frames import Frames
 
-__all__ = ["not_free", "withheld"]
+__all__ = ["faded", "not_free", "withheld"]
 
 _MAY_BE_EMPTY = 0.05  # probability of readings as strange as these without an object
 # of an object beside crosstalk that is not known yet (docs/model.md, resting)
 _LEAST = 0.2
+_FADES_S = 3.0  # time in which a width before a calibration is forgotten to 1 / e
 
 
 def withheld(model: Tracker, frames: Frames, track: Track) -> Track:
@@ -85,6 +87,44 @@ def not_free(model: Tracker, frames: Frames, empty: Frames | None, track: Track)
         surprise = np.square(off[:, used]).sum(axis=1) / (1.0 + 1.0 / len(empty))
         low &= surprise > scipy.stats.chi2.isf(_MAY_BE_EMPTY, int(used.sum()))
     return dataclasses.replace(track, present=np.where(low, _LEAST, track.present))
+
+
+def faded(
+    track: Track, times: NDArray[np.float64], widest: float, widest_at: float
+) -> tuple[Track, float, float]:
+    """Return answers that are not suddenly sharper than those of the seconds before.
+
+    Before a calibration errors of the scene are as large as its priors, and the tracker follows
+    them linearly. Where what they do to a range goes through zero, its standard deviation would be
+    that of the noise in a few frames; what is known of the scene has not changed.
+
+    Parameters
+    ----------
+    track : Track
+        Answers.
+    times : ndarray, shape (n,)
+        Of their frames [s].
+    widest, widest_at : float
+        Largest standard deviation of late, as a share of the range, as of this time [s].
+
+    Returns
+    -------
+    (Track, float, float)
+        With what was added as a part of the scene; and the largest share and its time, as of the
+        last frame with one range.
+    """
+    sd, scene = track.best_sd_m.copy(), track.sd_parts_m.scene.copy()
+    for i in np.flatnonzero(track.status == Status.UNIQUE):
+        widest *= math.exp(-(float(times[i]) - widest_at) / _FADES_S)
+        widest_at = float(times[i])
+        least = widest * track.best_m[i]
+        if sd[i] < least:
+            scene[i] = math.hypot(scene[i], math.sqrt((least - sd[i]) * (least + sd[i])))
+            sd[i] = least
+        elif np.isfinite(sd[i]):
+            widest = float(sd[i] / track.best_m[i])
+    parts = track.sd_parts_m._replace(scene=scene)
+    return dataclasses.replace(track, best_sd_m=sd, sd_parts_m=parts), widest, widest_at
 
 
 def surprise_of_empty(model: Tracker, frames: Frames) -> NDArray[np.float64]:

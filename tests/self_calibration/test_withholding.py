@@ -1,4 +1,4 @@
-"""A stream that is not calibrated yet calls nothing free that crosstalk alone may explain.
+"""A stream that is not calibrated yet: nothing that may be crosstalk is free, or suddenly sharp.
 
 The crosstalk is as wide as its prior then, and an empty scene explains the light of any object: it
 was called free with a probability of 1.4 % of an object whose light was 280 noises.
@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from inference.self_calibration.following import follow
 from inference.self_calibration.plan import begin, plan_of
+from inference.self_calibration.state import calibration_from_bytes, calibration_to_bytes
 from inference.tracking.settings import TrackingSettings
+from inference.tracking.track import step
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
@@ -63,3 +65,44 @@ def test_one_observable_is_held_to_its_own_frames(observables: str) -> None:
     present = _present(TOLD, settings=settings)
     assert (present[EMPTY:] >= FREE).all()
     assert (present[TOLD:EMPTY] < FREE).any()
+
+
+def _to_and_fro() -> Frames:
+    """Ten seconds behind empty frames, of an object that the scene does not know."""
+    times = np.arange(360) / 30
+    there = np.arange(360) >= EMPTY
+    path = SampledTrajectory(
+        range_m=(0.8 * np.exp(0.5 * np.sin(1.1 * times))).tolist(),
+        time_s=times.tolist(),
+        object_present=there.tolist(),
+    )
+    light = simulate(SENSOR, parse_scene({"object": OBJECT, "discrepancy": 0}), path, 4)
+    readings = light.frames.readings + CROSSTALK
+    return Frames(readings=readings, time_s=times, object_present=np.arange(360) >= TOLD)
+
+
+def test_ranges_are_never_suddenly_sharp() -> None:
+    """Shares fade by no more than 1 / e in three seconds, however the stream is cut."""
+    plan, frames = plan_of(SENSOR, STATED, TrackingSettings(), 7), _to_and_fro()
+    state, tracks = begin(plan), []
+    for start in range(0, len(frames), 24):
+        part = frames.select(slice(start, start + 24))
+        state, pieces = follow(plan, state, part, range(start, start + len(part)))
+        tracks += [piece.track for piece in pieces]
+        state = calibration_from_bytes(calibration_to_bytes(state))
+    sd, found = (np.concatenate([getattr(t, name) for t in tracks]) for name in ("sd_m", "range_m"))
+    one = np.flatnonzero(np.isfinite(sd))
+    assert one.size > 100
+    assert frames.time_s is not None
+    shares, steps = (sd / found)[one], np.diff(frames.time_s[one])
+    assert (shares[1:] >= shares[:-1] * np.exp(-steps / 3.0) * (1 - 1e-12)).all()
+    # it is the rule that makes them so: the tracker itself is sharper
+    _, plain = step(plan.tracker(state.scene), plan.tracker(state.scene).first, frames)
+    assert (plain.sd_m[one] < 0.9 * sd[one]).any()
+    squares = [
+        np.concatenate([getattr(t.sd_parts_m, part) for t in tracks])[one] ** 2
+        for part in ("noise", "scene", "model")
+    ]
+    np.testing.assert_allclose(sum(squares), sd[one] ** 2, rtol=1e-9)
+    truth = 0.8 * np.exp(0.5 * np.sin(1.1 * frames.time_s[one]))
+    assert np.max(np.abs(found[one] - truth) / sd[one]) < 4.0
