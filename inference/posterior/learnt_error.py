@@ -83,6 +83,8 @@ def learnt_error(sensor: Sensor, terms: Terms, frames: Frames, unknowns: int) ->
     shot = sensor.noise.shot * np.abs(frames.readings[used][usable])
     ruler = (inverse @ slope[usable][:, :, None])[:, :, 0] * sd[usable][:, None]
     variance = (inverse**2 @ (read**2 + shot)[:, :, None])[:, :, 0] + ruler**2
+    if sensor.kind == "pulsed":  # late photons are in both windows
+        variance += 2.0 * inverse.prod(axis=2) * shot.min(axis=1)[:, None]
     variance[:, 0] += sensor.noise.relative**2
     flux, range_m = (_size(e, v, spare) for e, v in zip(errors.T, variance.T, strict=True))
     return LearntError(frames=int(usable.sum()), flux=flux, range_m=range_m)

@@ -46,6 +46,11 @@ def frames_with(
         moved = seen * (np.hypot(*light.T) / np.hypot(*seen.T))[:, None]
     readings = mean_readings(sensor, terms, known) - light
     readings += (1.0 + flux * rng.standard_normal(count))[:, None] * moved
+    late, shot = np.abs(readings[:, 0]), sensor.noise.shot
+    if shot > 0.0:  # of a pulse: photons that are late are in both readings
+        early = np.abs(readings[:, 1]) - late
+        readings += (np.sqrt(shot * late) * rng.standard_normal(count))[:, None]
+        readings[:, 1] += np.sqrt(shot * early) * rng.standard_normal(count)
     readings += sensor.noise.read[0] * rng.standard_normal(readings.shape)
     told: NDArray[np.float64] = known + RULER_M * rng.standard_normal(count)
     return Frames(readings, known_range_m=told, known_range_sd_m=np.full(count, RULER_M))
@@ -98,6 +103,20 @@ def test_frames_in_the_dark_hide_no_errors(sensor: Sensor, flux: float, range_m:
     assert found is not None
     assert found.flux == pytest.approx(flux, rel=0.16, abs=5e-4)
     assert found.range_m == pytest.approx(range_m, rel=0.33, abs=5e-4)
+
+
+def test_late_photons_are_in_both_windows() -> None:
+    """Ranges err by 1 to 50 mm of photons, less than both windows would by photons of their own.
+
+    Of 1000 frames the standard error was 4.8 % (30 seeds), of 20000 it is 1.1 %; 5 of them fail
+    once in 1e6. With windows that share nothing the size is 9 % less.
+    """
+    noise = PULSE.noise.model_copy(update={"shot": 1e-6})
+    sensor = PULSE.model_copy(update={"noise": noise})
+    frames = frames_with(sensor, 0.0, 0.005, 20000, 1)
+    found = learnt_error(sensor, terms_of(sensor), frames, 0)
+    assert found is not None
+    assert found.range_m == pytest.approx(0.005, rel=0.055)
 
 
 def test_few_frames_say_less_and_say_so() -> None:
