@@ -159,7 +159,8 @@ class LearntError(Validated):
         How many there were.
     flux, range_m : float
         Sizes of the errors of the object's flux [1] and of the effective distance [m] that are left
-        with the unknowns as they were learnt, noise and the ruler's own error taken off.
+        with the unknowns as they were learnt, noise and the ruler's own error taken off; 0 where
+        chance explains them.
     """
 
     frames: Annotated[int, pydantic.Field(ge=1)]

@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 _SPARE = 4  # frames beyond the unknowns: fewer say next to nothing of a variance
 _STEP = 1e-5  # of a range, for slopes
 _SURE = 0.95
+_SHOWN = float(scipy.stats.norm.ppf(_SURE)) ** 2  # of the deviance: a size is not below zero
+_LEAST = 1e-6  # of a variance: next to nothing of it
+_APART = 0.25  # between logarithms of squared sizes that are tried: no maximum is as narrow
 
 
 def learnt_error(sensor: Sensor, terms: Terms, frames: Frames, unknowns: int) -> LearntError | None:
@@ -80,9 +83,40 @@ def learnt_error(sensor: Sensor, terms: Terms, frames: Frames, unknowns: int) ->
     shot = sensor.noise.shot * np.abs(frames.readings[used][usable])
     ruler = (inverse @ slope[usable][:, :, None])[:, :, 0] * sd[usable][:, None]
     variance = (inverse**2 @ (read**2 + shot)[:, :, None])[:, :, 0] + ruler**2
+    if sensor.kind == "pulsed":  # late photons are in both windows
+        variance += 2.0 * inverse.prod(axis=2) * shot.min(axis=1)[:, None]
     variance[:, 0] += sensor.noise.relative**2
-    excess = np.maximum((errors**2 - variance).sum(axis=0), 0.0) / spare
-    # so that a normal law of this size holds as much as Student's t, which few frames leave
-    wider = scipy.stats.t.ppf(_SURE, spare) / scipy.stats.norm.ppf(_SURE)
-    flux, range_m = (wider * np.sqrt(excess)).tolist()
+    flux, range_m = (_size(e, v, spare) for e, v in zip(errors.T, variance.T, strict=True))
     return LearntError(frames=int(usable.sum()), flux=flux, range_m=range_m)
+
+
+def _size(errors: Array, variance: Array, spare: int) -> float:
+    """Return the size s of errors e whose variances are v + s^2; 0 where chance explains them."""
+    free = spare / len(errors)  # the unknowns have taken their part of each square
+    most = float(np.max(errors**2 / free - variance))  # no maximum lies beyond
+    if most <= 0.0:
+        return 0.0
+
+    def deviance(square: float, free: float) -> float:
+        total = variance + square
+        return float((errors**2 / total + free * np.log(total / variance)).sum())
+
+    def slope(log_square: float) -> float:
+        total = variance + np.exp(log_square)
+        return float(((free * total - errors**2) / total**2).sum() / (1.0 / total).sum())
+
+    least = _LEAST * min(float(variance.min()), most)
+    tried = np.geomspace(least, most, int(np.log(most / least) / _APART) + 2)
+    # against n free squares, not fewer: what the unknowns took is no sign of an error
+    if deviance(0.0, 1.0) - min(deviance(square, 1.0) for square in tried) < _SHOWN:
+        return 0.0
+    best = int(np.argmin([deviance(square, free) for square in tried]))
+    low, high = np.log(tried[[max(best - 1, 0), min(best + 1, len(tried) - 1)]])
+    square = float(tried[best])
+    if slope(low) < 0.0 < slope(high):
+        square = float(np.exp(scipy.optimize.brentq(slope, low, high)))
+    # a frame whose own noise is larger says less of the size; one at least has shown it
+    degrees = max(free * float(((square / (variance + square)) ** 2).sum()), 1.0)
+    # so that a normal law of this size holds as much as Student's t, which few frames leave
+    wider = scipy.stats.t.ppf(_SURE, degrees) / scipy.stats.norm.ppf(_SURE)
+    return float(wider * np.sqrt(square))
