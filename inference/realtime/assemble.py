@@ -18,6 +18,7 @@ __all__ = [
     "Outcome",
     "assemble",
     "reasons_of",
+    "up_to_wall",
 ]
 
 Array = NDArray[np.float64]
@@ -28,6 +29,7 @@ NOISE_BAND = 3.0
 # the same where a frame taken for one on the right side has a range at the other end of all ranges:
 # one frame in 300,000
 END_BAND = 4.5
+_WALL = 1.0 - 1e-9  # of a wall's distance: what reaches so far reaches it, but for rounding
 
 NEGATIVE = (
     "the light is below zero by far more than noise: the crosstalk or the noise is not as stated"
@@ -105,6 +107,25 @@ class Outcome:
     support: tuple[float, float]
     reason: NDArray[np.uint8]
     reasons: tuple[str, ...]
+
+
+def up_to_wall(candidates: Candidates, wall_m: float) -> Candidates:
+    """Mark frames of which noise moves a root up to the wall, where the curve ends.
+
+    Its standard deviation is a third of how far noise reaches there, not that of a normal law.
+
+    Parameters
+    ----------
+    candidates : Candidates
+        Solutions before a wall.
+    wall_m : float
+        Its distance [m].
+    """
+    with np.errstate(invalid="ignore"):
+        ends = candidates.roots + NOISE_BAND * candidates.noise >= wall_m * _WALL
+        alone = np.isfinite(candidates.roots) & (candidates.roots < wall_m * _WALL)
+    frames = candidates.near_frame | (ends & alone).any(axis=1)
+    return dataclasses.replace(candidates, near_frame=frames)
 
 
 def _moved_back(

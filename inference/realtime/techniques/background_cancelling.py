@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import TechniqueResult
-from inference.realtime.assemble import END_BAND, NOISE_BAND, Outcome, assemble, reasons_of
+from inference.realtime.assemble import (
+    END_BAND,
+    NOISE_BAND,
+    Outcome,
+    assemble,
+    reasons_of,
+    up_to_wall,
+)
 from inference.realtime.from_curve import candidates_of, curve_parameters
 from inference.realtime.model_error import model_error_of, point_error, sd_of_roots
 from inference.realtime.net import UNREPRESENTABLE, Form, Net, known_net_readings
@@ -120,6 +127,7 @@ def _solve(task: Task) -> TechniqueResult:
         candidates, slopes = candidates_of(
             task, curve, distance, target, sd, beside=beside, end_band=END_BAND
         )
+        candidates = up_to_wall(candidates, distance)
         physical = None
         if task.physical and known.has("background.strength"):
             scene, wave = seen_scene(task, net.relative)

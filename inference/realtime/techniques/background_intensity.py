@@ -14,6 +14,7 @@ from inference.realtime.assemble import (
     Outcome,
     assemble,
     reasons_of,
+    up_to_wall,
 )
 from inference.realtime.from_curve import stacked
 from inference.realtime.model_error import model_error_of
@@ -82,6 +83,7 @@ def _solve(task: Task) -> TechniqueResult:
             model=np.abs(model) if error.range_m > 0 or error.shadow > 0 else None,
             merged=np.isnan(stacked(sds)) & stacked(near),
         )
+        candidates = up_to_wall(candidates, known.get("background.distance_m"))
     if isinstance(sensor, PulsedSensor):
         reason = np.full(n, _BEYOND)
         reason[net.first <= 0] = _CONTACT
