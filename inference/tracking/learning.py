@@ -11,6 +11,8 @@ from inference.tracking.candidates import TrackCandidate
 from inference.tracking.frame_density import Prior, TrackedFrame, bend_at, spread_at
 from inference.tracking.hypotheses import (
     ANCHOR,
+    CROSSTALK1,
+    CROSSTALK2,
     WITHOUT_CROSSTALK,
     Hypotheses,
     Scratch,
@@ -119,7 +121,11 @@ def _of_readings(
 ) -> Linear:
     """Linearise readings at a mode; ``nuisance`` is filled with their nuisance Jacobian."""
     x, t, gain = of.x, tangent, frame.gain
-    m1, m2 = t.value1 + prior.added.offset1, t.value2 + prior.added.offset2
+    offset1, offset2 = table.crosstalk1, table.crosstalk2
+    if learns_crosstalk(of):
+        # not the prior's: a known range has taught the hypothesis its crosstalk, too
+        offset1, offset2 = offset1 + x[row, CROSSTALK1], offset2 + x[row, CROSSTALK2]
+    m1, m2 = t.value1 + offset1, t.value2 + offset2
     i, part = cell_of(t.u, table)
     for j in range(nuisance.shape[1]):
         g1, g2 = nuisance_at(i, part, j, table)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy import stats
 
 from inference.estimates import Status
 from inference.tracking.settings import TrackingSettings
@@ -125,6 +126,34 @@ def test_known_ranges_teach_crosstalk(observables: Any) -> None:
     assert result.crosstalk_sd[-1][used] == pytest.approx(precision**-0.5, rel=0.02)
     assert result.crosstalk[-1][used] == pytest.approx(wanted[used], abs=0.1 * precision**-0.5)
     assert (result.outlier < 0.5).all()
+
+
+@pytest.mark.parametrize("frame", [1, 7, 15])
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+def test_what_a_later_known_range_teaches_is_within_its_deviations(kind: str, frame: int) -> None:
+    """An object that comes nearer, predicted far off because its light may be crosstalk.
+
+    Sums of squared deviations follow chi-square laws, at a millionth.
+    """
+    sensor, bare = sensor_of(NOISE / 3.0, kind), scene_of(PLATE)
+    light = 300.0 * NOISE / 3.0
+    priors = [{"prior": "normal", "mean": 0.0, "sd": scale * light} for scale in (0.3, 0.6)]
+    scene = scene_of(PLATE, crosstalk=priors)
+    true = np.array([0.05, 0.3]) * light
+    r, sd, seeds = 1.5 - 0.01 * np.arange(60), 0.005, 20
+    of_crosstalk, of_range = np.zeros((seeds, 2)), np.zeros(seeds)
+    for seed in range(seeds):
+        rng = np.random.default_rng(seed)
+        readings = read(sensor, bare, r, rng) + true
+        known = {frame: (float(r[frame] + sd * rng.standard_normal()), sd)}
+        result = track(sensor, scene, known_at(frames_of(readings, 0.05), known))
+        assert result.crosstalk is not None
+        assert result.crosstalk_sd is not None
+        of_crosstalk[seed] = ((result.crosstalk - true) / result.crosstalk_sd)[frame]
+        of_range[seed] = ((result.best_m - r) / result.best_sd_m)[frame + 1]
+    most = stats.chi2.isf(1e-6, seeds)
+    assert ((of_crosstalk**2).sum(axis=0) < most).all()
+    assert (of_range**2).sum() < most
 
 
 def test_a_known_range_that_contradicts_its_frame_is_an_outlier_and_then_a_misfit() -> None:
