@@ -16,6 +16,7 @@ from simulator.errors import InvalidInputError
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
 from simulator.simulate import mean_readings
+from tests.posterior.scenes import UNKNOWN_CROSSTALK
 from tests.tracking.reference import GridFilter
 from tests.tracking.scenes import (
     FOLD_M,
@@ -218,11 +219,12 @@ def test_saturated_frames_and_outliers_have_their_known_range() -> None:
         assert result.present[i] == pytest.approx(1.0)
 
 
-def test_a_stream_with_known_ranges_may_be_cut_anywhere() -> None:
+@pytest.mark.parametrize("unknown", [{}, {"crosstalk": UNKNOWN_CROSSTALK}])
+def test_a_stream_with_known_ranges_may_be_cut_anywhere(unknown: dict[str, Any]) -> None:
     """Batches with and without the columns give the same bits as all in one."""
-    sensor, scene = sensor_of(NOISE), scene_of(FOLDED)
+    sensor, scene = sensor_of(NOISE), scene_of(FOLDED, **unknown)
     u, _ = wander(np.random.default_rng(8), 30, TrackingSettings(), (-0.2, 0.3))
-    readings = read(sensor, scene, np.exp(u), np.random.default_rng(8))
+    readings = read(sensor, scene_of(FOLDED), np.exp(u), np.random.default_rng(8))
     frames = known_at(frames_of(readings), {i: (float(np.exp(u[i])), 0.03) for i in (3, 4, 17)})
     model = tracker(sensor, scene)
     _, whole = step(model, model.first, frames)
