@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from inference.tracking.borrowed import borrowed
 from inference.tracking.frame_density import TrackedFrame, log_known
-from inference.tracking.hypotheses import Hypotheses, Scratch, U
+from inference.tracking.hypotheses import Hypotheses, Scratch, U, learns_crosstalk
 from inference.tracking.readings_table import LOG_PRIOR, ReadingsTable, cell_of
+from inference.tracking.shared_error import NOT_SHARED, follow, shared_of
 from inference.tracking.square_root import update_range
 from simulator.compiled import compiled
 
@@ -33,8 +34,20 @@ def beyond_support(known: Array, sd: Array, table: ReadingsTable) -> NDArray[np.
 
 @borrowed
 @compiled
-def take_known(of: Hypotheses, row: int, u: float, frame: TrackedFrame, scratch: Scratch) -> float:
+def take_known(
+    of: Hypotheses,
+    row: int,
+    u: float,
+    new: bool,
+    frame: TrackedFrame,
+    table: ReadingsTable,
+    scratch: Scratch,
+) -> float:
     """Teach a hypothesis the range that is known of a frame, linear at u; its surprise.
+
+    Where crosstalk is learnt, a range far from the prediction says where on the curve the object
+    is. The crosstalk goes there along the curve, not along its tangent, with all that frames have
+    told of the readings kept: nuisance parameters stay what they are.
 
     Parameters
     ----------
@@ -42,8 +55,12 @@ def take_known(of: Hypotheses, row: int, u: float, frame: TrackedFrame, scratch:
         The hypothesis; changed in place.
     u : float
         log r at which the range is taken.
+    new : bool
+        Whether the object has just come: its range has nothing in common with the crosstalk.
     frame : TrackedFrame
         Of known range.
+    table : ReadingsTable
+        Mean readings.
     scratch : Scratch
         Overwritten.
 
@@ -52,9 +69,14 @@ def take_known(of: Hypotheses, row: int, u: float, frame: TrackedFrame, scratch:
     float
         Normalised innovation squared.
     """
+    along = learns_crosstalk(of) and not new
+    shared = shared_of(of, row) if along else NOT_SHARED
     slope = math.exp(u) * frame.known_rate
     residual = frame.known_m * frame.known_rate - slope * (1.0 + of.x[row, U] - u)
-    return update_range(of, row, residual, slope, scratch)
+    surprise = update_range(of, row, residual, slope, scratch)
+    if along:
+        follow(of, row, shared, frame.gain, table)
+    return surprise
 
 
 @borrowed

@@ -22,6 +22,7 @@ from inference.tracking.hypotheses import (
 from inference.tracking.known_range import take_known
 from inference.tracking.light import noise_at_light
 from inference.tracking.mode_refinement import bends
+from inference.tracking.prediction import own_prior
 from inference.tracking.readings_table import (
     FIRST,
     SECOND,
@@ -192,14 +193,23 @@ def learn(
     float
         Normalised innovation squared.
     """
-    u, gain, position = candidate.mode, frame.gain, prior.position
+    u, gain, born = candidate.mode, frame.gain, prior.position.born
+    beside = 0.0
+    if born:
+        begin(of, row, u, prior.rate.sd)
+    if frame.known_rate > 0.0:
+        beside = take_known(of, row, u, born, frame, table, scratch)
+        if learns_crosstalk(of) and not born:
+            # what is read is held against what the known range leaves, and the curve taken there
+            prior = own_prior(of, row, gain, 0.0, table)
+    position = prior.position
     # where the curve is taken: as far as the error that u shares with the crosstalk goes, at u's
     # prediction
-    at = u if position.born else position.centre + (1.0 - prior.share) * (u - position.centre)
+    at = u if born else position.centre + (1.0 - prior.share) * (u - position.centre)
     value1, value2, d1, d2 = mean_at(at, table)
     tangent = Tangent(u, at, gain * value1, gain * value2, gain * d1, gain * d2)
     noise = UNIT if table.by_rate else _noise_of(of, tangent, frame, prior, table)
-    shares = learns_crosstalk(of) and not position.born
+    shares = learns_crosstalk(of) and not born
     held = held and shares
     shared = NOT_SHARED
     if shares:
@@ -210,11 +220,6 @@ def learn(
             bring_anchor(of, row, at, prior.share, told, unsure)
         along = at, tangent.slope1, tangent.slope2
         shared = straighten(of, row, gain, along, noise, table)
-    if position.born:
-        begin(of, row, u, prior.rate.sd)
-    beside = 0.0
-    if frame.known_rate > 0.0:
-        beside = take_known(of, row, u, frame, scratch)
     if table.by_rate:
         readings = _of_derivatives(of, row, tangent, frame, prior)
     else:
@@ -226,6 +231,6 @@ def learn(
         _take_moments(of, row, candidate.mean, candidate.sd)
     if frame.known_rate > 0.0:
         # one number more is surprising; of an object that has just come it says where that is
-        told = table.channels + (0.0 if position.born else 1.0)
+        told = table.channels + (0.0 if born else 1.0)
         return (surprise + beside) * table.channels / told
-    return surprise + 1.0 if position.born else surprise
+    return surprise + 1.0 if born else surprise

@@ -45,6 +45,7 @@ __all__ = [
     "bring_anchor",
     "certainty",
     "follow",
+    "shared_of",
     "shared_part",
     "straighten",
 ]
@@ -150,6 +151,13 @@ def shared_part(of: Hypotheses, row: int) -> tuple[float, float, float]:
 
 
 @compiled
+def shared_of(of: Hypotheses, row: int) -> Shared:
+    """Return what a hypothesis errs in common before an update along the tangent at its anchor."""
+    back1, back2, _ = shared_part(of, row)
+    return Shared(back1, back2, 0.0, 0.0, of.x[row, CROSSTALK1], of.x[row, CROSSTALK2], _ALL)
+
+
+@compiled
 def certainty(of: Hypotheses, row: int) -> float:
     """Return how much of a rate is motion rather than noise, from 0 to 1."""
     square = of.x[row, V] * of.x[row, V]
@@ -234,11 +242,11 @@ def follow(of: Hypotheses, row: int, shared: Shared, gain: float, table: Reading
     Parameters
     ----------
     of, row : Hypotheses, int
-        The hypothesis, updated in the coordinates of `straighten`; changed in place.
+        The hypothesis, updated in these coordinates; changed in place.
     shared : Shared
-        From `straighten`.
+        From `straighten`, or `shared_of`.
     gain, table
-        As there.
+        As for `straighten`.
     """
     x, X = of.x, of.X
     back1, back2, turn1, turn2 = shared.back1, shared.back2, shared.turn1, shared.turn2

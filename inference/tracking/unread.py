@@ -136,10 +136,12 @@ def learn_unread(
     candidate: TrackCandidate,
     frame: TrackedFrame,
     rate_sd: float,
+    table: ReadingsTable,
     scratch: Scratch,
 ) -> None:
     """Teach a hypothesis what is known of the range of a frame whose readings say nothing."""
     if frame.known_rate > 0.0:
-        if candidate.parent == NEW_UNREAD:
+        new = candidate.parent == NEW_UNREAD
+        if new:
             begin(of, row, candidate.mode, rate_sd)
-        take_known(of, row, candidate.mode, frame, scratch)
+        take_known(of, row, candidate.mode, new, frame, table, scratch)

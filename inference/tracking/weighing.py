@@ -211,7 +211,7 @@ def _keep(
         own = rules.most_surprise
         if candidate.parent < 0:
             outlying += mass
-            learn_unread(after, count, candidate, frame, rules.rate_sd, room.scratch)
+            learn_unread(after, count, candidate, frame, rules.rate_sd, model.table, room.scratch)
         else:
             own = _learnt(count, candidate, frame, of, model, room)
         if mass > heaviest:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy import stats
 
 from inference.estimates import Status
 from inference.tracking.settings import TrackingSettings
@@ -15,6 +16,7 @@ from simulator.errors import InvalidInputError
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
 from simulator.simulate import mean_readings
+from tests.posterior.scenes import UNKNOWN_CROSSTALK
 from tests.tracking.reference import GridFilter
 from tests.tracking.scenes import (
     FOLD_M,
@@ -127,6 +129,56 @@ def test_known_ranges_teach_crosstalk(observables: Any) -> None:
     assert (result.outlier < 0.5).all()
 
 
+def deviations(kind: str, frame: int, seeds: int, *, cut: bool) -> tuple[Array, Array, Array]:
+    """Of an object that comes nearer, predicted far off because its light may be crosstalk.
+
+    Its range is known to 5 mm in one frame, whose readings may be cut off. Errors in their own
+    deviations of the crosstalk in that frame and in the next, shape (2, seeds, 2), and of the range
+    in the next, shape (seeds,); those deviations of that frame's crosstalk as shares of what its
+    readings and range alone leave open, shape (seeds, 2).
+    """
+    noise = NOISE / 3.0
+    sensor, bare = sensor_of(noise, kind, full_scale=[1.0, 1.0]), scene_of(PLATE)
+    light = 300.0 * noise
+    priors = [{"prior": "normal", "mean": 0.0, "sd": scale * light} for scale in (0.3, 0.6)]
+    scene = scene_of(PLATE, crosstalk=priors)
+    true = np.array([0.05, 0.3]) * light
+    r, sd = np.asarray(1.5 - 0.01 * np.arange(frame + 2), dtype=np.float64), 0.005
+    terms = parameters_of(sensor, bare).terms(np.zeros((1, 0)))
+    ends = mean_readings(sensor, terms, r[frame] + np.array([-sd, sd]))
+    alone = np.hypot(noise, 0.5 * (ends[1] - ends[0]))
+    of_crosstalk, of_range = np.zeros((2, seeds, 2)), np.zeros(seeds)
+    share = np.zeros((seeds, 2))
+    for seed in range(seeds):
+        rng = np.random.default_rng(seed)
+        readings = read(sensor, bare, r, rng) + true
+        if cut:
+            readings[frame] = 2.0
+        known = {frame: (float(r[frame] + sd * rng.standard_normal()), sd)}
+        result = track(sensor, scene, known_at(frames_of(readings, 0.05), known))
+        assert result.crosstalk is not None
+        assert result.crosstalk_sd is not None
+        of_crosstalk[:, seed] = ((result.crosstalk - true) / result.crosstalk_sd)[frame:]
+        of_range[seed] = ((result.best_m - r) / result.best_sd_m)[frame + 1]
+        share[seed] = result.crosstalk_sd[frame] / alone
+    return of_crosstalk, of_range, share
+
+
+@pytest.mark.parametrize("cut", [False, True])
+@pytest.mark.parametrize("frame", [1, 7, 15])
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+def test_a_later_known_range_teaches_what_its_frame_tells(kind: str, frame: int, cut: bool) -> None:
+    """Sums of squared deviations follow chi-square laws, at a millionth."""
+    seeds = 20
+    of_crosstalk, of_range, share = deviations(kind, frame, seeds, cut=cut)
+    most = stats.chi2.isf(1e-6, seeds)
+    assert ((of_crosstalk**2).sum(axis=1) < most).all()
+    assert (of_range**2).sum() < most
+    if not cut:
+        # what was known before can only add to what the frame tells alone, to first order
+        assert share.max() < 1.1
+
+
 def test_a_known_range_that_contradicts_its_frame_is_an_outlier_and_then_a_misfit() -> None:
     """Readings of 0.8 m where 1.2 m is known: the frame is named, nothing is averaged."""
     sensor, scene = sensor_of(NOISE), scene_of(PLATE)
@@ -167,11 +219,12 @@ def test_saturated_frames_and_outliers_have_their_known_range() -> None:
         assert result.present[i] == pytest.approx(1.0)
 
 
-def test_a_stream_with_known_ranges_may_be_cut_anywhere() -> None:
+@pytest.mark.parametrize("unknown", [{}, {"crosstalk": UNKNOWN_CROSSTALK}])
+def test_a_stream_with_known_ranges_may_be_cut_anywhere(unknown: dict[str, Any]) -> None:
     """Batches with and without the columns give the same bits as all in one."""
-    sensor, scene = sensor_of(NOISE), scene_of(FOLDED)
+    sensor, scene = sensor_of(NOISE), scene_of(FOLDED, **unknown)
     u, _ = wander(np.random.default_rng(8), 30, TrackingSettings(), (-0.2, 0.3))
-    readings = read(sensor, scene, np.exp(u), np.random.default_rng(8))
+    readings = read(sensor, scene_of(FOLDED), np.exp(u), np.random.default_rng(8))
     frames = known_at(frames_of(readings), {i: (float(np.exp(u[i])), 0.03) for i in (3, 4, 17)})
     model = tracker(sensor, scene)
     _, whole = step(model, model.first, frames)
