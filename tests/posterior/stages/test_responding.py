@@ -230,9 +230,13 @@ def test_crosstalk_far_from_where_an_exact_model_has_it_is_not_told_by_a_respons
     was 25 sd off and `identified`. The scale of the ranges knows nothing of it, and is straight."""
     one = wide_set(4242, 76)
     found = posterior_of(one, SamplerSettings(method="auto", seed=76))
+    status = _status(found)
     for path, value in one.parameters.items():
         told = found.parameters[path]
-        assert abs(told.mean - value) < 4.0 * told.sd, path
+        off = abs(told.mean - value) / told.sd
+        # its object is beyond what is stated of it, and that is said
+        said = found.fit.misfit and path.startswith("object.") and status[path] != "identified"
+        assert off < 4.0 or said, path
 
 
 @pytest.mark.thorough
