@@ -23,7 +23,7 @@ __all__ = ["far_ends"]
 Array = NDArray[np.float64]
 
 _ENOUGH = 9.0  # deviance that three standard deviations cost, beyond which an end says nothing
-_CLIMBS = 6  # frames whose ranges are held at the end
+_CLIMBS = 5  # frames whose ranges are held at the end
 _STEPS = 12  # of such a climb
 _LEAST = 1e-3  # deviance, below which all are alike
 
@@ -72,20 +72,20 @@ def far_ends(problem: FitProblem, top: Erring, doubt: float = 1.0) -> Array:
 
 
 def _costs(problem: FitProblem, top: Erring, frames: list[int], enough: float) -> dict[int, float]:
-    """Hold the darkest frame at the end, then where most is open; costs by rank."""
+    """Hold the darkest frame at the end, then brighter ones; costs by rank."""
     found = {0: _held(problem, frames[0], top.x, top.positions)}
     costs = {0: found[0].deviance - top.deviance}
     while len(found) < _CLIMBS:
         ranks = [*sorted(found), len(frames)]
-        gaps = [
-            (later - rank, rank, later)
-            for rank, later in itertools.pairwise(ranks)
-            if later - rank > 1 and costs[rank] < enough
-        ]
-        if not gaps:
+        if costs[ranks[-2]] < enough:  # farther on, to where frames are too bright
+            before = ranks[-2]
+            rank = min(max(2 * before + 1, len(frames) // 8), len(frames) - 1)
+        else:
+            pairs = [two for two in itertools.pairwise(ranks[:-1]) if costs[two[0]] < enough]
+            before, later = max(pairs, key=lambda two: two[1] - two[0], default=(0, 0))
+            rank = (before + later) // 2
+        if rank in found:
             break
-        _, before, later = max(gaps)
-        rank = later - 1 if later == len(frames) else (before + later) // 2
         start = found[before]  # where much is as it will be
         found[rank] = _held(problem, frames[rank], start.x, start.u)
         costs[rank] = found[rank].deviance - top.deviance
