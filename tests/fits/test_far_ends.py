@@ -62,7 +62,7 @@ def test_ends_cost_what_long_climbs_find() -> None:
 
 
 def test_few_dark_frames_stand_for_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of ten that are dark five are held at most; between these costs follow how dark a frame is."""
+    """Of ten that are dark five are held; between these costs follow how dark a frame is."""
     asked: list[tuple[FitProblem, Erring, float]] = []
 
     def noted(*given: Any) -> Any:

@@ -338,10 +338,10 @@ def frame_ranges(
     with np.errstate(invalid="ignore"):
         shared = np.sqrt(np.maximum(sd**2 - modes.noise**2 - modes.model**2, 0.0))
         tangent = np.sqrt(np.maximum(before**2 - modes.noise[:, 0] ** 2, 0.0))
-    tangent[ends < _ANY] = np.inf
     rest = shared.copy()
     # an end that is followed is no tangent; another mode beside it may be one
-    rest[:, 0] = np.where(np.isfinite(ends) & (sd[:, 0] <= alone), tangent, shared[:, 0])
+    followed = np.isfinite(ends) & (ends >= _ANY) & (sd[:, 0] <= alone)
+    rest[:, 0] = np.where(followed, tangent, shared[:, 0])
     for row, frame in enumerate(used):
         index = np.array(kept[frame], dtype=np.intp)
         index = index[np.argsort(u[row, index])]
