@@ -16,6 +16,7 @@ from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.maximum import Maximum, maximum_from
 from inference.fits.likelihood.prior_maxima import prior_maxima
 from inference.fits.likelihood.problem import FitProblem, fit_problem
+from simulator.constants import SPEED_OF_LIGHT
 from simulator.scene import Scene, parse_scene
 from simulator.sensor import Sensor, parse_sensor
 from simulator.simulate import Simulation, simulate
@@ -120,6 +121,46 @@ def random_set(
         present[-3:] = False
     trajectory = SampledTrajectory(range_m=ranges.tolist(), object_present=present.tolist())
     simulation = simulate(sensor, parse_scene({**truth, "discrepancy": errors}), trajectory, seed)
+    return RandomSet(sensor, parse_scene(scene), truth, simulation)
+
+
+def far_set(kind: str, seed: int) -> RandomSet:
+    """Draw a data set whose far frames are dark, behind crosstalk that is known to 3 %.
+
+    Its object may be anywhere up to the sensor's reach, and is unknown, as is how well the model
+    holds.
+
+    Parameters
+    ----------
+    kind : str
+        Of the sensor.
+    seed : int
+        Of all that is random.
+    """
+    rng = np.random.default_rng(seed)
+    c0 = 0.1 * math.exp(rng.normal())
+    c1 = 2 * math.sqrt(c0) * math.expm1(rng.normal(0.0, 0.3))
+    c2 = 0.1 * math.exp(rng.normal(0.0, 0.7))
+    signal = c0 * c2 / (1.0 + c1 + c0)  # at 1 m
+    read = signal / 10 ** rng.uniform(1.0, 3.5)
+    light = signal * 10 ** rng.uniform(-1.5, 1.0)
+    if kind == "pulsed":
+        crosstalk = light * np.array([0.3, 1.0])
+        width = float(rng.choice([3e-8, 1e-7]))
+        timing, reach = {"pulse_width_s": width}, 0.5 * SPEED_OF_LIGHT * width
+    else:
+        turn = rng.uniform(0.0, 2 * math.pi)
+        crosstalk = light * np.array([math.cos(turn), math.sin(turn)])
+        frequency = float(rng.choice([5e6, 1e7, 2e7]))
+        timing, reach = {"frequency_hz": frequency}, 0.5 * SPEED_OF_LIGHT / frequency
+    sd = 0.03 * light
+    told = crosstalk + sd * rng.standard_normal(2)
+    sensor = parse_sensor({"kind": kind, **timing, "noise": {"read": [read, read]}})
+    truth = {"object": {"c0": c0, "c1": c1, "c2": c2}, "crosstalk": crosstalk.tolist()}
+    scene = {"crosstalk": [{"prior": "normal", "mean": float(m), "sd": sd} for m in told]}
+    ranges = np.exp(rng.uniform(math.log(0.05), math.log(0.95 * reach), 25))
+    trajectory = SampledTrajectory(range_m=ranges.tolist())
+    simulation = simulate(sensor, parse_scene({**truth, "discrepancy": 0}), trajectory, seed)
     return RandomSet(sensor, parse_scene(scene), truth, simulation)
 
 

@@ -11,6 +11,13 @@ def test_a_set_that_frames_tell_is_answered_without_priors() -> None:
     assert 0.0 < float(row["worst"]) < 2.0
 
 
+def test_far_frames_that_are_dark_are_a_class_of_their_own() -> None:
+    row = dict(row_of("pulsed", "far", (0.0, 0.0), 100, 0))
+    assert row["misfit"] == 0
+    assert int(row["unique"]) > 15
+    assert 0.0 < float(row["worst"]) < 4.0
+
+
 def test_columns_count_sets_and_frames_of_what_is_answered() -> None:
     none = dict.fromkeys(COLUMNS, "")
     counts = {"frames": "8", "unique": "4", "held90": "2", "held": "3", "width": "0.1"}

@@ -40,6 +40,7 @@ from inference.fits.answer.report import (
     spoiled,
 )
 from inference.fits.likelihood.erring import Erring, contradicting, softened
+from inference.fits.likelihood.far_ends import far_ends
 from inference.fits.likelihood.held_walks import held_walks
 from inference.fits.likelihood.information import residuals_and_information
 from inference.fits.likelihood.law_mode import law_modes, place_of
@@ -265,6 +266,10 @@ def _erring_answer(
         places = [problem.natural(one.x) for one in rivals]
         elsewhere = {name: [x[j] for x in places] for j, name in enumerate(problem.names)}
         parameters = disputed(parameters, alone, elsewhere)
+    ends = None
+    if not report["misfit"]:  # else no range is told
+        of_mode = dataclasses.replace(problem, mode=top.clean.mode)
+        ends = far_ends(of_mode, top, doubt) / doubt
     return frame_ranges(
         name,
         problem,
@@ -288,4 +293,5 @@ def _erring_answer(
         ],
         contradicted,
         doubt,
+        ends,
     )

@@ -41,6 +41,7 @@ _IMPOSSIBLE = 36.0  # chi-square of a single frame that nothing explains
 _SMALL = 0.005
 _ONE = 1.0  # standard deviations below which two modes are one
 _BAND = 3.0  # standard deviations that are followed, as of noise
+_ANY = 1.0  # deviance, below which the farthest range is one of the best
 
 # why a fit that does not explain the frames gives no range
 CONTRADICTION = (
@@ -258,6 +259,7 @@ def frame_ranges(
     points: Sequence[Beside] = (),
     contradicted: Collection[int] = (),
     doubt: float = 1.0,
+    ends: Array | None = None,
 ) -> TechniqueResult:
     """Build the result of a technique of many frames.
 
@@ -281,8 +283,12 @@ def frame_ranges(
     contradicted : collection of int
         Frames of the problem whose readings and known ranges contradict one another.
     doubt : float
-        By what the variance of noise may be larger than stated (`report.doubt_of`); ``points`` have
-        their deviances over it.
+        By what the variance of noise may be larger than stated (`report.doubt_of`); ``points`` and
+        ``ends`` have their deviances over it.
+    ends : ndarray, shape (frames of the problem,), optional
+        By how much the deviance rises to where a range is the farthest that may be (`far_ends`);
+        inf where that is not followed. Else it says how far the range reaches, in place of
+        ``points``; with less than 1 the range is open.
 
     Returns
     -------
@@ -295,13 +301,19 @@ def frame_ranges(
     u, excess = modes.log_r, modes.excess / doubt
     for part in (modes.noise, modes.told):
         part *= math.sqrt(doubt)
-    modes.told[:, 0] = np.fmax(modes.told[:, 0], _reaches(problem, u[:, 0], points))
+    low, high = np.log(problem.support)
+    ends = np.full(used.size, np.inf) if ends is None else ends
+    before = modes.told[:, 0].copy()
+    # no point is less than the best with a range at its end, and its widths may be tangents there
+    to_end = np.expm1(high - u[:, 0]) / np.sqrt(np.maximum(ends, WITHIN))
+    reach = np.where(np.isfinite(ends), to_end, _reaches(problem, u[:, 0], points))
+    modes.told[:, 0] = np.fmax(modes.told[:, 0], reach)
     sd = np.hypot(modes.told, modes.model)
+    alone = sd[:, 0].copy()
     n = state.size
     kept: list[list[int]] = [[] for _ in range(n)]
     near = np.zeros(n, dtype=np.bool_)
     reason = state.copy()
-    low, high = np.log(problem.support)
     single = np.count_nonzero(excess <= DECIDED, axis=1) <= 1
     for row, frame in enumerate(used):
         if reason[frame]:
@@ -321,10 +333,15 @@ def frame_ranges(
             kept[frame], reason[frame] = [], _EDGE
     count = np.array([len(modes) for modes in kept], dtype=np.intp)
     width = max(int(count.max(initial=0)), 1)
-    roots, roots_sd, noise, scene, model = np.full((5, n, width), np.nan)
+    roots, roots_sd, noise, scene, model, opening = np.full((6, n, width), np.nan)
     # what other values and modes widen by is shared by all frames
     with np.errstate(invalid="ignore"):
         shared = np.sqrt(np.maximum(sd**2 - modes.noise**2 - modes.model**2, 0.0))
+        tangent = np.sqrt(np.maximum(before**2 - modes.noise[:, 0] ** 2, 0.0))
+    rest = shared.copy()
+    # an end that is followed is no tangent; another mode beside it may be one
+    followed = np.isfinite(ends) & (ends >= _ANY) & (sd[:, 0] <= alone)
+    rest[:, 0] = np.where(followed, tangent, shared[:, 0])
     for row, frame in enumerate(used):
         index = np.array(kept[frame], dtype=np.intp)
         index = index[np.argsort(u[row, index])]
@@ -334,9 +351,10 @@ def frame_ranges(
             roots_sd[frame, place] = roots[frame, place] * sd[row, index]
             noise[frame, place] = roots[frame, place] * modes.noise[row, index]
             scene[frame, place] = roots[frame, place] * shared[row, index]
+            opening[frame, place] = roots[frame, place] * rest[row, index]
             model[frame, place] = roots[frame, place] * modes.model[row, index]
     parts = SdParts(noise, scene, model)
-    lost = _open(roots, parts, problem.support)
+    lost = _open(roots, SdParts(noise, opening, model), problem.support)
     reason[(count == 1) & lost.any(axis=1)] = _OPEN
     roots_sd[lost | ~np.isfinite(roots_sd)] = np.nan
     status = status_of_counts(count)

@@ -18,11 +18,11 @@ from inference.fits.likelihood.erring_climb import begun, climbed
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import KnownRanges
 
-__all__ = ["profiles"]
+__all__ = ["LOOSE", "holding", "profiles"]
 
 Array = NDArray[np.float64]
 
-_LOOSE = 0.1  # standard deviation of log r, from which the tangent is no longer the curve
+LOOSE = 0.1  # standard deviation of log r, from which the tangent is no longer the curve
 _FRAMES = 2  # whose ranges are held: the loosest, and one in the middle of those that are loose
 _STEPS = 12  # of a climb with a range held
 _HELD = 1e3  # one over the relative standard deviation of a range that is held
@@ -55,7 +55,7 @@ def profiles(problem: FitProblem, top: Erring) -> list[Erring]:
         return points
     own, _, whole, _ = top.at_ranges(top.positions)
     # what is a frame's own is followed frame by frame (`frame_reaches`)
-    loose = np.flatnonzero(np.isfinite(whole) & (whole > np.hypot(_LOOSE, own)))
+    loose = np.flatnonzero(np.isfinite(whole) & (whole > np.hypot(LOOSE, own)))
     order = loose[np.argsort(-whole[loose], kind="stable")]
     for frame in order[:: max(1, order.size // _FRAMES)][:_FRAMES].tolist():
         for sign in (1.0, -1.0):
@@ -72,7 +72,7 @@ def _side(problem: FitProblem, top: Erring, frame: int, sd: float) -> list[Errin
     for _ in range(_TRIES):
         reach = min(reach, near + _STRIDE)
         value = float(np.clip(top.positions[frame] + sign * reach, low, high))
-        held = _holding(problem, frame, value)
+        held = holding(problem, frame, value)
         at, _ = climbed(held, begun(held, x, u), _STEPS)
         cost = at.deviance - top.deviance
         if not math.isfinite(cost):
@@ -89,8 +89,18 @@ def _side(problem: FitProblem, top: Erring, frame: int, sd: float) -> list[Errin
     return points
 
 
-def _holding(problem: FitProblem, frame: int, u: float) -> FitProblem:
-    """Return the problem with the range of a frame known."""
+def holding(problem: FitProblem, frame: int, u: float) -> FitProblem:
+    """Return the problem with the range of a frame known.
+
+    Parameters
+    ----------
+    problem : FitProblem
+        The problem, of which nothing else of the ranges is known.
+    frame : int
+        Which.
+    u : float
+        Its log r.
+    """
     values, rates = np.zeros((2, *problem.frames[:, :2].shape))
     values[frame, 0], rates[frame, 0] = math.exp(u), _HELD * math.exp(-u)
     return dataclasses.replace(problem, known=KnownRanges(values, rates, 0.0, 0.0))
