@@ -63,7 +63,7 @@ typedef struct {
     int status;
     @_real range_m; /* 0 without a range */
     @_real sd_m;    /* whole standard deviation; 0 without a range, -1 where it is no number */
-    int near_fold;  /* 1: the object may be there or farther, however small sd_m is */
+    int near_fold;  /* 1: the object may be there or farther, whatever sd_m is */
 } @_answer;
 
 int @_range(@_real first, @_real second, @_answer *out);

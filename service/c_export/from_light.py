@@ -87,10 +87,14 @@ static int solved(real light, real variance, real whole, @_answer *out)
         const real more = light + 3 * noise, less = light - 3 * noise;
         const real near = between(more) ? range_of(more) : LOW;
         const real far = between(less) ? range_of(less) : HIGH;
-        if (GOES_ON > 0 && !between(less))
+        if (GOES_ON > 0 && !between(less)) {
+            out->near_fold = NEARNESS > 0;
             return @_UNIQUE; /* at any farther range */
+        }
         sd = LARGER(sd, LARGER(far - range, range - near) / 3);
     }
+    /* noise moves it up to the wall */
+    out->near_fold = NEARNESS > 0 && (range + 3 * sd) * NEARNESS >= 1 - R(1e-9);
     out->sd_m = SQRT(sd * sd + model * model);
     return @_UNIQUE;
 }
