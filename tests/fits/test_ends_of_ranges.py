@@ -114,8 +114,8 @@ def test_climbs_of_one_place_are_followed_after_those_of_others() -> None:
             105,
             marks=pytest.mark.xfail(
                 strict=True,
-                reason="since slopes hold errors of the model the climb ends in a wrong valley again, "
-                "with a shadow a hundred times too large; ranges are within 3 sd",
+                reason="since slopes hold errors of the model the climb ends in a wrong valley "
+                "again, of a shadow a hundred times too large; ranges are within 3 sd",
             ),
         ),
     ],
