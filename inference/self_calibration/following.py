@@ -16,7 +16,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inference.self_calibration.ageing import awake, old_from
 from inference.self_calibration.calibration import Asked, Outcome
@@ -107,11 +106,7 @@ def follow(
 
 
 def _time_of(frames: Frames, index: int) -> float:
-    return float(_times(frames)[index])
-
-
-def _times(frames: Frames) -> NDArray[np.float64]:
-    return np.zeros(len(frames)) if frames.time_s is None else frames.time_s
+    return 0.0 if frames.time_s is None else float(frames.time_s[index])
 
 
 def _outlived(state: CalibrationState, frames: Frames, start: int) -> int:
@@ -133,8 +128,7 @@ def _tracked(
         widest, widest_at = 0.0, 0.0
     else:
         track = not_free(model, frames, _told_empty(state), track)
-        before = state.widest, state.widest_at
-        track, widest, widest_at = faded(track, _times(frames), *before)
+        track, widest, widest_at = faded(frames, track, state.widest, state.widest_at)
     kinds = kinds_of(plan.sensor, frames, track, state.trusts_empty)
     recent = in_order(state.recent, Kept(frames, numbers, kinds)).select(slice(-_RECENT, None))
     changed = dataclasses.replace(

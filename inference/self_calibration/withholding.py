@@ -90,7 +90,7 @@ def not_free(model: Tracker, frames: Frames, empty: Frames | None, track: Track)
 
 
 def faded(
-    track: Track, times: NDArray[np.float64], widest: float, widest_at: float
+    frames: Frames, track: Track, widest: float, widest_at: float
 ) -> tuple[Track, float, float]:
     """Return answers that are not suddenly sharper than those of the seconds before.
 
@@ -100,10 +100,8 @@ def faded(
 
     Parameters
     ----------
-    track : Track
-        Answers.
-    times : ndarray, shape (n,)
-        Of their frames [s].
+    frames, track : Frames, Track
+        Frames, and what the tracker said of them. Ranges that are told stay as they are.
     widest, widest_at : float
         Largest standard deviation of late, as a share of the range, as of this time [s].
 
@@ -114,7 +112,11 @@ def faded(
         last frame with one range.
     """
     sd, scene = track.best_sd_m.copy(), track.sd_parts_m.scene.copy()
-    for i in np.flatnonzero(track.status == Status.UNIQUE):
+    times = np.zeros(len(frames)) if frames.time_s is None else frames.time_s
+    one = track.status == Status.UNIQUE
+    if frames.known_range_m is not None:
+        one = one & np.isnan(frames.known_range_m)
+    for i in np.flatnonzero(one):
         widest *= math.exp(-(float(times[i]) - widest_at) / _FADES_S)
         widest_at = float(times[i])
         least = widest * track.best_m[i]

@@ -4,6 +4,8 @@ The crosstalk is as wide as its prior then, and an empty scene explains the ligh
 was called free with a probability of 1.4 % of an object whose light was 280 noises.
 """
 
+import dataclasses
+
 import numpy as np
 import pytest
 import scipy
@@ -106,3 +108,21 @@ def test_ranges_are_never_suddenly_sharp() -> None:
     np.testing.assert_allclose(sum(squares), sd[one] ** 2, rtol=1e-9)
     truth = 0.8 * np.exp(0.5 * np.sin(1.1 * frames.time_s[one]))
     assert np.max(np.abs(found[one] - truth) / sd[one]) < 4.0
+
+
+def test_a_range_that_is_told_is_as_sharp_as_it_is_told() -> None:
+    plan, frames = plan_of(SENSOR, STATED, TrackingSettings(), 7), _to_and_fro()
+    assert frames.time_s is not None
+    told = np.full(len(frames), np.nan)
+    told[200] = 0.8 * np.exp(0.5 * np.sin(1.1 * frames.time_s[200]))
+    frames = dataclasses.replace(
+        frames, known_range_m=told, known_range_sd_m=np.where(np.isnan(told), np.nan, 0.002)
+    )
+    _, pieces = follow(plan, begin(plan), frames, range(len(frames)))
+    sd, found = (
+        np.concatenate([getattr(piece.track, name) for piece in pieces])
+        for name in ("sd_m", "range_m")
+    )
+    assert sd[200] < 0.003
+    assert np.nanmax(sd[150:200]) > 0.01  # before, ranges are wide
+    assert abs(found[200] - told[200]) < 4 * sd[200]

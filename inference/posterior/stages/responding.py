@@ -79,12 +79,12 @@ def tasks(job: Job, checkpoint: Checkpoint) -> tuple[RespondTask, ...]:
 
 
 def decided(after: Checkpoint) -> Checkpoint:
-    """Return the same, or what the exact model came to where rounds from its draws failed.
+    """Return the same, or what the exact model came to, or begins with, where such rounds failed.
 
     Parameters
     ----------
     after : Checkpoint
-        With what the exact model came to, where its errors are being integrated out.
+        With that, where the exact model's errors are being integrated out.
     """
     stage, exact = after.stage, after.exact
     if exact is None or (isinstance(stage, Tempering) and stage.scouted):
