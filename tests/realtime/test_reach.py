@@ -114,7 +114,8 @@ def test_answers_in_the_dark_are_not_far_off(kind: str, name: str) -> None:
     result = answered(kind, name, ranges, light(0.6) / 30, seed=20261123)
     off = np.abs(result.range_m - ranges) / result.sd_m
     told = np.isfinite(off) & ~result.near_fold
-    assert told.sum() > n / 6  # fewest before a wall, which noise reaches from most of them
+    # before a wall noise reaches it from most of them
+    assert told.sum() > n / (6 if name == "background_intensity" else 4)
     assert (off[told] > BAND).sum() <= binom.isf(1e-7, n, 2 * BEYOND)
     assert (off[told] < 1.6449).mean() > 0.85
 
@@ -174,5 +175,5 @@ def test_photons_of_a_bright_glass_hide_which_way_a_faint_phasor_points(
     (result,) = estimate(sensor, scene, Frames(mean + noise), ["conventional"]).results
     off = np.abs(result.range_m - angle / sensor.wave_number) / result.sd_m
     told = np.isfinite(off)
-    assert told.sum() > n / 6  # fewest before a wall, which noise reaches from most of them
+    assert told.sum() > n / 4
     assert (off[told] > BAND).sum() <= binom.isf(1e-7, n, 2 * BEYOND)

@@ -27,6 +27,7 @@ from inference.fits.answer.ranges import (
     WITHIN,
     Answer,
     Beside,
+    Elsewhere,
     beside,
     frame_ranges,
 )
@@ -202,7 +203,7 @@ def _exact_answer(
         state,
         spoiled(parameters, report) if report["misfit"] else parameters,
         report,
-        [Beside(excess, one.positions) for excess, one in points],
+        Elsewhere([Beside(excess, one.positions) for excess, one in points]),
         doubt=doubt,
     )
 
@@ -266,6 +267,17 @@ def _erring_answer(
         places = [problem.natural(one.x) for one in rivals]
         elsewhere = {name: [x[j] for x in places] for j, name in enumerate(problem.names)}
         parameters = disputed(parameters, alone, elsewhere)
+    points = [
+        *(
+            (beside if problem.priors else _alone)(one, (one.deviance - top.deviance) / doubt)
+            for one in near
+        ),
+        *(
+            _with_width(one, (one.deviance - top.deviance) / doubt)
+            for one in wide
+            if place_of(one.clean.mode) == place_of(top.clean.mode)
+        ),
+    ]
     ends = None
     if not report["misfit"]:  # else no range is told
         of_mode = dataclasses.replace(problem, mode=top.clean.mode)
@@ -280,18 +292,7 @@ def _erring_answer(
         state,
         spoiled(parameters, report) if report["misfit"] else parameters,
         report,
-        [
-            *(
-                (beside if problem.priors else _alone)(one, (one.deviance - top.deviance) / doubt)
-                for one in near
-            ),
-            *(
-                _with_width(one, (one.deviance - top.deviance) / doubt)
-                for one in wide
-                if place_of(one.clean.mode) == place_of(top.clean.mode)
-            ),
-        ],
+        Elsewhere(points, ends),
         contradicted,
         doubt,
-        ends,
     )

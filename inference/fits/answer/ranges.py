@@ -28,6 +28,7 @@ __all__ = [
     "WITHIN",
     "Answer",
     "Beside",
+    "Elsewhere",
     "beside",
     "frame_ranges",
 ]
@@ -106,6 +107,26 @@ class Beside(NamedTuple):
     excess: float
     log_r: Array
     noise: Array | float = 0.0
+
+
+class Elsewhere(NamedTuple):
+    """What else than the answers the deviance allows.
+
+    Attributes
+    ----------
+    points : sequence of Beside
+        Other values that are not decided against.
+    ends : ndarray, shape (frames of the problem,), or None
+        By how much the deviance rises to where a range is the farthest that may be (`far_ends`);
+        inf where that is not followed. Else it says how far the range reaches, in place of
+        ``points``; with less than 1 the range is open.
+    """
+
+    points: Sequence[Beside] = ()
+    ends: Array | None = None
+
+
+_NOWHERE = Elsewhere()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -256,10 +277,9 @@ def frame_ranges(
     state: NDArray[np.uint8],
     parameters: Mapping[str, Any],
     fit: Mapping[str, Any],
-    points: Sequence[Beside] = (),
+    elsewhere: Elsewhere = _NOWHERE,
     contradicted: Collection[int] = (),
     doubt: float = 1.0,
-    ends: Array | None = None,
 ) -> TechniqueResult:
     """Build the result of a technique of many frames.
 
@@ -276,19 +296,15 @@ def frame_ranges(
         or saturated are, in order, those of the problem.
     parameters, fit : mapping
         As in `TechniqueResult`. A fit that says of itself that it misfits gives no ranges.
-    points : sequence of Beside
-        Other values that are not decided against, none of them an answer. Standard deviations of
-        the best answer are widened until such ranges lie as far out as their deviance says, or in
-        the interval of 95 % if that reaches them, with as much of their noise as is left of it.
+    elsewhere : Elsewhere
+        What else the deviance allows, none of it an answer. Standard deviations of the best answer
+        are widened until ranges of such values lie as far out as their deviance says, or in the
+        interval of 95 % if that reaches them, with as much of their noise as is left of it.
     contradicted : collection of int
         Frames of the problem whose readings and known ranges contradict one another.
     doubt : float
-        By what the variance of noise may be larger than stated (`report.doubt_of`); ``points`` and
-        ``ends`` have their deviances over it.
-    ends : ndarray, shape (frames of the problem,), optional
-        By how much the deviance rises to where a range is the farthest that may be (`far_ends`);
-        inf where that is not followed. Else it says how far the range reaches, in place of
-        ``points``; with less than 1 the range is open.
+        By what the variance of noise may be larger than stated (`report.doubt_of`); ``elsewhere``
+        has its deviances over it.
 
     Returns
     -------
@@ -302,6 +318,7 @@ def frame_ranges(
     for part in (modes.noise, modes.told):
         part *= math.sqrt(doubt)
     low, high = np.log(problem.support)
+    points, ends = elsewhere
     ends = np.full(used.size, np.inf) if ends is None else ends
     before = modes.told[:, 0].copy()
     # no point is less than the best with a range at its end, and its widths may be tangents there
