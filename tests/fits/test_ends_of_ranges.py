@@ -106,20 +106,7 @@ def test_climbs_of_one_place_are_followed_after_those_of_others() -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(
-    "number",
-    [
-        104,
-        pytest.param(
-            105,
-            marks=pytest.mark.xfail(
-                strict=True,
-                reason="since slopes hold errors of the model the climb ends in a wrong valley "
-                "again, of a shadow a hundred times too large; ranges are within 3 sd",
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize("number", [104, 105])
 def test_a_part_of_a_walls_light_passes_for_no_crosstalk(number: int) -> None:
     """Crosstalk of 105 was 40 sd off and `identified`; of 104 99, if ranges are only kept back."""
     one = random_set(20261125, number)

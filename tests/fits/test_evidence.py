@@ -14,6 +14,7 @@ from inference.estimates import TechniqueResult
 from inference.fits.answer.erring_search import judged
 from inference.fits.answer.ranges import WITHIN
 from inference.fits.answer.report import describe
+from inference.fits.answer.rivals import rivals_of
 from inference.fits.likelihood.erring import Erring, end_from, erring_maxima, softened
 from inference.fits.likelihood.evidence import evidence_of
 from inference.fits.likelihood.frame_modes import frame_modes, nearest_modes
@@ -130,6 +131,23 @@ def test_an_unknown_that_is_held_has_the_density_of_its_marginal(told_by_frames:
     for j, sd in enumerate(sds):
         more = evidence_of(told_by_frames, j) - evidence_of(told_by_frames)
         assert more == pytest.approx(-2.0 * math.log(sd), abs=1e-6)
+
+
+def test_what_fits_as_well_is_a_rival_however_large_its_errors_could_have_been(
+    told_by_frames: Erring,
+) -> None:
+    """Of 105 of the random sets log determinants decided for a shadow a hundred times too large."""
+    problem = problem_of({"discrepancy": SMALL, "crosstalk": UNKNOWN_CROSSTALK})
+    top, decided = told_by_frames, told_by_frames.deviance + 9.0
+    larger = dataclasses.replace(top, deviance=top.deviance + 50.0)
+    worse = dataclasses.replace(larger, chi_square=top.chi_square + 0.1)
+    far = dataclasses.replace(larger, x=top.x + 20.0)  # of logarithms: far out in the priors
+    near = dataclasses.replace(worse, deviance=top.deviance + 5.0)
+    first, second = rivals_of(problem, [top, larger, worse, far, near], decided)
+    assert (first.x is top.x, first.deviance) == (True, top.deviance)
+    assert second is near
+    (better,) = rivals_of(problem, [worse, top], worse.deviance + 9.0)
+    assert better is top
 
 
 def test_an_object_of_which_nothing_is_said_has_a_glossy_mode() -> None:

@@ -40,6 +40,7 @@ from inference.fits.answer.report import (
     p_value_of,
     spoiled,
 )
+from inference.fits.answer.rivals import rivals_of
 from inference.fits.likelihood.erring import Erring, contradicting, softened
 from inference.fits.likelihood.far_ends import far_ends
 from inference.fits.likelihood.held_walks import held_walks
@@ -235,7 +236,7 @@ def _erring_answer(
         wider = math.hypot(1.0, off_the_top(top))
         refuse_if_open(top.clean, top, top.facts, wider * math.sqrt(doubt), whole=top.whole)
     decided = top.deviance + doubt * DECIDED
-    rivals = [one for one in found[1:] if one.deviance <= decided]
+    rivals = rivals_of(problem, found, decided)
     # another mode of the law is another answer; near in the same mode, a wider one
     others = {place_of(one.clean.mode): one for one in reversed(rivals)}
     others.pop(place_of(top.clean.mode), None)
