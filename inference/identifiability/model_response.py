@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 _STEPS = 10
 _SHORTEST = 0.1  # share of a step
 _SETTLED = 0.1  # of the deviance, that the last step gained
+_FARTHEST = 30.0  # of log r: beyond a factor 1e13 nothing tells a range, and a step would overflow
 
 
 class _Point(NamedTuple):
@@ -191,6 +192,8 @@ def _settled(
     of_prior = off_by[m * n : m * n + d]
 
     def cost(by: _Point) -> float:
+        if not np.abs(by.log_r).max(initial=0.0) < _FARTHEST:
+            return math.inf
         with np.errstate(all="ignore"):
             off = readings - _means(_moved(e, by))
             off[:, :2] = np.einsum("nij,nj->ni", whitener, off[:, :2])

@@ -20,6 +20,7 @@ from inference.identifiability.model_response import (
 )
 from simulator.parameters import parameters_of
 from simulator.scene import parse_scene
+from simulator.sensor import parse_sensor
 from tests.posterior.scenes import UNKNOWN_CROSSTALK, sensor_of
 
 Array = NDArray[np.float64]
@@ -142,3 +143,22 @@ def test_a_range_that_the_prior_tells_does_not_follow() -> None:
     found = model_response(told, told.readings.mean)
     assert np.all(found.told < 1e-2)
     assert np.abs(found.log_r).max() < 1e-3 * np.abs(found.parameters).max()
+
+
+def test_a_step_that_leads_beyond_all_ranges_is_not_taken() -> None:
+    """Far frames whose light is gone: steps went on to where a range overflows, and none ended."""
+    sensor = parse_sensor(
+        {"kind": "sine_wave", "frequency_hz": 2e7, "noise": {"read": [6.8e-6, 6.8e-6]}}
+    )
+    unknown = {"prior": "normal", "mean": 0.0, "sd": 7.6e-4}
+    thing = {"c0": 0.0263, "c1": 0.0, "c2": 0.1131}
+    parameters = parameters_of(sensor, parse_scene({"crosstalk": [unknown] * 2, "object": thing}))
+    log_r = np.append(np.linspace(-1.69, -0.39, 16), [1.65, 1.5, 1.43, 1.39])
+    at = Experiment(sensor, parameters, np.array([13.9, 21.4]), log_r, discrepancy=0.02)
+    readings = at.readings.mean.copy()
+    gone = [[2.7, -6.5], [-1.1, -8.6], [-3.8, -10.3], [-5.8, -11.6]]
+    readings[-4:] += 1e-3 * np.array(gone)
+    first = model_response(at, readings)
+    found = model_response(at, readings, first.followed)
+    assert np.isfinite(found.shift[1]).all()
+    assert np.isfinite(found.shift[0]).all()

@@ -22,6 +22,7 @@ from inference.fits.likelihood.told import KnownRanges
 from inference.frame.arguments import Instrument, Rows
 from inference.frame.blocks import own_blocks
 from inference.frame.sensitivity import Value
+from inference.known import allowed_error
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.last_call import LastCall
@@ -35,7 +36,6 @@ __all__ = ["FitProblem", "fit_problem"]
 Array = NDArray[np.float64]
 
 _LOUDEST = 1e100  # times the noise: squares of readings, and bounds made from them, are numbers
-_OBJECT = ("object.c0", "object.c1", "object.c2")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -326,9 +326,6 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames, *, exact: bool = F
     for k in IN_READINGS:
         low[k], high[k] = low[k] / unit, high[k] / unit
     names, index, known = known_and_unknown(sensor, parameters, unit)
-    error = scene.model_error
-    if not set(_OBJECT) & set(names):
-        error = error.beside_numbers()
     return FitProblem(
         names=names,
         slots=np.flatnonzero(index >= 0),
@@ -347,5 +344,5 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames, *, exact: bool = F
         background=True if parameters.has_background else None,
         support=(near, far),
         parameters=parameters,
-        error=ModelError(0.0, 0.0, integrated=False) if exact else error,
+        error=ModelError(0.0, 0.0, integrated=False) if exact else allowed_error(scene),
     )
