@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from inference.fits.answer.model_checks import REASONS, Check
 from inference.fits.answer.ranges import WITHIN
@@ -16,6 +17,8 @@ from inference.fits.likelihood.problem import FitProblem
 from inference.identifiability.information import Information
 from inference.identifiability.status import is_positive, spread_of_fit, status_of
 from simulator.parameters import Parameters
+
+Array = NDArray[np.float64]
 
 __all__ = [
     "FALSE_ALARM",
@@ -32,6 +35,8 @@ __all__ = [
 
 FALSE_ALARM = 1e-3
 DOUBTFUL = 0.05  # of healthy fits whose noise is doubted
+_TO_END = 1.645  # standard deviations to an end of a 90 % interval
+_FARTHEST = 20.0  # of a logarithm
 _ONE = 1.0 - 1e-12  # for 1, whose logarithm of what is left is no number
 
 
@@ -75,6 +80,7 @@ def describe(
         sds = np.hypot(sds, model)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         ratios = sds / np.abs(values)
+        sds = np.fmax(sds, _farther_sides(problem, top, whole or facts, functionals, sds))
         others = [*((one, None) for one in undecided), *((end, end.whole) for end in maxima)]
         for other, told in others:
             excess = other.deviance - top.deviance
@@ -93,6 +99,30 @@ def describe(
     found = entries(problem.parameters, dict(zip(problem.names, columns, strict=True)))
     parts = zip(own.tolist(), model.tolist(), strict=True)
     return with_parts(found, dict(zip(problem.names, parts, strict=True)))
+
+
+def _farther_sides(
+    problem: FitProblem, top: Maximum, told: Information, functionals: Array, sds: Array
+) -> Array:
+    """Return standard deviations whose 90 % interval reaches to the farther of both its ends.
+
+    Coordinates are as good as normal, not values: a size that is told to a factor may be larger by
+    more than it may be smaller. So every unknown is moved to both ends of its interval, all others
+    following, and the way of its value counts.
+    """
+    covariances = told.factor @ (told.factor.T @ functionals.T)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        variances = np.einsum("jd,dj->j", functionals, covariances)
+        ways = (covariances * (sds / variances)).T
+        farther = np.zeros_like(sds)
+        for j in np.flatnonzero(np.isfinite(ways).all(axis=1)).tolist():
+            for sign in (_TO_END, -_TO_END):
+                way = sign * ways[j]
+                way[problem.logarithms] = np.clip(way[problem.logarithms], -_FARTHEST, _FARTHEST)
+                end = problem.natural(np.clip(top.x + way, *problem.bounds(top.x)))
+                away = abs(end[j] - problem.natural(top.x)[j]) / _TO_END
+                farther[j] = max(farther[j], away if math.isfinite(away) else 0.0)
+    return farther
 
 
 def disputed(
