@@ -36,7 +36,7 @@ def test_another_object_than_the_one_that_is_known_is_a_misfit() -> None:
     sensor = sensor_of("pulsed", 300.0)
     frames = data(sensor, {"crosstalk": [0.002, 0.01], "discrepancy": 0}, 16).frames
     settings = SamplerSettings(seed=1, max_seconds=20.0)
-    known = {"crosstalk": UNKNOWN_CROSSTALK, "object": OBJECT}
+    known: dict[str, object] = {"crosstalk": UNKNOWN_CROSSTALK, "object": OBJECT}
     right = infer(sensor, parse_scene(known), frames, settings)
     assert right.fit.misfit is False
     other = {**known, "object": {**OBJECT, "c0": 1.6 * OBJECT["c0"]}}
