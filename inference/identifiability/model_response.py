@@ -273,4 +273,5 @@ def curvature_of_response(experiment: Experiment, response: ModelResponse, norma
         return math.inf
     step = flux_step(rows, off, np.zeros(e.z.size))
     again = step.by_readings[1] + step.by_error[1] @ step.coefficients(np.zeros(by.error.size))
-    return float(np.sqrt(np.mean(np.square(again[present]))))
+    with np.errstate(over="ignore"):
+        return float(np.sqrt(np.mean(np.square(again[present]))))

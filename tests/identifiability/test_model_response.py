@@ -162,3 +162,5 @@ def test_a_step_that_leads_beyond_all_ranges_is_not_taken() -> None:
     found = model_response(at, readings, first.followed)
     assert np.isfinite(found.shift[1]).all()
     assert np.isfinite(found.shift[0]).all()
+    none = np.zeros(first.error.mean.size)
+    assert curvature_of_response(at, first, none) > 1.0
