@@ -13,6 +13,7 @@ from inference.density.static import with_common_range
 from inference.frame.blocks import RANGE
 from inference.frame.known_range import columns_of
 from inference.known import allowed_error
+from inference.posterior.answer.clock import with_clock_error
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.posterior.checks import check_scene_for_posterior
 from inference.posterior.libraries import import_libraries
@@ -115,7 +116,8 @@ class Job:
 
     def density(self) -> CollapsedDensity:
         """Return the collapsed density of the usable frames."""
-        frames, error = self.frames.select(self.usable), self.scene.model_error
+        error = self.allowed_error
+        frames = with_clock_error(self.frames.select(self.usable), error.range_m)
         density = collapsed_density(self.sensor, self.scene, frames)
         if self.scene.motion == "static":
             return with_common_range(density)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.density.discrepant import DiscrepantDensity
 from inference.identifiability.statuses import Spread
+from inference.posterior.answer.clock import as_ruled
 from inference.posterior.answer.draws import Draws
 from inference.posterior.answer.error_budget import ErrorBudget, error_budget
 from inference.posterior.criticism.discrepancy_check import LargerDiscrepancy, larger_discrepancy
@@ -117,7 +118,8 @@ def with_model_error(
         ends = np.log(density.parameters.terms(chosen).ranges[:, 6:8])
     moved = budget.moved_ranges(log_r, errors, ends)
     range_m = draws.range_m.copy()
-    range_m[..., usable] = np.exp(moved).reshape(*thinned.shape[:3], -1)
+    ruled = as_ruled(job.frames.select(usable), np.exp(moved), job.model_error.range_m, rng)
+    range_m[..., usable] = ruled.reshape(*thinned.shape[:3], -1)
     flat = z.reshape(len(sample.flat), d)
     parameters = density.parameters.natural(flat).reshape(z.shape)
     reported = parameters
