@@ -32,11 +32,19 @@ from inference.fits.likelihood.erring_point import (
     slopes_of_priors,
     whitened_of,
 )
+from inference.fits.likelihood.known_modes import with_known
 from inference.fits.likelihood.maximum import Maximum
 from inference.fits.likelihood.other_starts import apart, larger, of_law, other_crosstalk
 from inference.fits.likelihood.pairs import solved
 from inference.fits.likelihood.problem import FitProblem
-from inference.fits.likelihood.told import Told, contradictions, eliminated, improbable, told_at
+from inference.fits.likelihood.told import (
+    Told,
+    contradictions,
+    eliminated,
+    improbable,
+    told_at,
+    unsettled,
+)
 from inference.identifiability.elimination import eliminate
 from inference.identifiability.information import Information
 
@@ -51,8 +59,6 @@ _KEPT = 4
 _BEHIND = 2  # of the climbs that begin behind other crosstalk
 _SAME = 1e-3  # in log r and deviance
 _NAMED = 5  # frames that contradict are named, at most
-_TURNS = 6  # of a range between its readings and what is known of it
-_LONGEST = 0.3  # of log r in such a turn
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -67,6 +73,8 @@ class Erring(Maximum):
         The errors.
     chi_square : float
         Of readings, errors and what is known beside them.
+    read : FitProblem
+        The problem, with the readings that there are.
     clean : FitProblem
         With readings less what the errors do to them.
     bare : FitProblem
@@ -80,6 +88,7 @@ class Erring(Maximum):
 
     a: Array
     chi_square: float
+    read: FitProblem
     clean: FitProblem
     bare: FitProblem
     facts: Information
@@ -117,7 +126,8 @@ class Erring(Maximum):
         of_x, of_offset = self.facts.factors
         left = left_of_frames(problem, u, residual, along, errors, free)
         if told is not None:
-            left = left + self.contradictions(u)
+            off, move, more = self._beside(u)
+            left = left + contradictions(told, off, move, more) + unsettled(told, off, move)
         return (
             np.sqrt(own.own_variance),
             np.linalg.norm(own.response @ of_x + own.error_response @ of_offset, axis=1),
@@ -127,35 +137,24 @@ class Erring(Maximum):
 
     def contradictions(self, u: Array) -> Array:
         """Return by how much readings and what is known beside them tell other ranges, (n,)."""
-        problem = self.clean
-        told = told_at(problem.known, u, self.a)
+        told = told_at(self.clean.known, u, self.a)
         if told is None:
             return np.zeros(u.size)
+        return contradictions(told, *self._beside(u))
+
+    def _beside(self, u: Array) -> tuple[Array, Array, Array]:
+        """Return residuals, derivatives along log r and what else moves readings, whitened."""
+        problem = self.read
         residual, jacobian, along, errors, _ = linearised(problem, self.x, u, self.a)
         of_x, of_errors = self.whole.factors
         free = jacobian @ of_x + errors @ of_errors
-        parts = [residual[:, :, None], along[:, :, None], free]
+        parts = [(residual - errors @ self.a)[:, :, None], along[:, :, None], free]
         white = whitened_of(problem, u, errors, np.concatenate(parts, axis=2))
-        return contradictions(told, white[:, :, 0], white[:, :, 1], white[:, :, 2:])
+        return white[:, :, 0], white[:, :, 1], white[:, :, 2:]
 
     def with_known(self, u: Array) -> Array:
         """Return ranges that readings prefer, moved to where what is known beside them counts."""
-        problem = self.clean
-        if not np.isfinite(u).any():
-            return u
-        for _ in range(_TURNS):
-            told = told_at(problem.known, u, self.a)
-            if told is None:
-                break
-            residual, _, along, _, _ = linearised(problem, self.x, u, self.a)
-            move = np.where(np.isfinite(along), along, 0.0)
-            size = np.square(move).sum(axis=1) + np.square(told.along).sum(axis=1)
-            pull = np.einsum("ni,ni->n", move, residual)
-            pull += np.einsum("ni,ni->n", told.along, told.residual)
-            moved = (told.along > 0).any(axis=1)
-            step = np.divide(pull, size, out=np.zeros_like(pull), where=moved & (size > 0))
-            u = np.clip(u + np.clip(step, -_LONGEST, _LONGEST), *np.log(problem.support))
-        return u
+        return with_known(self.read, self.x, self.a, u)
 
 
 def softened(problem: FitProblem) -> tuple[FitProblem, ...]:
@@ -307,6 +306,7 @@ def end_of(problem: FitProblem, at: Point, remaining: float) -> Erring:
         positions=at.u,
         a=at.a,
         chi_square=chi_square,
+        read=problem,
         clean=clean,
         bare=_less(problem, solved(whitener, moved)),
         facts=facts,

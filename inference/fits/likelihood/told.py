@@ -26,6 +26,8 @@ __all__ = [
     "improbable",
     "known_ranges",
     "told_at",
+    "told_of",
+    "unsettled",
     "with_column",
 ]
 
@@ -144,8 +146,11 @@ def told_at(known: KnownRanges | None, u: Array, a: Array) -> Told | None:
     a : ndarray, shape (k,)
         Errors of the fit, the offset's last where there is one.
     """
-    if known is None:
-        return None
+    return None if known is None else told_of(known, u, a)
+
+
+def told_of(known: KnownRanges, u: Array, a: Array) -> Told:
+    """Return `told_at` of something that is known."""
     present = np.isfinite(u)
     rates = np.where(present[:, None], known.rates, 0.0)
     r = np.exp(np.where(present, u, 0.0))[:, None]
@@ -196,6 +201,28 @@ def contradictions(told: Told, residual: Array, along: Array, free: Array) -> Ar
     spread = np.einsum("ni,nik->nk", move, np.where(both[:, None, None], free, 0.0)) / own[:, None]
     variance = 1.0 / own + 1.0 / known + np.square(spread).sum(axis=1)
     return np.where(both, np.square(read - said) / variance, 0.0)
+
+
+def unsettled(told: Told, residual: Array, along: Array) -> Array:
+    """Return by how much a range is off where readings and knowledge together would have it, (n,).
+
+    `contradictions` looks from any range to where both would lead by their slopes, and is small
+    also where neither has led yet: what is no mode costs what there is left to gain. Where the
+    readings have no slope that is all that knowledge says.
+
+    Parameters
+    ----------
+    told, residual, along
+        As for `contradictions`.
+    """
+    move = np.where(np.isfinite(along), along, 0.0)
+    size = np.square(move).sum(axis=1) + np.square(told.along).sum(axis=1)
+    pull = np.einsum("ni,ni->n", move, residual)
+    pull += np.einsum("ni,ni->n", told.along, told.residual)
+    known = (told.along > 0).any(axis=1)
+    out = np.zeros(pull.size)
+    np.divide(np.square(pull), size, out=out, where=known & (size > 0))
+    return out
 
 
 def improbable(chi_square: Array) -> NDArray[np.intp]:
