@@ -32,9 +32,12 @@ __all__ = [
     "TrackedFrame",
     "bend_at",
     "expected_at",
+    "felt_at",
     "log_density",
     "log_known",
     "spread_at",
+    "taken_at",
+    "told_at",
 ]
 
 Array = NDArray[np.float64]
@@ -96,6 +99,9 @@ class Prior(NamedTuple):
     # part of the variance of u that comes from crosstalk that is not known: along it the curve
     # counts as straight (`inference.tracking.shared_error`)
     share: float
+    # part along which nuisance parameters are taken where the frame says that they are: what is not
+    # shared, as far as crosstalk is known too well to take up what they do
+    told: float
 
 
 @compiled
@@ -103,6 +109,22 @@ def log_known(u: float, frame: TrackedFrame) -> float:
     """Return the log density of what is known of the range beside the readings, at one u."""
     off = (math.exp(u) - frame.known_m) * frame.known_rate
     return -0.5 * off * off
+
+
+@compiled
+def taken_at(u: float, prior: Prior) -> float:
+    """Return the log r at which the curve is taken: as far as an error is shared, the centre."""
+    if prior.share == 0.0:
+        return u
+    return prior.position.centre + (1.0 - prior.share) * (u - prior.position.centre)
+
+
+@compiled
+def told_at(u: float, prior: Prior) -> float:
+    """Return the log r at which nuisance parameters are taken: the centre where none are told."""
+    if prior.told == 1.0 or prior.position.born:
+        return u
+    return prior.position.centre + prior.told * (u - prior.position.centre)
 
 
 @compiled
@@ -114,8 +136,7 @@ def expected_at(u: float, prior: Prior, table: ReadingsTable) -> tuple[float, fl
     if prior.share == 0.0:
         return mean_at(u, table)
     own = 1.0 - prior.share
-    centre = prior.position.centre
-    value1, value2, d1, d2 = mean_at(centre + own * (u - centre), table)
+    value1, value2, d1, d2 = mean_at(taken_at(u, prior), table)
     return value1, value2, own * d1, own * d2
 
 
@@ -148,7 +169,7 @@ def _add_at(root: Root, u: float, gain: float, added: Added, table: ReadingsTabl
 
 
 @compiled
-def _felt_at(
+def felt_at(
     j: int,
     i: int,
     t: float,
@@ -198,20 +219,20 @@ def spread_at(
     root : Root
         Of the covariance without them.
     u, gain, slopes, X, table
-        As for `_felt_at`, at u.
+        As for `felt_at`, at u.
     """
     i, t = cell_of(u, table)
     count = X.shape[1] - X.shape[0]
     square, product = root.r11 * root.r11, root.r11 * root.r21
     for j in range(count):
-        f1, f2 = _felt_at(j, i, t, gain, slopes, X, table)
+        f1, f2 = felt_at(j, i, t, gain, slopes, X, table)
         square += f1 * f1
         product += f1 * f2
     ratio = slope_of(product, square)
     off = root.r21 - ratio * root.r11
     rest = root.r22 * root.r22 + off * off
     for j in range(count):
-        f1, f2 = _felt_at(j, i, t, gain, slopes, X, table)
+        f1, f2 = felt_at(j, i, t, gain, slopes, X, table)
         off = f2 - ratio * f1
         rest += off * off
     length = math.sqrt(square)
@@ -242,7 +263,7 @@ def bend_at(
     i, t = cell_of(u, table)
     bend1, bend2 = 0.0, 0.0
     for j in range(X.shape[1] - X.shape[0]):
-        f1, f2 = _felt_at(j, i, t, gain, slopes, X, table)
+        f1, f2 = felt_at(j, i, t, gain, slopes, X, table)
         value = f1 * pulls[0] + f2 * pulls[1]
         here1, here2 = nuisance_at(i, 0.0, j, table)
         next1, next2 = nuisance_at(i, 1.0, j, table)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from inference.tracking.borrowed import borrowed
 from inference.tracking.candidates import TrackCandidate
-from inference.tracking.frame_density import Prior, TrackedFrame, bend_at, spread_at
+from inference.tracking.frame_density import Prior, TrackedFrame, bend_at, spread_at, told_at
 from inference.tracking.hypotheses import (
     ANCHOR,
     WITHOUT_CROSSTALK,
@@ -90,7 +90,12 @@ def _of_derivatives(
 @borrowed
 @compiled
 def _noise_of(
-    of: Hypotheses, tangent: Tangent, frame: TrackedFrame, prior: Prior, table: ReadingsTable
+    of: Hypotheses,
+    row: int,
+    tangent: Tangent,
+    frame: TrackedFrame,
+    prior: Prior,
+    table: ReadingsTable,
 ) -> Root:
     """Return the root of the covariance of a frame's own errors at a mode."""
     t, noise, gain, added = tangent, UNIT, frame.gain, prior.added
@@ -102,7 +107,10 @@ def _noise_of(
         residual = frame.first - m1, frame.second - m2
         noise = noise_at_light((m1, m2), (gain * o1, gain * o2), residual, added.own, table.noise)
     if learns_crosstalk(of) and not prior.position.born:
-        noise = add_products(noise, t.u, gain, math.sqrt(1.0 / prior.position.precision), table)
+        slopes, variance = (t.slope1 / gain, t.slope2 / gain), 1.0 / prior.position.precision
+        noise = add_products(
+            noise, noise, t.u, gain, variance, prior.told, slopes, of.X[row], table
+        )
     return noise
 
 
@@ -127,14 +135,14 @@ def _of_readings(
         nuisance[FIRST, j], nuisance[SECOND, j] = gain * g1, gain * g2
     along1, along2 = t.slope1, t.slope2
     e1, e2 = frame.first - m1, frame.second - m2
-    if bends(of.X.shape[1], table):
+    if bends(table):
         away = 0.0 if prior.position.born else t.u - prior.position.centre
         root = add_root(noise, prior.added.own)
         slopes = t.slope1 / gain, t.slope2 / gain
-        root = spread_at(root, t.u, gain, slopes, of.X[row], table)
+        root = spread_at(root, told_at(t.u, prior), gain, slopes, of.X[row], table)
         pulls = solve(root, e1 - prior.added.slope1 * away, e2 - prior.added.slope2 * away)
-        bend1, bend2 = bend_at(pulls, t.u, gain, slopes, of.X[row], table)
-        along1, along2 = along1 + bend1, along2 + bend2
+        bend1, bend2 = bend_at(pulls, told_at(t.u, prior), gain, slopes, of.X[row], table)
+        along1, along2 = along1 + prior.told * bend1, along2 + prior.told * bend2
     e1, e2 = e1 - along1 * (x[row, U] - t.at), e2 - along2 * (x[row, U] - t.at)
     return Linear(e1, e2, along1, along2, 0.0, 0.0, noise)
 
@@ -208,7 +216,7 @@ def learn(
     at = u if born else position.centre + (1.0 - prior.share) * (u - position.centre)
     value1, value2, d1, d2 = mean_at(at, table)
     tangent = Tangent(u, at, gain * value1, gain * value2, gain * d1, gain * d2)
-    noise = UNIT if table.by_rate else _noise_of(of, tangent, frame, prior, table)
+    noise = UNIT if table.by_rate else _noise_of(of, row, tangent, frame, prior, table)
     shares = learns_crosstalk(of) and not born
     held = held and shares
     shared = NOT_SHARED

@@ -234,7 +234,7 @@ def integrate(
     if shared and not once and not _by_noise(u, _FAINT, frame, prior, table):
         if _spills(mode, prior) or _fades(mode, frame, prior, table):
             return _divide(to, count, parent, mode, frame, prior, table, nodes)
-        if not prior.position.born and bends(prior.added.spread.shape[0], table):
+        if not prior.position.born and bends(table):
             u, scale, top = refined(mode, frame, prior, table)
         else:
             top = log_density(u, frame, prior, table)

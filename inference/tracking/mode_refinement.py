@@ -13,12 +13,13 @@ from inference.tracking.frame_density import (
     Prior,
     TrackedFrame,
     bend_at,
-    expected_at,
     log_known,
     spread_at,
+    taken_at,
+    told_at,
 )
-from inference.tracking.hypotheses import WITHOUT_CROSSTALK
-from inference.tracking.readings_table import ReadingsTable, noise_root, nuisance_count, object_at
+from inference.tracking.light import noise_at_light
+from inference.tracking.readings_table import ReadingsTable, mean_at, nuisance_count, object_at
 from inference.tracking.roots import UNIT, add_root, solve
 from simulator.compiled import compiled
 
@@ -41,22 +42,14 @@ class PeakedMode(NamedTuple):
 
 
 @compiled
-def bends(own: int, table: ReadingsTable) -> bool:
+def bends(table: ReadingsTable) -> bool:
     """Tell whether the direction of what nuisance parameters add is taken at the mode.
 
-    Not where crosstalk is learnt: along what range and crosstalk err in common the curve counts as
-    straight, and a slope that turns with every frame would pass for knowledge. One reading alone
-    has no direction.
-
-    Parameters
-    ----------
-    own : int
-        Number of a hypothesis' own states.
-    table : ReadingsTable
-        The scene.
+    Along what range and crosstalk err in common the curve counts as straight, and is taken at the
+    prediction (`taken_at`): a slope that turns with every frame would pass for knowledge. One
+    reading alone has no direction.
     """
-    without_crosstalk = own == WITHOUT_CROSSTALK
-    return without_crosstalk and nuisance_count(table) > 0 and table.channels == 2
+    return nuisance_count(table) > 0 and table.channels == 2
 
 
 class _Here(NamedTuple):
@@ -71,21 +64,23 @@ class _Here(NamedTuple):
 @compiled
 def _density(u: float, frame: TrackedFrame, prior: Prior, table: ReadingsTable) -> _Here:
     position, added, gain = prior.position, prior.added, frame.gain
-    value1, value2, slope1, slope2 = expected_at(u, prior, table)
-    away = u - position.centre
-    m1, m2 = gain * value1 + added.offset1, gain * value2 + added.offset2
-    e1, e2 = frame.first - m1 - added.slope1 * away, frame.second - m2 - added.slope2 * away
+    away, own = u - position.centre, 1.0 - prior.share
+    value1, value2, slope1, slope2 = mean_at(taken_at(u, prior), table)
+    at = told_at(u, prior)
+    m1 = gain * value1 + added.offset1 + added.slope1 * away
+    m2 = gain * value2 + added.offset2 + added.slope2 * away
+    e1, e2 = frame.first - m1, frame.second - m2
     root = UNIT
     if not table.noise.plain:
         o1, o2 = object_at(u, table)
-        root = noise_root(m1, m2, gain * o1, gain * o2, table.noise)
+        root = noise_at_light((m1, m2), (gain * o1, gain * o2), (e1, e2), added.own, table.noise)
     root = add_root(root, added.own)
     slopes = slope1, slope2
-    root = spread_at(root, u, gain, slopes, added.spread, table)
+    root = spread_at(root, at, gain, slopes, added.spread, table)
     pulls = solve(root, e1, e2)
-    bend1, bend2 = bend_at(pulls, u, gain, slopes, added.spread, table)
-    t1 = (gain * slope1 + added.slope1 + bend1) / root.r11
-    t2 = (gain * slope2 + added.slope2 + bend2 - root.r21 * t1) / root.r22
+    bend1, bend2 = bend_at(pulls, at, gain, slopes, added.spread, table)
+    t1 = (own * gain * slope1 + prior.told * bend1 + added.slope1) / root.r11
+    t2 = (own * gain * slope2 + prior.told * bend2 + added.slope2 - root.r21 * t1) / root.r22
     z1 = e1 / root.r11
     z2 = (e2 - root.r21 * z1) / root.r22
     value = position.log_scale - 0.5 * (z1 * z1 + z2 * z2 + away * away * position.precision)

@@ -22,10 +22,10 @@ from inference.tracking.hypotheses import (
 )
 from inference.tracking.merging import merge
 from inference.tracking.motion import Motion, Rules, motion_over, presence_over, wider
-from inference.tracking.readings_table import ReadingsTable, mean_at
-from inference.tracking.roots import Root, add_factor
+from inference.tracking.readings_table import ReadingsTable, mean_at, noise_root, object_at
+from inference.tracking.roots import UNIT, Root, add_factor
 from inference.tracking.second_order import add_products
-from inference.tracking.shared_error import certainty, shared_part
+from inference.tracking.shared_error import certainty, known_part, shared_part
 from inference.tracking.square_root import move
 from inference.tracking.turning import widening
 from simulator.compiled import compiled
@@ -147,14 +147,21 @@ def own_prior(
     precision = 1.0 / max(variance_of(of, row, U), 1e-300)
     log_scale = log_weight + 0.5 * (math.log(precision) - _LOG_2PI)
     offset1, offset2 = table.crosstalk1, table.crosstalk2
-    slope1, slope2, share, root = 0.0, 0.0, 0.0, Root(0.0, 0.0, 0.0)
+    slope1, slope2, share, told, root = 0.0, 0.0, 0.0, 1.0, Root(0.0, 0.0, 0.0)
     if learns_crosstalk(of):
         offset1, offset2 = offset1 + x[row, CROSSTALK1], offset2 + x[row, CROSSTALK2]
         slope1, slope2, root = _crosstalk_given_u(of, row, precision)
         _, _, share = shared_part(of, row)
         _, _, d1, d2 = mean_at(x[row, ANCHOR], table)
         slope1, slope2 = slope1 + gain * share * d1, slope2 + gain * share * d2
-        root = add_products(root, x[row, U], gain, math.sqrt(1.0 / precision), table)
+        u, noise = x[row, U], UNIT
+        value1, value2, d1, d2 = mean_at(u, table)
+        if not table.noise.plain:
+            o1, o2 = object_at(u, table)
+            m1, m2 = gain * value1 + offset1, gain * value2 + offset2
+            noise = noise_root(m1, m2, gain * o1, gain * o2, table.noise)
+        slopes, told = (d1, d2), (1.0 - share) * known_part(of, row)
+        root = add_products(root, noise, u, gain, 1.0 / precision, told, slopes, of.X[row], table)
     rate = Rate(x[row, V], 0.0, 0.0)
     if table.by_rate:
         rate = _rate_given_u(of, row, precision)
@@ -163,6 +170,7 @@ def own_prior(
         Added(offset1, offset2, slope1, slope2, root, root, of.X[row]),
         rate,
         share,
+        told,
     )
 
 
@@ -203,6 +211,7 @@ def prior_of(
         ),
         prior.rate,
         prior.share,
+        prior.told,
     )
 
 
@@ -235,4 +244,5 @@ def born_prior(of: Hypotheses, log_weight: float, rate_sd: float, table: Reading
         Added(offset1, offset2, 0.0, 0.0, root, root, of.X[0, of.X.shape[1] - 2 :]),
         Rate(0.0, 0.0, rate_sd),
         0.0,
+        known_part(of, 0) if learns_crosstalk(of) else 1.0,
     )
