@@ -36,8 +36,8 @@ def as_ruled(frames: Frames, range_m: Array, size: float, rng: np.random.Generat
     """Return draws of the effective distance as draws of the range that a ruler tells.
 
     With w the share of the ruler's variance in both, the range is normal about
-    known + w (effective - known) with variance w size^2. Moves by a smooth error of the clock, which
-    draws have already, are w^2 size^2 of that.
+    known + w (effective - known) with variance w size^2. Moves by a smooth error of the clock,
+    which draws have already, are w^2 size^2 of that.
 
     Parameters
     ----------
