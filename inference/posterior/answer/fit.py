@@ -46,7 +46,7 @@ class Fit:
     checks : tuple of FitCheck
         One by one.
     outliers : tuple of int
-        Frames too far off the model, by index, where the worst frame is a reason.
+        Frames without which the others fit, by index, where the worst frame is a reason.
     """
 
     p_value: float

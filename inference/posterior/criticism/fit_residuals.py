@@ -15,6 +15,7 @@ from inference.frame.known_range import beside, free_of_range, rates_of
 from inference.frame.shadow_error import shadow_at
 from inference.frame.warmth import gains_of
 from inference.posterior.answer.replicate import replicate_frames
+from inference.posterior.criticism.refit import Refit
 from inference.posterior.job import Job
 from simulator.discrepancy import NEGLECTED, discrepancy_basis
 
@@ -43,12 +44,15 @@ class FitResiduals:
     error : ndarray, shape (1 + replicates,)
         Sum of the squared coefficients of the flux's error that the frames ask for, which are
         standard normal by what the scene allows; zero where it allows for none.
+    refit : Refit or None
+        Of the frames themselves; None where it is not linear in rows of single frames.
     """
 
     across: Array
     squared: Array
     log_r: Array
     error: Array
+    refit: Refit | None = None
 
 
 def _with_flux_error(job: Job, density: CollapsedDensity) -> CollapsedDensity:
@@ -203,7 +207,19 @@ def fit_residuals(
     squared[:, told] += rest[:, n - count :]
     order = np.argsort(seen[present])
     error = np.square(found[:, of_z:of_flux]).sum(axis=1)
-    return FitResiduals(fitted[:, :count][:, order], squared, seen[present][order], error)
+    frame = [
+        np.flatnonzero(present),
+        *(np.repeat(np.flatnonzero(of), 2) for of in (~present, told)),
+    ]
+    beside = np.zeros(n)
+    beside[present] = np.maximum(along[0], 0.0)
+    return FitResiduals(
+        fitted[:, :count][:, order],
+        squared,
+        seen[present][order],
+        error,
+        Refit(before[0], rows, np.concatenate(frame), beside),
+    )
 
 
 def _of_one_range(density: StaticDensity, z: Array, seen: Array, readings: Array) -> FitResiduals:

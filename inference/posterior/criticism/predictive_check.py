@@ -24,7 +24,7 @@ _REPLICATES = 200  # of each
 _FEWEST = 40  # of the frames of each part, where they were dealt out
 _TAIL = 0.1  # share of the replicates that tell how the tail falls
 _LENGTH = 0.5  # in log r, of a smooth error
-TOTAL, FLUX_ERROR = "total", "flux_error"
+TOTAL, WORST_FRAME, FLUX_ERROR = "total", "worst_frame", "flux_error"
 NEIGHBOURS, WANDER = "neighbours", "wander"
 
 
@@ -61,7 +61,7 @@ def _flux_error(of: FitResiduals) -> Array:
 
 _CHECKS: dict[str, Callable[[FitResiduals], Array]] = {
     TOTAL: _total,
-    "worst_frame": _worst,
+    WORST_FRAME: _worst,
     NEIGHBOURS: _neighbours,
     WANDER: _wander,
     FLUX_ERROR: _flux_error,
@@ -69,7 +69,7 @@ _CHECKS: dict[str, Callable[[FitResiduals], Array]] = {
 
 
 # how a statistic of all frames is made from those of parts; others are sums
-_TOGETHER: dict[str, Callable[..., Array]] = {"worst_frame": np.max, NEIGHBOURS: np.mean}
+_TOGETHER: dict[str, Callable[..., Array]] = {WORST_FRAME: np.max, NEIGHBOURS: np.mean}
 
 
 def _survival(anew: Array, seen: Array) -> float:
@@ -131,7 +131,7 @@ def predictive_check(
         else:
             every = [erring_residuals(best, _DRAWS * replicates, rng)]
         found.append({name: [check(of) for of in every] for name, check in _CHECKS.items()})
-        seen.append(np.median([of.squared[0] for of in every], axis=0))
+        seen.append(every)
     checks = []
     for name in _CHECKS:
         values = _TOGETHER.get(name, np.sum)([of[name] for of in found], axis=0)
@@ -141,9 +141,11 @@ def predictive_check(
         checks.append(FitCheck(name, float(np.median(values[:, 0])), mean, p))
     least = min(check.p_value for check in checks)
     p_value = -math.expm1(len(checks) * math.log1p(-min(least, 1.0 - 1e-12)))
-    worst = np.max([of["worst_frame"] for of in found], axis=0)[:, 1:].ravel()
-    outliers = _outliers((job, *others), seen, worst)
+    worst = np.max([of[WORST_FRAME] for of in found], axis=0)[:, 1:].ravel()
     failed = [c for c in checks if -math.expm1(len(checks) * math.log1p(-c.p_value)) < MISFIT_P]
+    outliers: tuple[int, ...] = ()
+    if any(check.name == WORST_FRAME for check in failed):
+        outliers = _outliers((job, *others), seen, worst)
     return Fit(
         p_value,
         p_value < MISFIT_P,
@@ -151,19 +153,29 @@ def predictive_check(
         checks[0].statistic,
         checks[0].expected,
         tuple(checks),
-        outliers if any(check.name == "worst_frame" for check in failed) else (),
+        outliers,
     )
 
 
-def _outliers(parts: Sequence[Job], seen: Sequence[Array], worst: Array) -> tuple[int, ...]:
-    """Return the frames that are worse than all but one in a thousand worst frames should be."""
+def _outliers(
+    parts: Sequence[Job], seen: Sequence[Sequence[FitResiduals]], worst: Array
+) -> tuple[int, ...]:
+    """Return the frames without which none is worse than all but one in a thousand should be."""
     start = float(np.quantile(worst, 1.0 - _TAIL))
     limit = start + float((worst[worst > start] - start).mean()) * math.log(_TAIL / MISFIT_P)
     found = [
-        part.of_sent(np.flatnonzero(part.usable))[of > limit]
-        for part, of in zip(parts, seen, strict=True)
+        part.of_sent(np.flatnonzero(part.usable))[_beyond(every, limit)]
+        for part, every in zip(parts, seen, strict=True)
     ]
     return tuple(np.sort(np.concatenate(found)).tolist())
+
+
+def _beyond(every: Sequence[FitResiduals], limit: float) -> NDArray[np.bool_]:
+    """Tell which frames are too far off at most of the draws, the others fitted without them."""
+    told = np.zeros((len(every), every[0].squared.shape[1]), dtype=bool)
+    for row, of in zip(told, every, strict=True):
+        row[of.squared[0] > limit if of.refit is None else of.refit.outlying(limit)] = True
+    return np.asarray(np.median(told, axis=0) > 0.5)
 
 
 def _words(check: FitCheck, outliers: tuple[int, ...]) -> str:
@@ -173,7 +185,7 @@ def _words(check: FitCheck, outliers: tuple[int, ...]) -> str:
             f"the frames' chi-square is {check.statistic:.4g} where {check.expected:.4g} is "
             "expected: the noise is larger than stated, or the model is wrong"
         )
-    if check.name == "worst_frame":
+    if check.name == WORST_FRAME:
         size = math.sqrt(check.statistic)
         which = ", ".join(str(frame) for frame in outliers[:10])
         more = f" and {len(outliers) - 10} more" if len(outliers) > 10 else ""

@@ -105,7 +105,7 @@ def test_what_is_wrong_is_named(
     (found,) = (part for part in fit.checks if part.name == check)
     assert found.p_value < 2.5e-4
     if check == "worst_frame":
-        assert 7 in fit.outliers
+        assert fit.outliers == (7,)
         assert any("frames" in reason and "7" in reason for reason in fit.reasons)
     else:
         assert any("discrepancy" in reason for reason in fit.reasons)
