@@ -3,15 +3,11 @@
 import dataclasses
 import math
 
-from simulator.model_error import ModelError
 from simulator.remembered import remembered
 from simulator.scene import Quantity, Reference, Scene, Stroke
 from simulator.sensor import PulsedSensor, Sensor
 
-__all__ = ["OBJECT", "Known", "allowed_error", "known_of"]
-
-OBJECT = ("object.c0", "object.c1", "object.c2")
-"""Scene paths of the object's numbers."""
+__all__ = ["Known", "known_of"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,15 +89,3 @@ def known_of(scene: Scene, sensor: Sensor | None = None) -> Known:
         shift = sensor.known_shift_m
         support = (max(support[0], -shift), min(support[1], sensor.r0 - shift))
     return Known(numbers, crosstalk, support)
-
-
-def allowed_error(scene: Scene) -> ModelError:
-    """Return the model's error that an answer allows for.
-
-    Parameters
-    ----------
-    scene : Scene
-        Of an object whose numbers are known the flux errs by what their fit has left.
-    """
-    error = scene.model_error
-    return error.beside_numbers() if known_of(scene).has(*OBJECT) else error

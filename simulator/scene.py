@@ -218,6 +218,13 @@ class Scene(Validated):
         return ModelError.stated(self.discrepancy)
 
     @property
+    def allowed_error(self) -> ModelError:
+        """The same that answers allow for: an object whose numbers are known was fitted."""
+        numbers = self.object.c0, self.object.c1, self.object.c2
+        known = all(isinstance(number, float | int) for number in numbers)
+        return self.model_error.beside_numbers() if known else self.model_error
+
+    @property
     def stated_flux_error(self) -> float | None:
         """The flux's error where the scene states one: only until all floors use `model_error`."""
         return (self.model_error.flux or None) if self.discrepancy is not None else None

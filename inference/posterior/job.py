@@ -12,7 +12,6 @@ from inference.density.representatives import Representatives, standing_for
 from inference.density.static import with_common_range
 from inference.frame.blocks import RANGE
 from inference.frame.known_range import columns_of
-from inference.known import allowed_error
 from inference.posterior.answer.clock import with_clock_error
 from inference.posterior.archive import pack, pack_parts, unpack, unpack_parts
 from inference.posterior.checks import check_scene_for_posterior
@@ -76,13 +75,8 @@ class Job:
     @property
     def model_error(self) -> ModelError:
         """Sizes of the model's errors: those that the scene allows, or the readings ask for."""
-        error = self.allowed_error
+        error = self.scene.allowed_error
         return dataclasses.replace(error, flux=self.flux_times * error.flux)
-
-    @property
-    def allowed_error(self) -> ModelError:
-        """Sizes of the model's errors that the scene allows."""
-        return allowed_error(self.scene)
 
     @property
     def usable(self) -> NDArray[np.bool_]:
@@ -116,7 +110,7 @@ class Job:
 
     def density(self) -> CollapsedDensity:
         """Return the collapsed density of the usable frames."""
-        error = self.allowed_error
+        error = self.scene.allowed_error
         frames = with_clock_error(self.frames.select(self.usable), error.range_m)
         density = collapsed_density(self.sensor, self.scene, frames)
         if self.scene.motion == "static":
@@ -143,7 +137,7 @@ class Job:
     @property
     def can_integrate_error(self) -> bool:
         """Whether there is an error of the flux that is not, but could be, integrated out."""
-        error = self.allowed_error
+        error = self.scene.allowed_error
         few = len(self.frames) <= MOST_SAMPLED and self.scene.motion == "radial"
         return few and error.flux > 0 and not error.integrated
 
@@ -153,7 +147,7 @@ class Job:
         Linear response starts from the posterior of an exact model. Where that lies too far from
         the truth it cannot be put right to first order (docs/model.md, model-response).
         """
-        error = self.allowed_error
+        error = self.scene.allowed_error
         sizes = ErrorSizes(flux=error.flux, range_m=error.range_m, shadow=error.shadow)
         scene = self.scene.model_copy(update={"discrepancy": sizes})
         return dataclasses.replace(self, scene=scene)

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.known import OBJECT
 from inference.realtime.solving.curves import dispatch
 from inference.realtime.solving.curves.curve import CurveParameters
 from inference.technique import Task
@@ -41,7 +40,8 @@ def model_error_of(task: Task) -> ModelError:
     if task.exact:
         return ModelError(0.0, 0.0, integrated=False)
     error = task.scene.model_error
-    return error.beside_numbers() if task.known.has(*OBJECT) else error
+    known = task.known.has("object.c0", "object.c1", "object.c2")
+    return error.beside_numbers() if known else error
 
 
 def point_error(task: Task, unit: float) -> PointError:

@@ -22,7 +22,6 @@ from inference.fits.likelihood.told import KnownRanges
 from inference.frame.arguments import Instrument, Rows
 from inference.frame.blocks import own_blocks
 from inference.frame.sensitivity import Value
-from inference.known import allowed_error
 from simulator.errors import RefusedError
 from simulator.frames import Frames
 from simulator.last_call import LastCall
@@ -344,5 +343,5 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames, *, exact: bool = F
         background=True if parameters.has_background else None,
         support=(near, far),
         parameters=parameters,
-        error=ModelError(0.0, 0.0, integrated=False) if exact else allowed_error(scene),
+        error=ModelError(0.0, 0.0, integrated=False) if exact else scene.allowed_error,
     )

@@ -90,7 +90,7 @@ def flux_error_asked_for(job: Job, fit: Fit) -> float:
         1 where the size that is allowed for does, or noise alone is what is larger; at most what
         makes an error of `LARGEST`.
     """
-    error, asked = job.allowed_error, _check(fit, FLUX_ERROR)
+    error, asked = job.scene.allowed_error, _check(fit, FLUX_ERROR)
     if error.integrated or not (error.flux > 0 and fit.p_value < MISFIT_P):
         return 1.0
     if asked.p_value > _BY_CHANCE or not asked.expected > 0:

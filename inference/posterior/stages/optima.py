@@ -49,7 +49,7 @@ def depend_on_errors(job: Job, density: CollapsedDensity, optima: Sequence[Optim
     far = [one for one in optima if one.log_mass < best - _MATTERS]
     if not (far and job.can_integrate_error):
         return False
-    erring = with_discrepancy(density, job.allowed_error.flux)
+    erring = with_discrepancy(density, job.scene.allowed_error.flux)
     here, there = (erring(np.array([one.z for one in some])) for some in (near, far))
     within = there > here.max() - _WITHIN_REACH
     if not within.any():
