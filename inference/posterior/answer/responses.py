@@ -36,6 +36,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+_STRAIGHTEST = 0.05  # share of a way of unknowns that the next order may add unseen
 _REFERENCES = 100  # draws at which the response is computed
 _FRAMES = 20_000  # that this may cost
 _FEWEST = 20
@@ -101,11 +102,12 @@ class Responses:
 
         An exact model may put an unknown far from where errors let it be, as measured by what they
         leave of it: what the next order adds to so long a way then counts, however small a share.
+        That share is measured on ranges, and an unknown's own may be larger.
         """
         moved = self.by_z
         there = self.z + moved[:, :, 0]
         spread = there.var(axis=0) + np.square(moved[:, :, 1:]).sum(axis=2).mean(axis=0)
-        off = self.curvature * np.abs(moved[:, :, 0].mean(axis=0))
+        off = max(self.curvature, _STRAIGHTEST) * np.abs(moved[:, :, 0].mean(axis=0))
         sd = np.sqrt(spread)
         return np.asarray(np.divide(off, sd, out=np.zeros_like(off), where=sd > 0))
 
