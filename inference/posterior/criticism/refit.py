@@ -76,9 +76,20 @@ class Refit:
         squares = self.beside + np.bincount(frame, np.square(left), self.beside.size)
         squares[out] = 0.0
         far = np.flatnonzero(squares > limit)
-        falls = np.zeros_like(squares)
-        for k in np.unique(frame).tolist() if far.size else ():
-            falls[k] = self.beside[k] + _fall(left[frame == k], basis[frame == k])
+        if not far.size:
+            return _Far(far, squares)
+        falls = np.where(squares > 0.0, self.beside, 0.0)
+        frames, own, counts = np.unique(frame, return_inverse=True, return_counts=True)
+        # rows of a frame side by side, what is missing without effect
+        order = np.argsort(own, kind="stable")
+        place = np.empty_like(own)
+        place[order] = np.arange(own.size) - np.repeat(np.cumsum(counts) - counts, counts)
+        many = int(counts.max())
+        parts, shares = np.zeros((frames.size, many)), np.zeros((frames.size, many, basis.shape[1]))
+        parts[own, place], shares[own, place] = left, basis
+        free = np.eye(many) - shares @ shares.transpose(0, 2, 1)
+        inverse = np.linalg.pinv(free, rcond=1e-12, hermitian=True)
+        falls[frames] += np.einsum("ni,nij,nj->n", parts, inverse, parts)
         return _Far(far, falls)
 
     def _without(self, out: list[int]) -> tuple[Array, Array, NDArray[np.intp]]:
@@ -88,9 +99,3 @@ class Refit:
         basis = scipy.linalg.qr(np.concatenate([rows, np.eye(rows.shape[1])]), mode="economic")[0]
         basis = basis[: len(rows)]
         return before - basis @ (basis.T @ before), basis, self.frame[kept]
-
-
-def _fall(left: Array, basis: Array) -> float:
-    """Return by what chi-square falls without rows of which a fit leaves so much."""
-    free = np.eye(len(left)) - basis @ basis.T
-    return float(left @ np.linalg.lstsq(free, left, rcond=1e-12)[0])
