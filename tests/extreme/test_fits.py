@@ -121,7 +121,12 @@ def test_every_frame_twice_halves_the_variance(fit: Fit) -> None:
     assert two.parameters is not None
     for name, item in one.parameters.items():
         assert abs(two.parameters[name]["value"] - item["value"]) < TOP * item["sd"]
-        assert two.parameters[name]["sd"] * math.sqrt(2) == pytest.approx(item["sd"], rel=1e-3)
+        # the sd of a size reaches to the farther end of its interval, which is at z beyond that of
+        # its logarithm by a share of z/2 of it: more where it is wider
+        bend = 0.5 * 1.645 * item["sd"] / abs(item["value"]) * (1.0 - math.sqrt(0.5))
+        assert two.parameters[name]["sd"] * math.sqrt(2) == pytest.approx(
+            item["sd"], rel=1e-3 + bend
+        )
 
 
 @pytest.mark.parametrize("fit", FITS, ids=NAMES)

@@ -18,6 +18,7 @@ from inference.fits.likelihood.erring import Erring
 from inference.fits.likelihood.erring_point import moved_by_errors
 from inference.fits.likelihood.frame_modes import MOST, frame_reaches
 from inference.fits.likelihood.information import residuals_and_information
+from inference.fits.likelihood.known_modes import once
 from inference.fits.likelihood.maximum import DECIDED
 from inference.fits.likelihood.problem import FitProblem
 from inference.realtime.net import ABSENT, COMMON_REASONS, SATURATED
@@ -40,7 +41,6 @@ WITHIN = 3.8414588206941285
 _IMPOSSIBLE = 36.0  # chi-square of a single frame that nothing explains
 # of the range, below which the tangent holds as far as noise reaches
 _SMALL = 0.005
-_SAME = 1e-5  # of log r, to which a descent is sure of where it ends
 _ONE = 1.0  # standard deviations below which two modes are one
 _BAND = 3.0  # standard deviations that are followed, as of noise
 _ANY = 1.0  # deviance, below which the farthest range is one of the best
@@ -165,7 +165,7 @@ def _modes(problem: FitProblem, answers: Sequence[Answer]) -> tuple[_Modes, Arra
         if erring is not None and erring.clean.known is not None:
             ruled = (erring.clean.known.rates > 0).any(axis=1)  # more than readings tell it
             u = np.column_stack([erring.with_known(column) for column in u.T])
-            u[ruled], reach[ruled] = _once(u[ruled]), 0.0
+            u[ruled], reach[ruled] = once(u[ruled]), 0.0
         noise, told, model, squares = np.full((4, *u.shape), np.nan)
         for k in range(MOST):
             if k > 0 and not np.isfinite(u[:, k]).any():
@@ -210,14 +210,6 @@ def _modes(problem: FitProblem, answers: Sequence[Answer]) -> tuple[_Modes, Arra
         columns.append((u, noise, told, model, np.where(np.isnan(excess), np.inf, excess)))
     joined = (np.concatenate(parts, axis=1) for parts in zip(*columns, strict=True))
     return _Modes(*joined), chi_square
-
-
-def _once(u: Array) -> Array:
-    """Return modes, shape (n, `MOST`), nan in place of those that have come where another has."""
-    u = u.copy()
-    for k in range(1, u.shape[1]):
-        u[(np.abs(u[:, :k] - u[:, k : k + 1]) < _SAME).any(axis=1), k] = np.nan
-    return u
 
 
 def _merged(u: Array, sd: Array, excess: Array) -> tuple[list[int], bool]:

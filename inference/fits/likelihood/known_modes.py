@@ -7,14 +7,29 @@ from inference.fits.likelihood.erring_point import linearised, whitened_of
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import Told, told_of
 
-__all__ = ["with_known"]
+__all__ = ["once", "with_known"]
 
 Array = NDArray[np.float64]
 
 _TURNS = 60  # enough to cross all ranges of a scene, and to settle
 _LONGEST = 0.3  # of log r in a turn
 _SETTLED = 1e-9  # in log r
+_SAME = 1e-5  # of log r, to which a descent is sure of where it ends
 _NEAR = 0.1  # standard deviations, below which a step is taken as it is
+
+
+def once(u: Array) -> Array:
+    """Return modes of frames, nan in place of those that have come where another has.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n, modes)
+        log r; nan where there is no mode.
+    """
+    u = u.copy()
+    for k in range(1, u.shape[1]):
+        u[(np.abs(u[:, :k] - u[:, k : k + 1]) < _SAME).any(axis=1), k] = np.nan
+    return u
 
 
 def with_known(problem: FitProblem, x: Array, a: Array, u: Array) -> Array:
