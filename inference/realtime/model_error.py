@@ -39,9 +39,7 @@ def model_error_of(task: Task) -> ModelError:
     """Return the model's error that a task answers for: none where its model is exact."""
     if task.exact:
         return ModelError(0.0, 0.0, integrated=False)
-    error = task.scene.model_error
-    known = task.known.has("object.c0", "object.c1", "object.c2")
-    return error.beside_numbers() if known else error
+    return task.scene.allowed_error
 
 
 def point_error(task: Task, unit: float) -> PointError:

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from inference.fits.likelihood.erring_point import linearised, whitened_of
 from inference.fits.likelihood.problem import FitProblem
-from inference.fits.likelihood.told import Told, told_of
+from inference.fits.likelihood.told import Told, step_of, told_of
 
 __all__ = ["once", "with_known"]
 
@@ -62,7 +62,7 @@ def with_known(problem: FitProblem, x: Array, a: Array, u: Array) -> Array:
     for _ in range(_TURNS):
         parts = np.stack([residual - errors @ a, np.where(np.isfinite(along), along, 0.0)], axis=2)
         white = whitened_of(problem, u, errors, parts)
-        step, size = _step(told, white[:, :, 0], white[:, :, 1])
+        step, size = step_of(told, white[:, :, 0], white[:, :, 1])
         near = np.square(step) * size < _NEAR**2
         damp[near] = 1.0
         new = np.clip(u + damp * np.clip(step, -_LONGEST, _LONGEST), low, high)
@@ -92,15 +92,3 @@ def _like(less: NDArray[np.bool_], part: Array) -> NDArray[np.bool_]:
 
 def _deviance(told: Told, residual: Array) -> Array:
     return np.asarray(np.square(residual).sum(axis=1) + np.square(told.residual).sum(axis=1))
-
-
-def _step(told: Told, residual: Array, along: Array) -> tuple[Array, Array]:
-    """Return the step of Gauss and Newton in log r, and what is known along it.
-
-    The step is 0 where nothing is known beside the readings.
-    """
-    size = np.square(along).sum(axis=1) + np.square(told.along).sum(axis=1)
-    pull = np.einsum("ni,ni->n", along, residual)
-    pull += np.einsum("ni,ni->n", told.along, told.residual)
-    moved = (told.along > 0).any(axis=1) & (size > 0)
-    return np.divide(pull, size, out=np.zeros_like(pull), where=moved), size

@@ -25,6 +25,7 @@ __all__ = [
     "eliminated",
     "improbable",
     "known_ranges",
+    "step_of",
     "told_at",
     "told_of",
     "unsettled",
@@ -215,14 +216,26 @@ def unsettled(told: Told, residual: Array, along: Array) -> Array:
     told, residual, along
         As for `contradictions`.
     """
+    step, size = step_of(told, residual, along)
+    return np.square(step) * size
+
+
+def step_of(told: Told, residual: Array, along: Array) -> tuple[Array, Array]:
+    """Return the step of Gauss and Newton in log r, and what is known along it, each shape (n,).
+
+    The step is 0 where nothing is known beside the readings.
+
+    Parameters
+    ----------
+    told, residual, along
+        As for `contradictions`.
+    """
     move = np.where(np.isfinite(along), along, 0.0)
     size = np.square(move).sum(axis=1) + np.square(told.along).sum(axis=1)
     pull = np.einsum("ni,ni->n", move, residual)
     pull += np.einsum("ni,ni->n", told.along, told.residual)
-    known = (told.along > 0).any(axis=1)
-    out = np.zeros(pull.size)
-    np.divide(np.square(pull), size, out=out, where=known & (size > 0))
-    return out
+    moved = (told.along > 0).any(axis=1) & (size > 0)
+    return np.divide(pull, size, out=np.zeros_like(pull), where=moved), size
 
 
 def improbable(chi_square: Array) -> NDArray[np.intp]:
