@@ -11,7 +11,7 @@ from benchmarks.samplers.outcome import Outcome, enough, equal, judged
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior import fold
 from inference.posterior.job import Job
-from inference.posterior.sampling.flux_coordinate import coordinates_of
+from inference.posterior.sampling.coordinates import coordinates_of
 from inference.posterior.sampling.importance import draw_weighted
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.start import Optimum

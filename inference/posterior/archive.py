@@ -14,6 +14,7 @@ from inference.density.representatives import Representatives
 from inference.posterior.sampling.ensemble import Ensemble
 from inference.posterior.sampling.flux_coordinate import FluxCoordinate
 from inference.posterior.sampling.importance import WeightedDraws
+from inference.posterior.sampling.light_at_rest import LightAtRest
 from inference.posterior.sampling.pool import Pool
 from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.proposal import Local, Mixture, Proposal
@@ -133,6 +134,7 @@ _PARTS = {
         Decision,
         Ensemble,
         FluxCoordinate,
+        LightAtRest,
         Frames,
         LastDraws,
         Local,

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.posterior.sampling.reparametrisation import Reparametrisation, reparametrisation_of
+from inference.posterior.sampling.reparametrisation import Reparametrisation
 
-__all__ = ["FluxCoordinate", "coordinates_of"]
+__all__ = ["FluxCoordinate", "flux_coordinate_of"]
 
 Array = NDArray[np.float64]
 
@@ -80,6 +80,10 @@ class FluxCoordinate:
             span = ranges[[max(best - 1, 0), min(best + 1, _RATIOS - 1)]]
         return dataclasses.replace(self, range_m=float(ranges[best]))
 
+    def log_volume(self, z: Array) -> Array:
+        """Return log |dy/dz|, shape (n,): 0."""
+        return np.zeros(len(z))
+
     def forward(self, z: Array) -> Array:
         """Return y of z, shape (n, d)."""
         y = z.copy() if self.before is None else self.before.forward(z)
@@ -99,24 +103,27 @@ def _log_flux(range_m: Array | float, root: Array, above_pole: Array) -> Array:
     return np.asarray(-np.log(np.maximum((s - 1.0) ** 2 + 2.0 * s * above_pole, _LEAST)))
 
 
-def coordinates_of(density: CollapsedDensity) -> FluxCoordinate | Reparametrisation | None:
-    """Return coordinates that a map is fitted in.
+def flux_coordinate_of(
+    density: CollapsedDensity, before: Reparametrisation | None
+) -> FluxCoordinate | None:
+    """Return the flux as a coordinate, its range not chosen yet.
 
     Parameters
     ----------
     density : CollapsedDensity
-        Its unknowns, and the sensor.
+        Its unknowns.
+    before : Reparametrisation or None
+        Applied before it.
 
     Returns
     -------
-    FluxCoordinate, Reparametrisation or None
-        With the flux where c2 and c0 are unknown with independent priors, else with the static
-        light where crosstalk and a background are confounded; None for z itself.
+    FluxCoordinate or None
+        None where c2 or c0 is known, or their priors are not independent.
     """
-    before, parameters = reparametrisation_of(density), density.parameters
+    parameters = density.parameters
     names = list(parameters.names)
     if not {"object.c0", "object.c2"} <= set(names) or parameters.law is not None:
-        return before
+        return None
     c0, c2 = names.index("object.c0"), names.index("object.c2")
     c1 = names.index("object.c1") if "object.c1" in names else c0
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import linalg, optimize, special
 
 from inference.density.collapsed import CollapsedDensity
-from inference.posterior.sampling.flux_coordinate import coordinates_of
+from inference.posterior.sampling.coordinates import coordinates_of
 from inference.posterior.sampling.pool import Pool
 from inference.posterior.sampling.proposal import Local, Mixture, Proposal
 from inference.posterior.sampling.transport import fit_map

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.aliases import Aliases, aliases_of
 from inference.posterior.sampling.by_weight import systematic
+from inference.posterior.sampling.coordinates import coordinates_of
 from inference.posterior.sampling.effort import Effort, Move
-from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.transport import TriangularMap, fit_map, straight_map
 
 __all__ = ["Population", "arrived_at", "carried", "first_population", "temper"]

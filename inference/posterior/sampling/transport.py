@@ -14,14 +14,13 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.density.triangular import update_factor
+from inference.posterior.sampling.coordinates import Coordinates
 from inference.posterior.sampling.flux_coordinate import FluxCoordinate
-from inference.posterior.sampling.reparametrisation import Reparametrisation
 from simulator.compiled import compiled
 
 __all__ = ["TriangularMap", "fit_map", "straight_map"]
 
 Array = NDArray[np.float64]
-Coordinates = FluxCoordinate | Reparametrisation
 
 _POINTS = 6  # of the sample for every term of a polynomial
 _BEYOND = 1.5  # times the reach of the sample: held to it, moves never widen a sheet too short
@@ -114,7 +113,7 @@ class TriangularMap:
         Coefficients of each coordinate's log scale, at most quadratic.
     cubic : int
         Widest coordinates that have cubic terms in the means.
-    coordinates : FluxCoordinate, Reparametrisation or None
+    coordinates : FluxCoordinate, LightAtRest, Reparametrisation or None
         Applied before all of this; None for z itself.
     """
 
@@ -132,13 +131,14 @@ class TriangularMap:
 
     def unbend(self, z: Array) -> tuple[Array, Array]:
         """Return x of shape (n, d) and log |dx/dz| of shape (n,)."""
+        log_det = np.full(len(z), -self._log_volume)
         if self.coordinates is not None:
+            log_det += self.coordinates.log_volume(z)
             z = self.coordinates.forward(z)
         # the axes are orthogonal: their inverse is their transpose, rescaled
         inverse = self.axes / np.einsum("ij,ij->j", self.axes, self.axes)
         whitened = np.einsum("nj,jk->nk", z - self.centre, inverse)
         x = np.empty_like(whitened)
-        log_det = np.full(len(z), -self._log_volume)
         _unbend(x, log_det, whitened, self.bounds, self.means, self.scales, self.cubic)
         return x, log_det
 
@@ -156,7 +156,10 @@ class TriangularMap:
             self.cubic,
         )
         z = self.centre + np.einsum("nk,jk->nj", whitened, self.axes)
-        return (z if self.coordinates is None else self.coordinates.backward(z)), log_det
+        if self.coordinates is not None:
+            z = self.coordinates.backward(z)
+            log_det -= self.coordinates.log_volume(z)
+        return z, log_det
 
 
 def _features(w: Array, k: int, quadratic: bool, cubic: int) -> Array:
@@ -219,7 +222,7 @@ def fit_map(draws: Array, coordinates: Coordinates | None = None) -> TriangularM
     ----------
     draws : ndarray, shape (n, d)
         n > d, not all equal; duplicates count as often as they stand there.
-    coordinates : FluxCoordinate or Reparametrisation, optional
+    coordinates : FluxCoordinate, LightAtRest or Reparametrisation, optional
         That the map starts from; of a flux, at the range at which the sample tells it best.
 
     Returns

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
-from inference.posterior.sampling.flux_coordinate import coordinates_of
+from inference.posterior.sampling.coordinates import coordinates_of
 from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
 from inference.posterior.sampling.proposal import Proposal
 from inference.posterior.sampling.transport import fit_map

@@ -15,8 +15,8 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
+from inference.posterior.sampling.coordinates import coordinates_of
 from inference.posterior.sampling.effort import effort_of, scouts
-from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.importance import WeightedDraws, draw_weighted
 from inference.posterior.sampling.population import Population, carried
 from inference.posterior.sampling.proposal import Mixture, Proposal, mixture_of

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.job import Job
+from inference.posterior.sampling.coordinates import coordinates_of
 from inference.posterior.sampling.ensemble import WALKERS, warm_walkers
-from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.rounds import STEP, first_draws, next_draws, taken_in
 from inference.posterior.sampling.rounds_so_far import Rounds, RoundsSoFar, Wanted

@@ -8,13 +8,13 @@ import numpy as np
 
 from inference.posterior.job import Job
 from inference.posterior.sampling.aliases import aliases_of
+from inference.posterior.sampling.coordinates import coordinates_of
 from inference.posterior.sampling.diagnostics import (
     autocorrelation_time,
     effective_sample_size,
     split_r_hat,
 )
 from inference.posterior.sampling.ensemble import Ensemble, advance, restart
-from inference.posterior.sampling.flux_coordinate import coordinates_of
 from inference.posterior.sampling.proposal import Proposal
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.sampling.verdict import Chains, Verdict, judge

@@ -9,7 +9,8 @@ import hybridtof
 from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.archive import pack_parts, unpack_parts
 from inference.posterior.infer import infer
-from inference.posterior.sampling.flux_coordinate import FluxCoordinate, coordinates_of
+from inference.posterior.sampling.coordinates import coordinates_of
+from inference.posterior.sampling.flux_coordinate import FluxCoordinate
 from inference.posterior.sampling.reparametrisation import Reparametrisation
 from inference.posterior.sampling.transport import fit_map
 from inference.posterior.settings import SamplerSettings
