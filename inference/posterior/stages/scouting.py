@@ -17,7 +17,7 @@ from inference.posterior.stages.stage import Tempering
 __all__ = ["from_scouts"]
 
 _HALFWAY = 0.3  # power of the likelihood at which small populations stop
-_MOST_S = 10  # seconds that rounds may take
+_MOST_S = 40  # seconds that rounds may take: populations that are carried all the way take longer
 
 
 def from_scouts(

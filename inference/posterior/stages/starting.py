@@ -215,11 +215,14 @@ def _first_stage(
     # walkers are held to the fewer draws: they are to find what more of these weigh too coarsely
     held_to = drawn if job.settings.method == "auto" else warm.draws
     contradicted = beyond(density, warm.proposal, held_to, scouts.hot) >= TOLERATED
-    if may_answer and _enough(drawn, job) and not contradicted and are_told(job, drawn):
+    enough = may_answer and _enough(drawn, job)
+    if enough and not contradicted and are_told(job, drawn):
         return answer_of(job, warm.proposal, drawn.that_count, scouts.z, 0), calls
-    # walkers, too, would hardly ever jump to where no weight leads
-    if contradicted and (stage := from_scouts(job, density, warm.proposal, scouts, warm.draws)):
-        return stage, calls
+    # walkers, too, would hardly ever jump to where no weight leads, or leave where weights are few
+    if contradicted or (may_answer and not enough):
+        stage = from_scouts(job, density, warm.proposal, scouts, warm.draws)
+        if stage is not None:
+            return stage, calls
     ensembles = from_weighted(job, density, warm.proposal, warm.draws, scouts.z)
     walking = Walking(warm.proposal, ensembles, pending, adaptations=0, weighted=warm.draws)
     return walking, calls + ensembles[0].walkers * len(ensembles)

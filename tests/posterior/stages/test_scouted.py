@@ -1,5 +1,6 @@
 """Weak signals: a spine that Laplace shapes follow, and a wide tail that they miss."""
 
+import dataclasses
 import functools
 from typing import Any
 
@@ -11,7 +12,7 @@ from inference.posterior import fold
 from inference.posterior.sampling.rounds import in_rounds
 from inference.posterior.sampling.rounds_so_far import Rounds, Wanted
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages import setting_out, walking
+from inference.posterior.stages import setting_out, starting, walking
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.ensembles import POPULATIONS
 from inference.posterior.stages.stage import Starting, Tempering, Walking, Weighted
@@ -66,6 +67,33 @@ def test_ensembles_do_not_start_from_draws_that_leave_out_where_scouts_stood() -
     sensor, scene, simulation = _case("pulsed", "object, crosstalk", 100.0, SEED)
     settings = SamplerSettings.model_validate({"seed": SEED, "method": "emcee"})
     stage = begin(fold.prepare(sensor, scene, simulation.frames, settings), Starting()).stage
+    assert isinstance(stage, Tempering)
+    assert stage.scouted
+
+
+def test_rounds_follow_draws_that_fit_and_are_not_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planted fault: ensembles walked, stayed in the tail, and called for populations."""
+    monkeypatch.setattr(starting, "_enough", lambda *_: False)
+    sensor, scene, simulation = _case("pulsed", "object, crosstalk", 1000.0, SEED)
+    settings = SamplerSettings.model_validate({"seed": SEED, "method": "auto"})
+    stage = begin(fold.prepare(sensor, scene, simulation.frames, settings), Starting()).stage
+    assert isinstance(stage, Tempering)
+    assert stage.scouted
+
+
+def test_rounds_follow_where_known_ranges_have_errors_integrated_out() -> None:
+    """Planted fault: forty such frames counted as too dear for rounds, and populations set out."""
+    sensor, scene, simulation = _case("sine_wave", "object, crosstalk", 100.0, SEED)
+    ends = np.array([True] + [False] * 38 + [True])
+    frames = dataclasses.replace(
+        simulation.frames,
+        known_range_m=np.where(ends, simulation.range_m, np.nan),
+        known_range_sd_m=np.where(ends, 0.002, np.nan),
+    )
+    settings = SamplerSettings.model_validate({"seed": SEED, "method": "auto"})
+    job = fold.prepare(sensor, scene, frames, settings)
+    assert job.scene.model_error.integrated
+    stage = begin(job, Starting()).stage
     assert isinstance(stage, Tempering)
     assert stage.scouted
 
