@@ -23,9 +23,18 @@ from inference.tracking.outliers import log_outlier
 from inference.tracking.readings_table import FIRST, SECOND, ReadingsTable
 from inference.tracking.roots import UNIT, Root, add_factor, solve
 from inference.tracking.square_root import Linear, update
+from inference.tracking.without_object import take_stated
 from simulator.compiled import compiled
 
-__all__ = ["NEVER", "Empty", "Expected", "expect_empty", "learn_empty", "weigh_empty"]
+__all__ = [
+    "NEVER",
+    "Empty",
+    "Expected",
+    "expect_empty",
+    "learn_empty",
+    "learn_stated",
+    "weigh_empty",
+]
 
 Array = NDArray[np.float64]
 
@@ -128,6 +137,21 @@ def learn_empty(
         e1, e2 = frame.first - expected.mean1, frame.second - expected.mean2
         update(of, 0, Linear(e1, e2, 0.0, 0.0, 0.0, 0.0, expected.noise), scratch, of.X.shape[1])
     return expected.surprise
+
+
+@borrowed
+@compiled
+def learn_stated(
+    of: Hypotheses, frame: TrackedFrame, table: ReadingsTable, empty: Array, scratch: Scratch
+) -> float:
+    """Learn the crosstalk from a frame that is stated to be empty; its surprise.
+
+    Parameters are those of `learn_empty`.
+    """
+    if learns_crosstalk(of):
+        expected = expect_empty(of, frame, table, empty, scratch.nuisance)
+        take_stated(of, expected.noise, scratch.nuisance)
+    return learn_empty(of, frame, table, empty, scratch)
 
 
 @borrowed

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import Status
-from inference.tracking.empty_scene import learn_empty
+from inference.tracking.empty_scene import learn_stated
 from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import (
     COUNT,
@@ -123,7 +123,7 @@ def run_filter(
                 weigh_known(frame, of, model, room)
         else:
             if kinds[i] == EMPTY:
-                surprise = learn_empty(of, frame, model.table, model.places.empty, room.scratch)
+                surprise = learn_stated(of, frame, model.table, model.places.empty, room.scratch)
             of.weight[0], numbers[PENDING], numbers[COUNT] = 1.0, 0.0, 0.0
         if not math.isnan(surprise):
             own = min(surprise, rules.most_surprise) / model.table.channels

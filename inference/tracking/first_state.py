@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from inference.tracking.evenness import ROUGH, hides
 from inference.tracking.hypotheses import (
     ANCHOR,
-    BRIGHT,
     CROSSTALK1,
     RESTING,
     STILL,
+    TOLD,
     Hypotheses,
+    unknown_crosstalk,
 )
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
@@ -78,11 +79,12 @@ def first_state(
     weight[0] = 1.0 - there
     numbers = [math.nan, there, 1.0, 0.0, 0.0, ROUGH, 0.0]
     numbers += [math.nan, math.nan, math.inf, math.inf, 0.0, 0.0, 0.0]
-    numbers += [0.0] * (BRIGHT + 1 - STILL)
+    numbers += [0.0] * (TOLD + 1 - STILL)
     if steady:
         numbers += first_unsteady(directions)
     first = Hypotheses(x, X, weight, np.array(numbers))
     first.numbers[RESTING] = float(crosstalk is not None and hides(first, 0))
+    first.numbers[TOLD] = 0.0 if crosstalk is None else unknown_crosstalk(first, 0)
     return TrackState(first)
 
 

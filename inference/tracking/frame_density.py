@@ -76,7 +76,9 @@ class Added(NamedTuple):
     slope1: float
     slope2: float
     own: Root  # of the covariance that crosstalk adds
-    root: Root  # of that with nuisance parameters, at the prediction
+    # of that with nuisance parameters and what `inference.tracking.second_order` adds, both at the
+    # prediction
+    root: Root
     # root of the covariance, as what nuisance parameters add depends on u: (n, n + p) of a
     # hypothesis; (2, n + p) of the crosstalk in the empty scene where the prior is born
     spread: Array

@@ -36,6 +36,7 @@ __all__ = [
     "STAYED",
     "STILL",
     "TIME",
+    "TOLD",
     "WITHOUT_CROSSTALK",
     "Hypotheses",
     "Scratch",
@@ -62,6 +63,7 @@ WITHOUT_CROSSTALK = 2  # own states of a hypothesis that does not learn it
 TIME, PENDING, RUNNING, COUNT, LOST, ROUGHNESS, SAME, _READ1, _READ2, _STEP1, _STEP2 = range(11)
 RESTING, LEVEL1, LEVEL2 = range(11, 14)
 STILL, SINCE, STAYED, STAY1, STAY2, LATE1, LATE2, BRIGHT = range(14, 22)
+TOLD = 22
 _LEAST = -700.0  # log of a weight that underflows
 _ROOT_8 = math.sqrt(8.0)
 # probability of no change at all from which on readings that do not change say nothing: thirty
@@ -78,7 +80,7 @@ class Hypotheses(NamedTuple):
     x: Array
     X: Array  # (rows, n, n + p): roots of the covariances
     weight: Array  # (rows,): probabilities
-    # (22,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
+    # (23,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
     # the last frame [s] (nan: none yet), probability of an object of which nothing is known yet,
     # running surprise, number of hypotheses, whether an object that was there may be anywhere by
     # now, the surprise of the last frames, each cut at 1, how many frames up to the last had the
@@ -86,7 +88,8 @@ class Hypotheses(NamedTuple):
     # the next (inf: none yet), where crosstalk is learnt whether its light may be that of an object
     # at rest (`inference.tracking.resting`), what the crosstalk was before anything changed, and
     # of readings that stay as they are (`inference.tracking.stillness`) whether they do, since when
-    # [s], in how many frames, their mean, that of late, and the gain's factor
+    # [s], in how many frames, their mean, that of late, and the gain's factor, and what is known of
+    # the crosstalk without any object (`inference.tracking.without_object`)
     numbers: Array
 
 

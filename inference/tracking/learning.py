@@ -11,6 +11,7 @@ from inference.tracking.candidates import TrackCandidate
 from inference.tracking.frame_density import Prior, TrackedFrame, bend_at, spread_at, told_at
 from inference.tracking.hypotheses import (
     ANCHOR,
+    CROSSTALK1,
     WITHOUT_CROSSTALK,
     Hypotheses,
     Scratch,
@@ -149,17 +150,24 @@ def _of_readings(
 
 @compiled
 def _take_moments(of: Hypotheses, row: int, mean: float, sd: float) -> None:
-    """Give u the mean and standard deviation that were integrated along the curve, if they were."""
+    """Give u the mean and standard deviation that were integrated along the curve, if they were.
+
+    They hold what nuisance parameters do to u. Crosstalk follows u by all that u errs by: by what u
+    errs by itself alone, far less beside a bright object, it would follow what the light hides.
+    """
     x, X = of.x, of.X
-    n, variance = X.shape[1], variance_of(of, row, U)
-    if not (variance > 0.0 and sd > 0.0):
+    n, m = X.shape[1], X.shape[2]
+    own = variance_of(of, row, U)
+    if not (own > 0.0 and sd > 0.0):
         return
-    stretch = sd / math.sqrt(variance) - 1.0
+    stretch = sd / math.sqrt(own) - 1.0
     shift = mean - x[row, U]
     for i in range(n - 1, -1, -1):
-        slope = 0.0
-        for j in range(n):
+        last = n if i < CROSSTALK1 else m
+        slope, variance = 0.0, 0.0
+        for j in range(last):
             slope += X[row, i, j] * X[row, U, j]
+            variance += X[row, U, j] * X[row, U, j]
         slope /= variance
         x[row, i] += slope * shift
         for j in range(n):

@@ -18,9 +18,11 @@ from inference.tracking.frame_density import (
     taken_at,
     told_at,
 )
+from inference.tracking.hypotheses import WITHOUT_CROSSTALK
 from inference.tracking.light import noise_at_light
 from inference.tracking.readings_table import ReadingsTable, mean_at, nuisance_count, object_at
 from inference.tracking.roots import UNIT, add_root, solve
+from inference.tracking.second_order import add_products
 from simulator.compiled import compiled
 
 __all__ = ["PeakedMode", "bends", "refined"]
@@ -74,8 +76,14 @@ def _density(u: float, frame: TrackedFrame, prior: Prior, table: ReadingsTable) 
     if not table.noise.plain:
         o1, o2 = object_at(u, table)
         root = noise_at_light((m1, m2), (gain * o1, gain * o2), (e1, e2), added.own, table.noise)
+    slopes, noise = (slope1, slope2), root
     root = add_root(root, added.own)
-    slopes = slope1, slope2
+    if added.spread.shape[0] > WITHOUT_CROSSTALK:
+        # at the mode, as in what is learnt there: where the prediction is vague, what it says of
+        # their size holds nowhere else
+        root = add_products(
+            root, noise, u, gain, 1.0 / position.precision, prior.told, slopes, added.spread, table
+        )
     root = spread_at(root, at, gain, slopes, added.spread, table)
     pulls = solve(root, e1, e2)
     bend1, bend2 = bend_at(pulls, at, gain, slopes, added.spread, table)

@@ -28,6 +28,7 @@ from inference.tracking.second_order import add_products
 from inference.tracking.shared_error import certainty, known_part, shared_part
 from inference.tracking.square_root import move
 from inference.tracking.turning import widening
+from inference.tracking.without_object import take_drift
 from simulator.compiled import compiled
 
 __all__ = ["born_prior", "own_prior", "predict", "prior_of"]
@@ -102,6 +103,7 @@ def predict(
     if learns:
         still = Motion(0.0, 0.0, Root(0.0, 0.0, 0.0), motion.drift1, motion.drift2)
         move(of, 0, still, work)
+        take_drift(of, motion.drift1, motion.drift2)
 
 
 @compiled
@@ -147,10 +149,11 @@ def own_prior(
     precision = 1.0 / max(variance_of(of, row, U), 1e-300)
     log_scale = log_weight + 0.5 * (math.log(precision) - _LOG_2PI)
     offset1, offset2 = table.crosstalk1, table.crosstalk2
-    slope1, slope2, share, told, root = 0.0, 0.0, 0.0, 1.0, Root(0.0, 0.0, 0.0)
+    slope1, slope2, share, told, own = 0.0, 0.0, 0.0, 1.0, Root(0.0, 0.0, 0.0)
+    root = own
     if learns_crosstalk(of):
         offset1, offset2 = offset1 + x[row, CROSSTALK1], offset2 + x[row, CROSSTALK2]
-        slope1, slope2, root = _crosstalk_given_u(of, row, precision)
+        slope1, slope2, own = _crosstalk_given_u(of, row, precision)
         _, _, share = shared_part(of, row)
         _, _, d1, d2 = mean_at(x[row, ANCHOR], table)
         slope1, slope2 = slope1 + gain * share * d1, slope2 + gain * share * d2
@@ -161,13 +164,13 @@ def own_prior(
             m1, m2 = gain * value1 + offset1, gain * value2 + offset2
             noise = noise_root(m1, m2, gain * o1, gain * o2, table.noise)
         slopes, told = (d1, d2), (1.0 - share) * known_part(of, row)
-        root = add_products(root, noise, u, gain, 1.0 / precision, told, slopes, of.X[row], table)
+        root = add_products(own, noise, u, gain, 1.0 / precision, told, slopes, of.X[row], table)
     rate = Rate(x[row, V], 0.0, 0.0)
     if table.by_rate:
         rate = _rate_given_u(of, row, precision)
     return Prior(
         Position(False, False, x[row, U], precision, log_scale),
-        Added(offset1, offset2, slope1, slope2, root, root, of.X[row]),
+        Added(offset1, offset2, slope1, slope2, own, root, of.X[row]),
         rate,
         share,
         told,
@@ -197,7 +200,7 @@ def prior_of(
         return prior
     u, added = prior.position.centre, prior.added
     _, _, d1, d2 = mean_at(u, table)
-    root = spread_at(added.own, u, gain, (d1, d2), of.X[row], table)
+    root = spread_at(added.root, u, gain, (d1, d2), of.X[row], table)
     return Prior(
         prior.position,
         Added(

@@ -17,7 +17,8 @@ Errors of readings are kept as far as frames tell them. What nuisance parameters
 what noise and crosstalk could be, no frame has told, and crosstalk that took it up would leave what
 is known of it. For the same reason crosstalk that is known to a frame's noise takes up no turn
 of a tangent where the light is open by more: it gains next to nothing from turns between tangents,
-and 15 frames stated empty were unlearnt, by up to hundreds of noises.
+and 15 frames stated empty were unlearnt, by up to hundreds of noises. What is known of it without
+any object takes up none, whatever the light (`inference.tracking.without_object`).
 """
 
 from typing import NamedTuple
@@ -27,6 +28,7 @@ from inference.tracking.hypotheses import (
     ANCHOR,
     CROSSTALK1,
     CROSSTALK2,
+    TOLD,
     Hypotheses,
     U,
     V,
@@ -40,6 +42,7 @@ from inference.tracking.readings_table import (
     nuisance_root,
 )
 from inference.tracking.roots import Root, add_factor, add_root, solve
+from inference.tracking.without_object import open_part
 from simulator.compiled import compiled
 
 __all__ = [
@@ -97,12 +100,9 @@ NOT_SHARED = Shared(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _ALL, 1.0)
 def known_part(of: Hypotheses, row: int) -> float:
     """Return how little crosstalk can take up of what a frame's readings err, from 0 to 1.
 
-    Crosstalk that adds q variances of the noise to a reading takes up q / (q + 1) of an error: of
-    its variance the square.
+    `inference.tracking.without_object` has the rule.
     """
-    unknown = unknown_crosstalk(of, row)
-    taken = unknown / (unknown + 1.0)
-    return 1.0 - taken * taken
+    return 1.0 - open_part(unknown_crosstalk(of, row))
 
 
 @compiled
@@ -171,7 +171,8 @@ def shared_part(of: Hypotheses, row: int) -> tuple[float, float, float]:
 def shared_of(of: Hypotheses, row: int) -> Shared:
     """Return what a hypothesis errs in common before an update along the tangent at its anchor."""
     back1, back2, _ = shared_part(of, row)
-    return Shared(back1, back2, 0.0, 0.0, of.x[row, CROSSTALK1], of.x[row, CROSSTALK2], _ALL, 1.0)
+    x, turns = of.x, open_part(of.numbers[TOLD])
+    return Shared(back1, back2, 0.0, 0.0, x[row, CROSSTALK1], x[row, CROSSTALK2], _ALL, turns)
 
 
 @compiled
@@ -244,6 +245,8 @@ def straighten(
     hidden = nuisance_root(at, gain, table)
     square = hidden.r11 * hidden.r11 + hidden.r21 * hidden.r21 + hidden.r22 * hidden.r22
     turns = 1.0 - known_part(of, row) * (1.0 - 1.0 / (1.0 + square))
+    # nor does what is known of it without any object turn with what that object does
+    turns *= open_part(of.numbers[TOLD])
     turn1, turn2 = _kept(told, turns * (gain * s1 - slope1), turns * (gain * s2 - slope2))
     # held to what can be undone
     along = back1 * turn1 + back2 * turn2
@@ -280,13 +283,13 @@ def follow(of: Hypotheses, row: int, shared: Shared, gain: float, table: Reading
     here1, here2, _, _ = mean_at(x[row, U] - common, table)
     there1, there2, _, _ = mean_at(x[row, U], table)
     _, _, s1, s2 = mean_at(x[row, ANCHOR], table)
-    away1, away2 = gain * (here1 + s1 * common - there1), gain * (here2 + s2 * common - there2)
+    size = gain * shared.turns
+    away1, away2 = size * (here1 + s1 * common - there1), size * (here2 + s2 * common - there2)
     away1, away2 = _kept(shared.told, away1, away2)
     x[row, CROSSTALK1] += away1 - turn1 * common
     x[row, CROSSTALK2] += away2 - turn2 * common
     # what an update corrects is no motion: the readings' errors stay what they are
     _, _, e1, e2 = mean_at(x[row, U], table)
-    size = gain * shared.turns
     bend1, bend2 = _kept(shared.told, size * (s1 - e1), size * (s2 - e2))
     bend1, bend2 = bend1 - turn1, bend2 - turn2
     x[row, ANCHOR] = x[row, U]

@@ -36,6 +36,7 @@ from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import (
     COUNT,
     PENDING,
+    TOLD,
     Hypotheses,
     Scratch,
     copy,
@@ -192,6 +193,7 @@ def _keep(
 ) -> Kept:
     """Take over the heaviest candidates, taught by the frame, until the rest is negligible."""
     rules, after, candidates = model.rules, room.after, room.candidates
+    after.numbers[TOLD] = of.numbers[TOLD]  # whoever learns asks for it
     usual, odd = math.exp(empty.usual - best), math.exp(empty.odd - best)
     outlying = odd + math.exp(empty.odd_born - best)
     heaviest, surprise = usual, empty.surprise
