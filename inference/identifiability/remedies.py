@@ -72,7 +72,8 @@ class Remedy:
     @functools.cached_property
     def information(self) -> Information:
         """What its readings would tell."""
-        of = information(self.experiment)
+        # of a copy: what it derives is large, and goes with it
+        of = information(dataclasses.replace(self.experiment))
         if self.asked is None:
             return of
         own = of.own_variance.copy()
@@ -82,7 +83,7 @@ class Remedy:
     @functools.cached_property
     def expected(self) -> ExpectedPosterior:
         """The spread that a posterior of its readings should have."""
-        return expected_posterior(self.experiment, self.asked)
+        return expected_posterior(dataclasses.replace(self.experiment), self.asked)
 
     @property
     def cost(self) -> tuple[int, int]:
@@ -110,7 +111,7 @@ class Remedy:
         spread = self.spread(parameter)
         status = status_of(parameter, spread)
         if parameter == "range_m" and status == "weak":
-            alike = left_open(self.experiment, spread, self.expected)
+            alike = left_open(dataclasses.replace(self.experiment), spread, self.expected)
             status = status if alike is None else "not_identified"
         return status
 
