@@ -80,8 +80,11 @@ def fitted_object(light: Array, range_m: Array) -> dict[str, float]:
 
 
 def _foresight(truth: Truth, times: float, known: Any, displacement: Any) -> Foresight:
-    """Return what is foreseen at the truth, errors of the model being ``times`` the default's."""
-    sizes = {"flux": times * DISCREPANCY_SD, "range_m": times * RANGE_ERROR_SD}
+    """Return what is foreseen at the truth, the flux's error being ``times`` the default's.
+
+    That of the effective distance is added by who asks, known ranges being exactly as told.
+    """
+    sizes = {"flux": times * DISCREPANCY_SD}
     scene = parse_scene(truth.scene | {"discrepancy": sizes})
     there = np.isfinite(truth.range_m)
     at = {name: value or _NEAR_ZERO for name, value in truth.at.items()}

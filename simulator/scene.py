@@ -225,11 +225,6 @@ class Scene(Validated):
         return self.model_error.beside_numbers() if known else self.model_error
 
     @property
-    def stated_flux_error(self) -> float | None:
-        """The flux's error where the scene states one: only until all floors use `model_error`."""
-        return (self.model_error.flux or None) if self.discrepancy is not None else None
-
-    @property
     def crosstalk_values(self) -> tuple[Quantity, Quantity] | None:
         """The two crosstalk quantities, however they were written."""
         return self.crosstalk.values if isinstance(self.crosstalk, Crosstalk) else self.crosstalk

@@ -3,10 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.identifiability.erring import erring
 from inference.identifiability.expected_posterior import expected_posterior
 from inference.identifiability.experiment import Experiment
+from inference.identifiability.reasons import Diagnosis
 from inference.identifiability.status import Identifiability
 from inference.identifiability.statuses import Spread, statuses_of
+from simulator.model_error import ModelError
 from simulator.parameters import Parameters
 from simulator.sensor import Sensor
 
@@ -14,6 +17,7 @@ __all__ = ["statuses_of_draws"]
 
 Array = NDArray[np.float64]
 
+_EXACT = ModelError(0.0, 0.0, integrated=False)
 # variance between the frames' mean ranges, in units of that within them; equal ranges read with
 # noise give one, and four hundred frames of them never four
 _STILL = 4.0
@@ -27,7 +31,7 @@ def statuses_of_draws(
     log_r: Array,
     gain: Array | None = None,
     *,
-    discrepancy: float | None = None,
+    error: ModelError = _EXACT,
     common_range: bool = False,
     rates: Array | None = None,
 ) -> tuple[Identifiability, ...]:
@@ -43,8 +47,8 @@ def statuses_of_draws(
         Draws of log r [log m]; nan for a frame without object.
     gain : ndarray, shape (frames,), optional
         Factor of each frame on the sensor's gain.
-    discrepancy : float, optional
-        Standard deviation of a smooth error of the object's log flux.
+    error : ModelError, optional
+        Sizes of the errors of the model; left out: none.
     common_range : bool
         Whether the object is known not to move.
     rates : ndarray, shape (frames, 2), optional
@@ -76,12 +80,12 @@ def statuses_of_draws(
         chosen[centre],
         here,
         gain,
-        discrepancy=discrepancy,
         common_range=common_range,
         rates=rates,
     )
+    experiment = erring(experiment, error)
     expected = expected_posterior(experiment) if experiment.finite else None
-    return statuses_of(experiment, spread, expected, still)
+    return statuses_of(Diagnosis(experiment, still), spread, expected)
 
 
 def _is_still(drawn: Array) -> bool:

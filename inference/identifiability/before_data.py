@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.identifiability.clock import with_clock
+from inference.identifiability.erring import erring
 from inference.identifiability.expected_posterior import (
     STEP,
     ExpectedPosterior,
@@ -15,8 +17,8 @@ from inference.identifiability.expected_posterior import (
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.information import Information
 from inference.identifiability.known_beside import planned_circuit, planned_rates, with_rates
+from inference.identifiability.offers import NOTHING_HELPS, NOTHING_IDENTIFIES, Offer, offers
 from inference.identifiability.reasons import Diagnosis
-from inference.identifiability.remedies import Offer
 from inference.identifiability.status import Identifiability
 from inference.identifiability.statuses import Spread, statuses_of
 from simulator.errors import InvalidInputError, Problem, RefusedError, escape
@@ -43,7 +45,8 @@ class Foresight:
     experiment : Experiment
         Sensor, unknowns, their reference values and the ranges.
     information : Information
-        Of the readings alone: rank, singular values, Cramer-Rao bounds.
+        Of the readings alone, errors of the model among what is unknown: rank, singular values,
+        Cramer-Rao bounds.
     posterior : ExpectedPosterior
         Spread to be expected, priors included.
     needed : int
@@ -53,7 +56,8 @@ class Foresight:
     identifiability : tuple of Identifiability
         A row for every unknown and one for "range_m".
     remedies : dict of str to tuple of Offer
-        Of every parameter that is not identified what would lower its bound, the cheapest first.
+        Of every parameter that is not identified what would help: what has it identified first,
+        and of what achieves as much the cheapest.
     """
 
     experiment: Experiment
@@ -145,9 +149,10 @@ def check_discrepancy(scene: Scene) -> None:
     Raises
     ------
     RefusedError
-        Where the object is stated not to move.
+        Where the object is stated not to move, and the size of the flux's error is.
     """
-    if scene.motion == "static" and scene.stated_flux_error is not None:
+    error = scene.model_error
+    if scene.motion == "static" and error.integrated and error.flux > 0:
         raise RefusedError(
             "an object at rest has one range, at which a discrepancy of its flux is no different "
             "from another c2; leave `discrepancy` out, and give `object.c2` a wider prior"
@@ -203,7 +208,8 @@ def identifiability(
     sensor : Sensor
         The sensor, with its noise.
     scene : Scene
-        What is known and what is not; optional terms are taken to stay.
+        What is known and what is not; optional terms are taken to stay. What its ``discrepancy``
+        allows the model to err by, left out the default, is in all that is foreseen.
     ranges_m : sequence of float
         Range of the object in every frame [m].
     object_present : sequence of bool, optional
@@ -244,19 +250,22 @@ def identifiability(
             "computed for one amplitude and a range that changes; state radial motion"
         )
     log_r = _log_ranges(ranges_m, object_present)
+    allowed = scene.allowed_error
     rates = planned_rates(known_range_sd_m, displacement_sd_m, log_r)
+    if rates is not None:
+        rates = with_clock(rates, allowed.range_m)
     experiment = Experiment(
         sensor,
         parameters,
         _reference(parameters, at),
         log_r,
         planned_circuit(sensor, log_r.size, gain, temperature_k),
-        discrepancy=scene.stated_flux_error,
         common_range=scene.motion == "static",
     )
     _check_ranges(experiment, scene)
     if rates is not None:
         experiment = _with_rates(experiment, rates)
+    experiment = erring(experiment, allowed)
     if not experiment.finite:
         raise RefusedError(
             "a reading, its noise or one of their derivatives is beyond what a number can hold; "
@@ -267,9 +276,12 @@ def identifiability(
     still = bool(present.any()) and float(np.ptp(log_r[present])) < 1e-9
     spread = Spread(posterior.sd, posterior.scale_sd)
     diagnosis = Diagnosis(experiment, still)
-    rows = statuses_of(experiment, spread, posterior, still)
+    rows = statuses_of(diagnosis, spread, posterior)
     if 0 < diagnosis.distinct == diagnosis.needed and rates is None:
         rows = tuple(dataclasses.replace(row, reason=row.reason + _JUST_ENOUGH) for row in rows)
+    found: dict[str, tuple[Offer, ...]] = {}
+    if not all(row.status == "identified" for row in rows):
+        rows, found = _with_offers(diagnosis, rows, spread)
     return Foresight(
         experiment,
         diagnosis.information,
@@ -277,9 +289,25 @@ def identifiability(
         diagnosis.needed,
         diagnosis.distinct,
         rows,
-        {
-            row.parameter: diagnosis.offers(row.parameter)
-            for row in rows
-            if row.status != "identified" and not row.parameter.startswith("range_m.")
-        },
+        found,
     )
+
+
+def _with_offers(
+    diagnosis: Diagnosis, rows: tuple[Identifiability, ...], spread: Spread
+) -> tuple[tuple[Identifiability, ...], dict[str, tuple[Offer, ...]]]:
+    """Return the rows, that nothing helps said in their reasons, and what would help."""
+    said, found = [], {}
+    for row, size in zip(rows, [*spread.parameters.tolist(), spread.scale], strict=True):
+        name = row.parameter
+        if row.status == "identified" or name.startswith("range_m."):
+            said.append(row)
+            continue
+        blind = diagnosis.distinct == 0 and name == "range_m"
+        of = () if blind else offers(diagnosis.actions, row, diagnosis.bound(name), size)
+        found[name] = of
+        more = ""
+        if diagnosis.distinct > 0 and not any(each.status == "identified" for each in of):
+            more = NOTHING_IDENTIFIES if of else NOTHING_HELPS
+        said.append(dataclasses.replace(row, reason=row.reason + more))
+    return tuple(said), found

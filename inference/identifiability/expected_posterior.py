@@ -8,7 +8,9 @@ import scipy
 from numpy.typing import NDArray
 
 from inference.frame.known_range import offset_slopes
+from inference.identifiability.clock import as_ruled
 from inference.identifiability.experiment import Experiment
+from inference.identifiability.shared_errors import fewer
 from simulator.parameters import Parameters
 from simulator.scene import Reference, Stroke
 
@@ -71,7 +73,7 @@ def _limited(sd: Array, limit: float, curved: bool) -> Array:
         return np.asarray(1 / np.sqrt(1 / sd**2 + 1 / limit**2))
 
 
-def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
+def expected_posterior(experiment: Experiment, frames: int | None = None) -> ExpectedPosterior:
     """Return the spread that the posterior is expected to have.
 
     Parameters
@@ -79,6 +81,8 @@ def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
     experiment : Experiment
         Sensor, unknowns, their values, ranges. What is ``known`` after all keeps its place: the
         readings are taken not to depend on it.
+    frames : int, optional
+        Of how many frames, the first, the scale is asked; left out: of all.
 
     Returns
     -------
@@ -90,7 +94,12 @@ def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
     law = experiment.range_prior
     curved = law.inverse_sd > 0 or law.log_inverse_sd > 0
     curved = curved and not isinstance(p.range_prior, Stroke)  # whose support is no row
-    jacobian, along, extra = told_rows(experiment)
+    d, (jacobian, along, extra) = len(p), told_rows(experiment)
+    errors = fewer(jacobian[:, :, d:])
+    k = errors.shape[2]
+    jacobian = np.concatenate([jacobian[:, :, :d], errors], axis=2)
+    # rows of z alone know of no errors
+    extra = [np.eye(d + k), *(np.pad(rows[:, :d], ((0, 0), (0, k))) for rows in extra[1:])]
     across, response, variance = eliminated(experiment, jacobian, along)
     independent = 1 if experiment.common_range else int(present.sum())
     room = _room(experiment)
@@ -98,22 +107,40 @@ def expected_posterior(experiment: Experiment) -> ExpectedPosterior:
         # a scale that is known to the room which the support leaves tells of what moves with it
         own = math.sqrt(variance[present].mean() / independent)
         extra.append(response[present].mean(axis=0)[None] / math.hypot(room, own))
-    d, unknowns = len(p), jacobian.shape[-1]
+    unknowns = d + k
     factor = np.empty((0, 0))
     if unknowns > 0:
         rows = np.concatenate([across.reshape(-1, unknowns), *extra])
         triangle = scipy.linalg.qr(rows, mode="r")[0][:unknowns]
         factor = np.asarray(scipy.linalg.solve_triangular(triangle, np.eye(unknowns)))
     sd = np.linalg.norm(p.marginal(factor[:d].T), axis=0)
-    range_sd = np.sqrt(variance + np.linalg.norm(response @ factor, axis=1) ** 2)
+    share, ruled = as_ruled(experiment.rates, experiment.log_r, experiment.range_error)
+    variance = variance * share**2 + ruled
+    moved = (response * share[:, None]) @ factor
+    drifts = experiment.drifts(_share_of_readings(along))
+    if drifts is not None:
+        moved = np.concatenate([moved, drifts], axis=1)
+    range_sd = np.sqrt(variance + np.linalg.norm(moved, axis=1) ** 2)
     range_sd = np.where(present, _limited(range_sd, log_range_spread(p), curved), np.nan)
-    if not present.any():
+    asked = present & (np.arange(present.size) < (present.size if frames is None else frames))
+    if not asked.any():
         return ExpectedPosterior(factor[:d], sd, range_sd, math.nan)
-    own = float(variance[present].mean()) / independent
-    shared = np.linalg.norm(response[present].mean(axis=0) @ factor)
-    scale = np.array([math.sqrt(own + shared**2)])
+    independent = 1 if experiment.common_range else int(asked.sum())
+    scale = math.hypot(
+        math.sqrt(float(variance[asked].mean()) / independent),
+        float(np.linalg.norm(moved[asked].mean(axis=0))),
+    )
     limit = min(room, log_range_spread(p))
-    return ExpectedPosterior(factor[:d], sd, range_sd, float(_limited(scale, limit, curved)[0]))
+    scale_sd = float(_limited(np.array([scale]), limit, curved)[0])
+    return ExpectedPosterior(factor[:d], sd, range_sd, scale_sd)
+
+
+def _share_of_readings(along: Array) -> Array:
+    """Return the share of the information on log r that is the readings', not its prior's."""
+    told = np.square(along)
+    whole = told.sum(axis=1)
+    of_readings = told[:, :2].sum(axis=1)
+    return np.asarray(np.divide(of_readings, whole, out=np.zeros_like(whole), where=whole > 0))
 
 
 def told_rows(experiment: Experiment) -> tuple[Array, Array, list[Array]]:

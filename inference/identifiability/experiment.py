@@ -10,9 +10,11 @@ from inference.frame.arguments import Background, RangePrior, prior_of
 from inference.frame.coordinates import coordinate_slopes
 from inference.frame.sensitivity import Sensitivity, sensitivity, whiteners
 from inference.frame.shadow_error import ShadowError, shadow_at, with_shadow_error
+from inference.identifiability.clock import as_ruled, by_clock, drifts
 from inference.identifiability.elimination import eliminate
 from inference.identifiability.information import Information
 from inference.identifiability.scaled_unknowns import ScaledUnknowns
+from inference.identifiability.shared_errors import fewer
 from simulator.discrepancy import discrepancy_basis
 from simulator.parameters import OFFSET, Parameters, Terms
 from simulator.sensor import Sensor
@@ -50,7 +52,10 @@ class Experiment:
         out: none.
     rates : ndarray, shape (n, 2), optional
         One over the standard deviations of what is known of range and displacement of each frame
-        beside its readings [1/m], 0 where nothing is; left out: of no frame.
+        beside its readings [1/m], 0 where nothing is; left out: of no frame. Ranges are those of
+        the effective distance (`inference.identifiability.clock.with_clock`).
+    range_error : float
+        Standard deviation of a smooth error of the effective distance along log r [m]; 0: none.
     """
 
     sensor: Sensor
@@ -64,6 +69,7 @@ class Experiment:
     shadow: float = 0.0
     error: Array | None = None
     rates: Array | None = None
+    range_error: float = 0.0
 
     @functools.cached_property
     def terms(self) -> Terms:
@@ -154,13 +160,36 @@ class Experiment:
 
     @functools.cached_property
     def by_error(self) -> Array:
-        """Derivatives of the readings along the coefficients of flux's and shadow's error.
+        """Derivatives of the readings along the coefficients of the errors.
 
-        Shape (n, 2, k). The coefficients are independent and standard normal.
+        Of flux and shadow, and where anything is known of ranges beside the readings of the
+        effective distance, shape (n, 2, k). The coefficients are independent and standard normal.
         """
-        if self._wall is None:
-            return self._by_flux_error
-        return np.concatenate([self._by_flux_error, self._wall.columns], axis=2)
+        parts = [self._by_flux_error]
+        if self._wall is not None:
+            parts.append(self._wall.columns)
+        if self.range_error > 0 and self.rates is not None:
+            of = self.sensor, self.readings.signal, self.log_r, self.parameters.reach_m
+            parts.append(by_clock(*of, self.range_error))
+        return np.concatenate(parts, axis=2)
+
+    def drifts(self, share: Array | None = None) -> Array | None:
+        """Return how ranges follow an error of the effective distance that nothing tells of.
+
+        Parameters
+        ----------
+        share : ndarray, shape (n,), optional
+            Of the information on log r what is the readings'; left out: all.
+
+        Returns
+        -------
+        ndarray, shape (n, k), or None
+            Of log r; None without an error, and where ``by_error`` has it.
+        """
+        if not self.range_error > 0 or self.rates is not None:
+            return None
+        share = np.ones(self.log_r.size) if share is None else share
+        return drifts(self.log_r, self.parameters.reach_m, self.range_error, share)
 
     @property
     def _by_flux_error(self) -> Array:
@@ -189,7 +218,7 @@ class Experiment:
         ndarray, shape (n, 2)
             Along log r; nan for a frame without object.
         ndarray, shape (n, 2, k)
-            Along the coefficients of the errors of flux and shadow.
+            Along the coefficients of the errors, as ``by_error``.
         """
         return self._whitened_by_noise if whitener is None else self._whitened_terms(whitener)
 
@@ -244,22 +273,35 @@ class Experiment:
             return by_term @ self.unknowns.directions, along, by_error
 
 
-def information(experiment: Experiment) -> Information:
+def information(experiment: Experiment, quieter: float = 1.0) -> Information:
     """Return what the readings alone tell of the unknowns, without any prior.
 
     Parameters
     ----------
     experiment : Experiment
         Sensor, unknowns, their values, ranges.
+    quieter : float
+        By how many times the noise of the readings would be lower.
 
     Returns
     -------
     Information
         In the dimensionless coordinates of `ScaledUnknowns.directions`.
     """
-    return eliminate(
+    by_name, along, by_error = (quieter * part for part in experiment.whitened())
+    of = eliminate(
         experiment.names,
-        *experiment.whitened(),
+        by_name,
+        along,
+        fewer(by_error),
         common_range=experiment.common_range,
         beside=experiment.beside,
+    )
+    share, own = as_ruled(experiment.rates, experiment.log_r, experiment.range_error)
+    return dataclasses.replace(
+        of,
+        response=of.response * share[:, None],
+        own_variance=of.own_variance * share**2 + own,
+        error_response=of.error_response * share[:, None],
+        drifts=experiment.drifts(),
     )

@@ -46,6 +46,8 @@ class Information:
         d log r_i along them, as ``response``.
     common_range : bool
         Whether all frames have one range, which is eliminated once.
+    drifts : ndarray, shape (n, j), optional
+        d log r_i along j more such errors, of which no reading tells anything; left out: none.
     """
 
     names: tuple[str, ...]
@@ -56,6 +58,7 @@ class Information:
     errors: Array
     error_response: Array
     common_range: bool = False
+    drifts: Array | None = None
 
     @functools.cached_property
     def _equilibrated(self) -> tuple[Array, Array, Array]:
@@ -230,7 +233,7 @@ class Information:
         sd = np.full(self.own_variance.size, np.nan)
         shared = self.sd_of(self.response[present], self.error_response[present])
         sd[present] = np.sqrt(self.own_variance[present] + shared**2)
-        return sd
+        return sd if self.drifts is None else np.hypot(sd, np.linalg.norm(self.drifts, axis=1))
 
     @functools.cached_property
     def scale_sd(self) -> float:
@@ -245,6 +248,8 @@ class Information:
             part[present].mean(axis=0)[None] for part in (self.response, self.error_response)
         )
         shared = self.sd_of(mean, of_errors)[0]
+        if self.drifts is not None:
+            own += float(np.square(self.drifts[present].mean(axis=0)).sum())
         return float(np.sqrt(own + shared**2))
 
 

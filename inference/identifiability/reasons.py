@@ -8,7 +8,7 @@ import numpy as np
 
 from inference.identifiability.experiment import Experiment, information
 from inference.identifiability.information import Information
-from inference.identifiability.remedies import Offer, Remedy, cheap_remedies, remedies, span
+from inference.identifiability.remedies import Remedy, cheap_remedies, remedies, span
 from simulator.errors import listed
 from simulator.object_model import log_slope
 from simulator.parameters import OFFSET
@@ -19,9 +19,11 @@ __all__ = ["Diagnosis"]
 
 _ALIKE = 0.98  # correlation of two bounds above which one parameter hides behind the other
 _HELP = 2.0  # a change that lowers a bound by less is not worth its words
-_BETTER = 1.2  # by which what costs more has to be better
 _POWER_LAW = 0.15  # distance of the exponent from a whole number
 _WANTED = 0.1  # relative error that a bound is held against
+_NEARLY = 1.5  # times the wanted bound that noise still counts as what limits it at
+_MOST = 1e6  # times lower noise that is looked at
+_NOISELESS = 100.0  # times lower noise, at which errors of the model are all that is left
 _BACKGROUND = ("background.strength", "background.distance_m")
 _PRODUCT = ("object.c0", "object.c2")  # all that a flux that falls as r^-4 tells of an object
 
@@ -72,26 +74,10 @@ class Diagnosis:
     def _cheap(self) -> list[Remedy]:
         return cheap_remedies(self.experiment)
 
-    def offers(self, parameter: str) -> tuple[Offer, ...]:
-        """Return what would lower the bound of a parameter to a half or less, the cheapest first.
-
-        Of remedies that cost the same the best, and none that is worse than a cheaper one.
-
-        Parameters
-        ----------
-        parameter : str
-            An unknown on which the readings depend, or "range_m".
-        """
-        if self.distinct == 0 and parameter == "range_m":
-            return ()
-        changes = [r for r in self._remedies if r.kind in ("empty", "motion")]
-        least, found = self.bound(parameter) / _HELP, []
-        ordered = [(r.cost, r.bound(parameter), r) for r in (*changes, *self._cheap)]
-        for _, bound, remedy in sorted(ordered, key=lambda item: item[:2]):
-            if bound < least and math.isfinite(bound):
-                found.append(Offer(remedy.kind, remedy.words.rstrip(","), bound))
-                least = bound / _BETTER
-        return tuple(found)
+    @property
+    def actions(self) -> list[Remedy]:
+        """What can be done, in place of what could be known: candidates of `offers`."""
+        return [r for r in self._remedies if r.kind in ("empty", "motion")] + self._cheap
 
     @functools.cached_property
     def distinct(self) -> int:
@@ -185,14 +171,9 @@ class Diagnosis:
                 return f"{text}: at these ranges the flux falls as r^-4, whatever c1"
         if law == 2 and parameter in ("object.c0", "object.c1"):
             return f"{text}: at these ranges the flux falls as r^-2, whatever c0 and c1"
-        if self.experiment.discrepancy is not None:
-            exact = dataclasses.replace(self.experiment, discrepancy=None)
-            without = Diagnosis(exact, self.still).bound(parameter)
-            if _HELP * without < sd:
-                return (
-                    f"{text}: the error of the object's flux hides it, without which they would "
-                    f"tell it to {_relative(parameter, without)}"
-                )
+        hidden = self._hidden(parameter, sd)
+        if hidden is not None:
+            return text + hidden
         name, value = self._look_alike(parameter)
         if self._is_background(parameter, name if abs(value) > _ALIKE else ""):
             assert self.experiment.background is not None  # noqa: S101  # it is unknown
@@ -202,6 +183,32 @@ class Diagnosis:
             size = f"is {value:.4f}" if abs(value) < 0.9999 else "exceeds 0.9999 in size"
             return f"{text}: it hides behind {name} (their correlation {size})"
         return text
+
+    def _hidden(self, parameter: str, sd: float) -> str | None:
+        """Say which error of the model hides a parameter, where one does."""
+        for error, without in self._exact.items():
+            bound = without.bound(parameter)
+            if _HELP * bound < sd:
+                return (
+                    f": the error of the {error} hides it, without which they would tell it to "
+                    f"{_relative(parameter, bound)}"
+                )
+        return None
+
+    @functools.cached_property
+    def _exact(self) -> "dict[str, Diagnosis]":
+        """The same without one error of the model each, of those that there are."""
+        e = self.experiment
+        changes: dict[str, dict[str, float | None]] = {
+            "object's flux": {"discrepancy": None} if e.discrepancy else {},
+            "shadow": {"shadow": 0.0} if e.shadow else {},
+            "effective distance": {"range_error": 0.0} if e.range_error else {},
+        }
+        return {
+            error: Diagnosis(dataclasses.replace(e, **change), self.still)  # type: ignore[arg-type]
+            for error, change in changes.items()
+            if change
+        }
 
     def _is_background(self, parameter: str, like: str) -> bool:
         """Return whether it is crosstalk and background that are taken for one another."""
@@ -258,7 +265,11 @@ class Diagnosis:
         useful.sort(key=lambda item: item[0])
         chosen = [item for item in useful if item[0] < 1][:2]
         # frames without the object cost nothing: they are named whenever they help
-        chosen += [item for item in useful if item[1].kind == "empty" and item not in chosen]
+        chosen += [
+            item
+            for item in useful
+            if item[1].kind == "empty" and item[0] < 1 and item not in chosen
+        ]
         told = self._cheapest(parameter, sd)
         if told is not None and not any(
             remedy.cost <= told[1].cost and after < _WANTED for after, remedy in chosen
@@ -270,8 +281,25 @@ class Diagnosis:
             verb = "lower the bound" if math.isfinite(sd) else "bring the bound down"
             words.append(f"{remedy.words} would {verb}{fold} to {_relative(parameter, after)}")
         if not words and math.isfinite(sd) and sd > _WANTED:
-            words.append(f"noise {_count(sd / _WANTED)} times lower would tell it to 10 %")
+            words.append(self._quieter(parameter, sd))
         return words
+
+    def _quieter(self, parameter: str, sd: float) -> str:
+        """Say by how much lower noise would tell a parameter, or that none would."""
+        times, e = sd / _WANTED, self.experiment
+        exact = not (e.discrepancy or e.shadow or e.range_error)
+        if exact or self._at_noise(parameter, min(times, _MOST)) < _NEARLY * _WANTED:
+            return f"noise {_count(times)} times lower would tell it to 10 %"
+        least = self._at_noise(parameter, min(_NOISELESS * times, _MOST))
+        return (
+            "less noise would not help: with hardly any, the errors that `discrepancy` allows the "
+            f"model would leave it open by {_relative(parameter, least)}"
+        )
+
+    def _at_noise(self, parameter: str, quieter: float) -> float:
+        """Return the bound with so many times less noise."""
+        of = information(self.experiment, quieter)
+        return of.scale_sd if parameter == "range_m" else float(of.sd[of.names.index(parameter)])
 
     def _cheapest(self, parameter: str, sd: float) -> tuple[float, Remedy] | None:
         """Return the cheapest knowledge of ranges, or of the empty scene, that is enough."""

@@ -2,18 +2,22 @@
 
 import contextlib
 import dataclasses
+import functools
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.identifiability.expected_posterior import ExpectedPosterior, expected_posterior
 from inference.identifiability.experiment import Experiment, information
 from inference.identifiability.information import Information
 from inference.identifiability.known_beside import with_rates
+from inference.identifiability.left_open import left_open
+from inference.identifiability.status import status_of
 from simulator.errors import InvalidInputError
 from simulator.parameters import OFFSET
 
-__all__ = ["Offer", "Remedy", "cheap_remedies", "remedies", "span"]
+__all__ = ["Remedy", "cheap_remedies", "remedies", "span"]
 
 Array = NDArray[np.float64]
 
@@ -49,17 +53,37 @@ class Remedy:
     words : str
         The change, as the subject of a sentence: "three frames without the object".
     kind : str
-        As of `Offer`, or the start of the paths of the unknowns that it makes known.
-    information : Information
-        What its readings would tell.
+        As of `inference.identifiability.offers.Offer`, or the start of the paths of the unknowns
+        that it makes known.
+    experiment : Experiment
+        With the change.
     frames : int
         Frames that it adds; 0 where it changes those that there are.
+    asked : int, optional
+        How many frames, the first, have ranges that are asked for; left out: all.
     """
 
     words: str
     kind: str
-    information: Information
+    experiment: Experiment
     frames: int = 0
+    asked: int | None = None
+
+    @functools.cached_property
+    def information(self) -> Information:
+        """What its readings would tell."""
+        # of a copy: what it derives is large, and goes with it
+        of = information(dataclasses.replace(self.experiment))
+        if self.asked is None:
+            return of
+        own = of.own_variance.copy()
+        own[self.asked :] = np.nan
+        return dataclasses.replace(of, own_variance=own)
+
+    @functools.cached_property
+    def expected(self) -> ExpectedPosterior:
+        """The spread that a posterior of its readings should have."""
+        return expected_posterior(dataclasses.replace(self.experiment), self.asked)
 
     @property
     def cost(self) -> tuple[int, int]:
@@ -76,25 +100,20 @@ class Remedy:
             float(self.information.sd[names.index(parameter)]) if parameter in names else math.inf
         )
 
+    def spread(self, parameter: str) -> float:
+        """Return the foreseen spread of an unknown or of "range_m", as `status_of` takes it."""
+        if parameter == "range_m":
+            return self.expected.scale_sd
+        return float(self.expected.sd[self.experiment.parameters.names.index(parameter)])
 
-@dataclasses.dataclass(frozen=True)
-class Offer:
-    """Something to be done about a parameter that is not identified.
-
-    Attributes
-    ----------
-    kind : "empty", "distance", "distances", "odometry" or "motion"
-        Frames without the object, the object at one or two known distances, odometry, a stroke.
-    words : str
-        It in full.
-    bound : float
-        Cramer-Rao bound that it would give: relative, of c1 over sqrt(c0), of crosstalk over the
-        scene's light, of "range_m" that of the mean of log r.
-    """
-
-    kind: str
-    words: str
-    bound: float
+    def status(self, parameter: str) -> str:
+        """Return what an unknown or "range_m" would be then."""
+        spread = self.spread(parameter)
+        status = status_of(parameter, spread)
+        if parameter == "range_m" and status == "weak":
+            alike = left_open(dataclasses.replace(self.experiment), spread, self.expected)
+            status = status if alike is None else "not_identified"
+        return status
 
 
 def span(log_r: Array) -> float:
@@ -194,13 +213,13 @@ def remedies(experiment: Experiment) -> list[Remedy]:
     found = _emptied(experiment, 3)
     names = experiment.names
     strokes = (_moved(experiment), _at_the_bend(experiment))
-    found += [Remedy(s[0], "motion", information(s[1])) for s in strokes if s is not None]
+    found += [Remedy(s[0], "motion", s[1]) for s in strokes if s is not None]
     for prefix, words in _GROUPS.items():
         group = tuple(name for name in names if name.startswith(prefix))
         if not group or len(group) == len(names) or (prefix == "object.c" and len(group) == 1):
             continue
         known = dataclasses.replace(experiment, known=(*experiment.known, *group))
-        found.append(Remedy(f"knowing {words}", prefix, information(known)))
+        found.append(Remedy(f"knowing {words}", prefix, known))
     return found
 
 
@@ -210,7 +229,7 @@ def _emptied(experiment: Experiment, *counts: int) -> list[Remedy]:
         return []
     tried = {count: _with_more(experiment, np.full(count, np.nan)) for count in counts}
     return [
-        Remedy(f"{_COUNTS[count]} frames without the object", "empty", information(of), count)
+        Remedy(f"{_COUNTS[count]} frames without the object", "empty", of, count)
         for count, of in tried.items()
     ]
 
@@ -244,17 +263,15 @@ def cheap_remedies(experiment: Experiment) -> list[Remedy]:
 def _told(experiment: Experiment, distances: tuple[float, ...]) -> Remedy:
     """Put the object at distances that are known, in frames of their own."""
     more = np.repeat(distances, _TARGETS)
-    of = information(_with_more(experiment, more, 1.0 / _TOLD_M))
-    # of these ranges nothing is asked
-    own = of.own_variance.copy()
-    own[experiment.log_r.size :] = np.nan
+    told_m = math.hypot(_TOLD_M, experiment.range_error)
+    changed = _with_more(experiment, more, 1.0 / told_m)
     where = " and ".join(f"{math.exp(place):.2g}" for place in distances)
     words = f"{_TARGETS} frames with the object at {where} m" + (
         " each" if len(distances) > 1 else ""
     )
     kind = "distance" if len(distances) == 1 else "distances"
     words += f", known to {1e3 * _TOLD_M:g} mm,"
-    return Remedy(words, kind, dataclasses.replace(of, own_variance=own), more.size)
+    return Remedy(words, kind, changed, more.size, experiment.log_r.size)  # of others nothing
 
 
 def _moving(experiment: Experiment) -> Remedy:
@@ -268,4 +285,4 @@ def _moving(experiment: Experiment) -> Remedy:
         f"odometry to {1e3 * _TOLD_M:g} mm over the stroke from {ranges.min():.2g} to "
         f"{ranges.max():.2g} m"
     )
-    return Remedy(words, "odometry", information(changed))
+    return Remedy(words, "odometry", changed)

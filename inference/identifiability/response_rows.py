@@ -9,12 +9,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inference.frame.delayed import delayed
 from inference.frame.sensitivity import whiteners
+from inference.identifiability.clock import by_clock
 from inference.identifiability.expected_posterior import eliminated, told_rows
 from inference.identifiability.experiment import Experiment
-from simulator.discrepancy import discrepancy_basis
-from simulator.sensor import instrument
 
 __all__ = ["FluxStep", "ResponseRows", "flux_step"]
 
@@ -74,12 +72,11 @@ class ResponseRows:
     def _by_range_error(self, m: int) -> Array:
         """Return whitened derivatives along errors of the distance that an object seems to have."""
         e = self.experiment
-        basis, present = discrepancy_basis(*e.parameters.reach_m), np.isfinite(e.log_r)
-        at = np.where(present, e.log_r, basis.first)
-        late = delayed(e.readings.signal, at, *instrument(e.sensor)) * present[:, None]
-        late = np.einsum("nij,nj->ni", whiteners(e.sensor, e.readings), late)
-        result = np.zeros((at.size, m, basis.size))
-        result[:, :2] = self.range_error * late[:, :, None] * basis.values(at)[:, None]
+        late = by_clock(
+            e.sensor, e.readings.signal, e.log_r, e.parameters.reach_m, self.range_error
+        )
+        result = np.zeros((e.log_r.size, m, late.shape[2]))
+        result[:, :2] = np.einsum("nij,njk->nik", whiteners(e.sensor, e.readings), late)
         return result
 
     @property

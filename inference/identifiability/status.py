@@ -27,6 +27,7 @@ from simulator.parameters import Parameters
 __all__ = [
     "NARROW_SCALE",
     "NARROW_SPREAD",
+    "STATUSES",
     "WIDE_SCALE",
     "WIDE_SPREAD",
     "Identifiability",
@@ -45,6 +46,9 @@ WIDE_SPREAD = 0.7  # its share is one half: the prior says as much as the data
 # Of the ranges' scale, what its user can do with it.
 NARROW_SCALE = 0.05  # all ranges are right within a tenth at 95 %
 WIDE_SCALE = 0.3  # at 95 % a range may be half or twice what is said: no scale is known
+
+STATUSES = ("identified", "weak", "not_identified")
+"""The best first."""
 
 # coordinates of the quadrature that `spread_of_fit` uses; what falls between two of them is
 # narrower than a hundredth of the prior and identified all the same

@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 
 from inference.identifiability.expected_posterior import (
     ExpectedPosterior,
-    expected_posterior,
     log_range_spread,
 )
-from inference.identifiability.experiment import Experiment
+from inference.identifiability.left_open import left_open
 from inference.identifiability.reasons import Diagnosis
 from inference.identifiability.status import Identifiability, contraction_of, status_of
 from simulator.scene import Reference
@@ -26,13 +25,6 @@ _LEANING = (
     'says that ranges are spread. Where that is not known, {{"prior": "reference"}} takes nothing '
     "from it"
 )
-_HELP = 2.0  # a term is to blame where the scale would be known so many times better with it known
-_ALIKE = (
-    ": {term} and an error of the object's flux of {error:.2g}, as `discrepancy` allows for, look "
-    "alike in these frames and leave it open by {spread:.2g} of itself, more than the error of the "
-    "flux; were {term} known{how}, it would be known to {known:.2g}"
-)
-_STATIC = {"crosstalk": ", as frames without the object tell it", "background": ""}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -67,28 +59,26 @@ def _headline(parameter: str, status: str, spread: float) -> str:
 
 
 def statuses_of(
-    experiment: Experiment, spread: Spread, expected: ExpectedPosterior | None, still: bool
+    diagnosis: Diagnosis, spread: Spread, expected: ExpectedPosterior | None
 ) -> tuple[Identifiability, ...]:
     """Say of every unknown and of the common scale of the ranges whether it is identified.
 
     Parameters
     ----------
-    experiment : Experiment
-        Where the reasons are computed.
+    diagnosis : Diagnosis
+        Of the experiment at which the reasons are computed.
     spread : Spread
         Of the posterior, or as it is predicted.
     expected : ExpectedPosterior or None
         At the experiment, to tell a curved or divided posterior by; None where its derivatives
         are beyond what a number can hold, and no cause can be computed.
-    still : bool
-        Whether the ranges of all frames are one and the same, as far as can be told.
 
     Returns
     -------
     tuple of Identifiability
         In the order of the unknowns, "range_m" last.
     """
-    diagnosis = Diagnosis(experiment, still)
+    experiment = diagnosis.experiment
     names = experiment.parameters.names
     wide = log_range_spread(experiment.parameters)
     linear_sd = np.full(len(names) + 1, np.nan)
@@ -107,7 +97,7 @@ def statuses_of(
         status = status_of(name, value)
         alike = None
         if name == "range_m" and status == "weak":
-            alike = _left_open(experiment, spread, expected)
+            alike = left_open(experiment, spread.scale, expected)
             status = "weak" if alike is None else "not_identified"
         text = _headline(name, status, value)
         if alike is not None:
@@ -123,28 +113,6 @@ def statuses_of(
         contraction = contraction_of(value / unit) if unit > 0 else 0.0
         rows.append(Identifiability(name, status, contraction, text))
     return tuple(rows)
-
-
-def _left_open(
-    experiment: Experiment, spread: Spread, expected: ExpectedPosterior | None
-) -> str | None:
-    """Say so where an error of the flux and light that stands still leave the ranges' scale open.
-
-    Unknown crosstalk takes up what a smooth error of the flux bends: all ranges then stretch
-    together, by more than the flux may err, and how far is decided by how right the model is taken
-    to be, not by the readings.
-    """
-    error = experiment.discrepancy
-    if error is None or expected is None or not spread.scale > error:
-        return None
-    for term, how in _STATIC.items():
-        group = tuple(name for name in experiment.parameters.names if name.startswith(term))
-        if not group:
-            continue
-        known = expected_posterior(dataclasses.replace(experiment, known=group)).scale_sd
-        if _HELP * known < expected.scale_sd:
-            return _ALIKE.format(term=term, how=how, error=error, spread=spread.scale, known=known)
-    return None
 
 
 def _cause(diagnosis: Diagnosis, name: str, spread: float, linear: float) -> str:

@@ -93,8 +93,7 @@ def _judged(drawn: "_Drawn", whole: Whole) -> tuple[Identifiability, ...]:
         chosen,
         log_r,
         gains_of(density.frames),
-        # at rest it is no different from another c2
-        discrepancy=None if static else job.model_error.flux or None,
+        error=job.model_error,
         common_range=static,
         rates=rates_of(density.frames),
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.frame.blocks import GAIN
-from inference.frame.known_range import rates_of
+from inference.frame.known_range import columns_of, rates_of
 from inference.identifiability.before_data import identifiability
 from inference.identifiability.status import Identifiability
 from inference.posterior.answer.error_parts import ErrorParts, ParameterErrorParts
@@ -89,7 +89,9 @@ def _foreseen(
     names = density.parameters.names
     values = density.parameters.natural(best)[0].tolist()
     present = np.isfinite(log_r)
-    ranges, rates = np.where(present, np.exp(log_r), 1.0), rates_of(density.frames)
+    ranges = np.where(present, np.exp(log_r), 1.0)
+    # as they were sent: what the clock errs by is foreseen with the scene
+    rates = rates_of(columns_of(job.frames.select(job.usable)))
     # without coefficients it is not used
     warm = None if job.sensor.temperature is None else job.frames.temperature_k
     try:

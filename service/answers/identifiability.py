@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.identifiability.before_data import Foresight, identifiability
-from inference.identifiability.remedies import Offer
+from inference.identifiability.offers import Offer
 from inference.identifiability.status import Identifiability
 from service.answers.posteriors import SHAPES
 from service.answers.shape import model_of
@@ -75,10 +75,11 @@ class ForeseenIdentifiability:
     identifiability : list
         A status and a reason for every unknown and for ``range_m``.
     remedies : dict
-        For each of them that is not identified what would lower its Cramer-Rao bound to a half or
-        less, the cheapest first: the kind (``empty``: frames without the object; ``distance``,
-        ``distances``: the object at one or two known distances; ``odometry``; ``motion``: a wider
-        stroke), words for it, and the bound that it would give, relative as in the reasons.
+        For each of them that is not identified what would help: the kind (``empty``: frames without
+        the object; ``distance``, ``distances``: the object at one or two known distances;
+        ``odometry``; ``motion``: a wider stroke), words for it, the Cramer-Rao bound that it would
+        give, relative as in the reasons, at most half of what it is and below one, and the status.
+        What would have it identified comes first, and of what achieves as much the cheapest.
     """
 
     rank: int

@@ -16,10 +16,10 @@ def add_parser(subparsers: "Subparsers[argparse.ArgumentParser]") -> None:
         _run,
         brief="what frames at given ranges would tell of a scene",
         description="Rank, Cramer-Rao bounds and, for every unknown, whether it would be "
-        "identified and why not, before any frame is taken, as JSON. Bounds of ranges are of noise "
-        "and unknowns; what answers add for an object and a clock that are not exactly as the "
-        "model (0.8 mm at least, by default) is not in them. Which technique serves a "
-        "scene, and why the others do not, is in the answer of `hybridtof estimate`.",
+        "identified and why not, before any frame is taken, as JSON. All of it is of noise, "
+        "unknowns and what the scene's `discrepancy` allows object and clock to be off the model; "
+        "left out that is the default, as in the answers, and 0 states none. Which technique "
+        "serves a scene, and why the others do not, is in the answer of `hybridtof estimate`.",
         examples="""
             hybridtof identifiability --scene scene.json --ranges 0.3 0.6 1.2
             hybridtof identifiability --scene scene.json --ranges 0.3 0.6 --at object.c0=0.08

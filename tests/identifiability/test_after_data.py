@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from inference.identifiability.after_data import _is_still, statuses_of_draws
 from inference.identifiability.status import Identifiability
 from inference.identifiability.statuses import Spread
+from simulator.model_error import ModelError
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import parse_scene
 from tests.posterior.scenes import UNKNOWN_CROSSTALK, sensor_of
@@ -144,9 +145,10 @@ def test_a_scale_left_open_by_crosstalk_and_discrepancy_is_not_identified(
     scale = spread * rng.standard_normal((500, 1))
     log_r = np.log(np.linspace(0.2, 0.4, 20)) + 1e-4 * rng.standard_normal((500, 20)) + scale
 
-    def row(discrepancy: float | None) -> Identifiability:
+    def row(flux: float) -> Identifiability:
         spread = spread_of(z, log_r)
-        return statuses_of_draws(SENSOR, made, spread, z, log_r, discrepancy=discrepancy)[-1]
+        error = ModelError(flux, 0.0, integrated=False)
+        return statuses_of_draws(SENSOR, made, spread, z, log_r, error=error)[-1]
 
     found = row(0.072)
     assert found.status == status
@@ -156,4 +158,4 @@ def test_a_scale_left_open_by_crosstalk_and_discrepancy_is_not_identified(
     # nor is a scale open that is known well, however small the error is said to be
     assert spread > 0.05 or row(1e-3).status == "identified"
     # a model that is stated to be exact cannot be what leaves it open
-    assert "error of the object's flux" not in row(None).reason
+    assert "error of the object's flux" not in row(0.0).reason

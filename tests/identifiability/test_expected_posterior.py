@@ -67,7 +67,8 @@ def test_readings_without_noise_leave_the_bound(name: str) -> None:
     """The prior adds its unit information to 1 / variance: a relative part of variance / 2."""
     experiment = experiment_of(SCENES[name], snr=1e7)
     bounds, found = information(experiment), expected_posterior(experiment)
-    foreseen = identifiability(experiment.sensor, parse_scene(SCENES[name]), np.exp(LOG_R).tolist())
+    exact = parse_scene(SCENES[name] | {"discrepancy": 0})
+    foreseen = identifiability(experiment.sensor, exact, np.exp(LOG_R).tolist())
     worst = float(found.sd.max())
     assert worst < 1e-2
     for parameter, sd in foreseen.posterior_sd.items():
@@ -140,7 +141,7 @@ def test_error_of_the_flux() -> None:
     scene = {"object": {"c0": 0.0769, "c1": -0.123, "c2": 0.0957}, "crosstalk": UNKNOWN_CROSSTALK}
     ranges = np.geomspace(0.2, 0.4, 24).tolist()
     sensor = sensor_of("pulsed")
-    exact = identifiability(sensor, parse_scene(scene), ranges)
+    exact = identifiability(sensor, parse_scene(scene | {"discrepancy": 0}), ranges)
     before = exact.information.range_sd
     last = 1.0
     for size, least in ((1e-9, 0.99), (1e-3, 1.0), (0.02, 5.0), (0.07, 20.0)):
@@ -199,7 +200,8 @@ def test_what_cannot_be_foreseen_is_refused() -> None:
 
 def test_a_known_object_at_rest_has_one_unknown_range() -> None:
     """Frames add up: the bound of the common range falls with the root of their number."""
-    scene = {"object": {"c0": 0.0769, "c1": -0.123, "c2": 0.0957}, "motion": "static"}
+    known = {"c0": 0.0769, "c1": -0.123, "c2": 0.0957}
+    scene = {"object": known, "motion": "static", "discrepancy": 0}
     one, four = (
         identifiability(sensor_of("pulsed"), parse_scene(scene), [1.0] * n).information.range_sd
         for n in (1, 4)

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from inference.identifiability.before_data import identifiability
+from inference.posterior import undrawn
 from inference.posterior.infer import infer
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages import standing
@@ -43,7 +45,8 @@ def untrusted(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_nothing_drawn_has_no_numbers_and_says_what_is_foreseen(crosstalk: Any) -> None:
     if isinstance(crosstalk, dict):
         crosstalk = crosstalk | {"optional": True}
-    found = infer(SENSOR, parse_scene({"crosstalk": crosstalk}), FRAMES, NO_TIME)
+    exact = parse_scene({"crosstalk": crosstalk, "discrepancy": 0})
+    found = infer(SENSOR, exact, FRAMES, NO_TIME)
     assert not found.drawn
     assert not found.verdict.converged
     assert any("nothing was drawn" in reason for reason in found.verdict.reasons)
@@ -85,6 +88,24 @@ def test_an_object_at_rest_foresees_what_it_will_never_tell() -> None:
     by_name = {row.parameter: row for row in rows}
     assert by_name["object.c0"].status == "not_identified"
     assert "the object must move" in by_name["object.c0"].reason
+
+
+@pytest.mark.usefixtures("untrusted")
+def test_a_ruler_is_foreseen_as_it_was_sent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the clock errs by is counted where it is foreseen, and once."""
+    asked: list[Any] = []
+
+    def listening(*args: Any, **more: Any) -> Any:
+        asked.append(more)
+        return identifiability(*args, **more)
+
+    monkeypatch.setattr(undrawn, "identifiability", listening)
+    known = np.append(np.geomspace(0.1, 2.0, 8)[:7], np.nan)
+    told = dataclasses.replace(FRAMES, known_range_m=known, known_range_sd_m=np.full(8, 1e-3))
+    rows = infer(SENSOR, parse_scene({"crosstalk": UNKNOWN_CROSSTALK}), told, NO_TIME)
+    assert "foreseen at the best fit so far" in rows.identifiability[0].reason
+    (of,) = asked
+    assert of["known_range_sd_m"] == [pytest.approx(1e-3)] * 7 + [None]
 
 
 def test_the_command_line_does_not_take_it_for_an_answer(

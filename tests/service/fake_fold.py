@@ -100,7 +100,7 @@ def order(**orders: Any) -> None:
 
 
 def prepare(_: "Sensor", scene: "Scene", __: "Frames", settings: SamplerSettings) -> Job:
-    if scene.stated_flux_error is not None:
+    if scene.model_error.integrated:
         raise RefusedError("a discrepancy is not known here; leave it out")
     seed = 1 if settings.seed is None else settings.seed
     from inference.posterior.answer.posterior import RANGE_COLUMNS

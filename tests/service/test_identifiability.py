@@ -130,8 +130,15 @@ def test_command(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
         ]
     )
     out, err = capsys.readouterr()
-    assert (code, err) == (0, "")
+    assert code == 0
+    # seven frames, and a shadow that errs
+    assert "range_m, the scale of all ranges, would be weak" in err
     assert json.loads(out)["rank"] == 5
+    exact = BODY["scene"] | {"discrepancy": 0}
+    path.write_text(json.dumps({"sensor": BODY["sensor"], "scene": exact}))
+    common = ["--at", "object.c0=0.08", "--at", "background.distance_m=3"]
+    code = main(["identifiability", "--scene", str(path), "--ranges", *ranges, *common])
+    assert (code, capsys.readouterr().err) == (0, "")
     for bad in (["--at", "object.c0"], ["--at", "object.c9=1"], ["--empty", "-1"]):
         code = main(["identifiability", "--scene", str(path), "--ranges", "1", *bad])
         out, err = capsys.readouterr()
