@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from inference.tracking.evenness import ROUGH, hides
 from inference.tracking.hypotheses import (
     ANCHOR,
-    BRIGHT,
     CROSSTALK1,
     RESTING,
+    RIVAL_TIME,
     STILL,
     Hypotheses,
 )
@@ -78,7 +78,7 @@ def first_state(
     weight[0] = 1.0 - there
     numbers = [math.nan, there, 1.0, 0.0, 0.0, ROUGH, 0.0]
     numbers += [math.nan, math.nan, math.inf, math.inf, 0.0, 0.0, 0.0]
-    numbers += [0.0] * (BRIGHT + 1 - STILL)
+    numbers += [0.0] * (RIVAL_TIME + 1 - STILL)
     if steady:
         numbers += first_unsteady(directions)
     first = Hypotheses(x, X, weight, np.array(numbers))
