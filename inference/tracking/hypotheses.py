@@ -97,9 +97,9 @@ class Hypotheses(NamedTuple):
     # of readings that stay as they are (`inference.tracking.stillness`) whether they do, since when
     # [s], in how many frames, their mean, that of late, and the gain's factor, and of frames that
     # are stated empty (`inference.tracking.stated_empty`) how many agree with what is held of the
-    # crosstalk, how many with its rival, how many of the last ones, and of the rival the mean of
-    # these frames without the scene's light, its variance in that of a frame's noise, the mean of
-    # their factors on the gain, and the time that the variance is of [s]
+    # crosstalk, how many with its rival, how many of the last were passed over, and of the rival
+    # the mean of its frames without the scene's light, its variance in that of a frame's noise, the
+    # mean of their factors on the gain, and the time that the variance is of [s]
     numbers: Array
 
 

@@ -4,8 +4,8 @@ One of them may be an outlier, as any frame may be: a glitch, a hand before the 
 over where it contradicts what is held of the crosstalk. But what is held may be the outlier itself:
 beside a wide prior the first of these frames is believed whatever it reads. So the frames that are
 passed over and agree with one another are remembered as a rival, and the two are counted. More
-frames win. While as many say the one as the other, or the last ones contradict all before them,
-nobody knows, and the crosstalk is as wide as both.
+frames win. While as many say the one as the other, or the last ones contradict what is held, nobody
+knows, and the crosstalk is as wide as both.
 
 docs/model.md, stated-empty, has the rule.
 """
@@ -111,7 +111,7 @@ def _tell_rival(
 @compiled
 def _start_rival(numbers: Array, frame: TrackedFrame, empty: Array) -> None:
     """Let a frame that agrees with nothing be the rival."""
-    numbers[RIVAL], numbers[RUN], numbers[RIVAL_VARIANCE] = 1.0, 1.0, 1.0
+    numbers[RIVAL], numbers[RIVAL_VARIANCE] = 1.0, 1.0
     numbers[RIVAL1] = frame.first - frame.gain * empty[FIRST, 0]
     numbers[RIVAL2] = frame.second - frame.gain * empty[SECOND, 0]
     numbers[RIVAL_GAIN], numbers[RIVAL_TIME] = frame.gain, numbers[TIME]
@@ -125,7 +125,7 @@ def _teach_rival(numbers: Array, frame: TrackedFrame, empty: Array) -> None:
     numbers[RIVAL2] += share * (frame.second - frame.gain * empty[SECOND, 0] - numbers[RIVAL2])
     numbers[RIVAL_GAIN] += share * (frame.gain - numbers[RIVAL_GAIN])
     numbers[RIVAL_VARIANCE] = share
-    numbers[RIVAL], numbers[RUN] = numbers[RIVAL] + 1.0, numbers[RUN] + 1.0
+    numbers[RIVAL] += 1.0
 
 
 @compiled
@@ -186,6 +186,7 @@ def learn_stated(
     if not odd:
         numbers[HELD], numbers[RUN] = numbers[HELD] + 1.0, 0.0
         return outlier, learn_empty(of, frame, table, empty, scratch)
+    numbers[RUN] += 1.0
     numbers[COUNT] = 0.0  # row 1 is free
     own = 1.0
     if numbers[RIVAL] > 0.0:
@@ -204,7 +205,6 @@ def learn_stated(
     elif numbers[RIVAL] > 1.0:
         # a third opinion: one vote less for either, so that a tie stays one
         numbers[RIVAL], numbers[HELD] = numbers[RIVAL] - 1.0, numbers[HELD] - 1.0
-        numbers[RUN] = 0.0
     else:
         _start_rival(numbers, frame, empty)
     return outlier, rules.most_surprise
@@ -222,6 +222,9 @@ def open_crosstalk(
 ) -> None:
     """Make the crosstalk as wide as both that frames stated empty tell, before one that is not.
 
+    In every direction: known to noise across the line between the two, one frame of an object
+    would tell both where it is and where on that line the crosstalk, by the wrong root as well.
+
     Parameters
     ----------
     of : Hypotheses
@@ -230,7 +233,11 @@ def open_crosstalk(
         As for `learn_stated`.
     """
     _tell_rival(of, table, empty, first, rules, scratch)
+    away1 = of.x[1, CROSSTALK1] - of.x[0, CROSSTALK1]
+    away2 = of.x[1, CROSSTALK2] - of.x[0, CROSSTALK2]
+    half = 0.5 * math.hypot(away1, away2)
     merge(of, 0, 1, 0.5, CROSSTALK1, scratch.work)
+    move(of, 0, Motion(0.0, 0.0, Root(0.0, 0.0, 0.0), half, half), scratch.work)
     of.numbers[HELD], of.numbers[RIVAL], of.numbers[RUN] = 0.0, 0.0, 0.0
 
 

@@ -224,3 +224,5 @@ def test_light_of_a_wall_and_the_gain_are_no_contradiction(kind: str) -> None:
     )
     found = track(sensor, scene_of(PLATE, **wall, crosstalk=WIDE), frames)
     assert crosstalk_off(found, 11) < 4.0
+    assert found.crosstalk_sd is not None
+    assert found.crosstalk_sd[11].max() < 0.5 * READ
