@@ -23,7 +23,6 @@ from inference.tracking.outliers import log_outlier
 from inference.tracking.readings_table import FIRST, SECOND, ReadingsTable
 from inference.tracking.roots import UNIT, Root, add_factor, solve
 from inference.tracking.square_root import Linear, update
-from inference.tracking.without_object import take_stated
 from simulator.compiled import compiled
 
 __all__ = [
@@ -32,7 +31,6 @@ __all__ = [
     "Expected",
     "expect_empty",
     "learn_empty",
-    "learn_stated",
     "weigh_empty",
 ]
 
@@ -68,14 +66,20 @@ class Expected(NamedTuple):
 
 @compiled
 def expect_empty(
-    of: Hypotheses, frame: TrackedFrame, table: ReadingsTable, empty: Array, nuisance: Array
+    of: Hypotheses,
+    row: int,
+    frame: TrackedFrame,
+    table: ReadingsTable,
+    empty: Array,
+    nuisance: Array,
 ) -> Expected:
     """Hold a frame against the empty scene.
 
     Parameters
     ----------
-    of : Hypotheses
-        Row 0 is the empty scene.
+    of, row : Hypotheses, int
+        The row that holds its crosstalk, where that is learnt: 0 but for a rival of it
+        (`inference.tracking.stated_empty`).
     frame : TrackedFrame
         The frame.
     table : ReadingsTable
@@ -92,19 +96,19 @@ def expect_empty(
     m1 = gain * empty[FIRST, 0] + table.crosstalk1
     m2 = gain * empty[SECOND, 0] + table.crosstalk2
     if learns:
-        m1, m2 = m1 + x[0, CROSSTALK1], m2 + x[0, CROSSTALK2]
+        m1, m2 = m1 + x[row, CROSSTALK1], m2 + x[row, CROSSTALK2]
     e1, e2 = frame.first - m1, frame.second - m2
     noise = UNIT
     if not table.noise.plain and not table.by_rate:
         unknown = Root(0.0, 0.0, 0.0)
         for j in range(n if learns else 0):
-            unknown = add_factor(unknown, X[0, CROSSTALK1, j], X[0, CROSSTALK2, j])
+            unknown = add_factor(unknown, X[row, CROSSTALK1, j], X[row, CROSSTALK2, j])
         noise = noise_at_light((m1, m2), (0.0, 0.0), (e1, e2), unknown, table.noise)
     root = noise
     for j in range(m):
         f1, f2 = 0.0, 0.0
         if learns:
-            f1, f2 = X[0, CROSSTALK1, j], X[0, CROSSTALK2, j]
+            f1, f2 = X[row, CROSSTALK1, j], X[row, CROSSTALK2, j]
         if j >= n:
             g1, g2 = gain * empty[FIRST, 1 + j - n], gain * empty[SECOND, 1 + j - n]
             nuisance[FIRST, j - n], nuisance[SECOND, j - n] = g1, g2
@@ -132,26 +136,11 @@ def learn_empty(
     scratch : Scratch
         Overwritten.
     """
-    expected = expect_empty(of, frame, table, empty, scratch.nuisance)
+    expected = expect_empty(of, 0, frame, table, empty, scratch.nuisance)
     if learns_crosstalk(of):
         e1, e2 = frame.first - expected.mean1, frame.second - expected.mean2
         update(of, 0, Linear(e1, e2, 0.0, 0.0, 0.0, 0.0, expected.noise), scratch, of.X.shape[1])
     return expected.surprise
-
-
-@borrowed
-@compiled
-def learn_stated(
-    of: Hypotheses, frame: TrackedFrame, table: ReadingsTable, empty: Array, scratch: Scratch
-) -> float:
-    """Learn the crosstalk from a frame that is stated to be empty; its surprise.
-
-    Parameters are those of `learn_empty`.
-    """
-    if learns_crosstalk(of):
-        expected = expect_empty(of, frame, table, empty, scratch.nuisance)
-        take_stated(of, expected.noise, scratch.nuisance)
-    return learn_empty(of, frame, table, empty, scratch)
 
 
 @borrowed
@@ -181,7 +170,7 @@ def weigh_empty(
     scratch : Scratch
         Overwritten.
     """
-    expected = expect_empty(of, frame, table, empty, scratch.nuisance)
+    expected = expect_empty(of, 0, frame, table, empty, scratch.nuisance)
     strange = log_outlier(frame, (expected.mean1, expected.mean2, expected.spread), table, rules)
     if frame.known_rate > 0.0:
         return Empty(NEVER, NEVER, NEVER, strange, expected.surprise)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import Status
-from inference.tracking.empty_scene import learn_stated
 from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import (
     COUNT,
@@ -42,6 +41,12 @@ from inference.tracking.report import (
     report,
 )
 from inference.tracking.resting import least_present, nothing_has_changed
+from inference.tracking.stated_empty import (
+    describe_contradicted,
+    is_contradicted,
+    learn_stated,
+    open_crosstalk,
+)
 from inference.tracking.stillness import begin_anew, is_still, mean_at_rest, take_still
 from inference.tracking.unsteady import OUTLIERS, UNSTEADY, take_empty, take_unsteady
 from inference.tracking.weighing import Model, room_for, weigh_frame, weigh_known
@@ -97,6 +102,9 @@ def run_filter(
     rules, numbers = model.rules, of.numbers
     for i in range(times.size):
         seconds = 0.0
+        stated = kinds[i] == EMPTY or kinds[i] == EMPTY_SATURATED
+        if not stated and is_contradicted(of):
+            open_crosstalk(of, model.table, model.places.empty, model.first, rules, room.scratch)
         if learns_crosstalk(of) and kinds[i] == USABLE:
             rest, untold = mean_at_rest(of), is_still(of) and nothing_has_changed(of)
             now = TrackedFrame(frames[i, _FIRST], frames[i, _SECOND], frames[i, _GAIN], 0.0, 0.0)
@@ -123,21 +131,26 @@ def run_filter(
                 weigh_known(frame, of, model, room)
         else:
             if kinds[i] == EMPTY:
-                surprise = learn_stated(of, frame, model.table, model.places.empty, room.scratch)
+                outlier, surprise = learn_stated(
+                    of, frame, model.table, model.places.empty, model.first, rules, room.scratch
+                )
             of.weight[0], numbers[PENDING], numbers[COUNT] = 1.0, 0.0, 0.0
         if not math.isnan(surprise):
             own = min(surprise, rules.most_surprise) / model.table.channels
             numbers[RUNNING] += (1.0 - rules.memory) * (own - numbers[RUNNING])
             numbers[ROUGHNESS] += (min(own, 1.0) - numbers[ROUGHNESS]) / _LATE
         report(out, rows, i, of, rules, model.table)
-        told_empty = kinds[i] == EMPTY or kinds[i] == EMPTY_SATURATED
+        if is_contradicted(of):
+            describe_contradicted(
+                out, i, of, model.table, model.places.empty, model.first, rules, room.scratch
+            )
         usual = 1.0 - outlier if kinds[i] == USABLE else 0.0
-        least = least_present(of, frame, model.table, usual, told_empty)
+        least = least_present(of, frame, model.table, usual, stated)
         out[i, PRESENT] = max(out[i, PRESENT], least)
         out[i, OUTLIER], out[i, SURPRISE] = outlier, numbers[RUNNING]
         out[i, STUCK] = stuck_for(numbers)
         if numbers.size > UNSTEADY:
-            if kinds[i] == USABLE and outlier >= 0.5:
+            if outlier >= 0.5:
                 numbers[OUTLIERS] += 1.0
             elif kinds[i] == USABLE or kinds[i] == EMPTY:
                 numbers[OUTLIERS] = 0.0

@@ -11,6 +11,7 @@ from inference.tracking.hypotheses import (
     ANCHOR,
     CROSSTALK1,
     RESTING,
+    RIVAL_TIME,
     STILL,
     TOLD,
     Hypotheses,
@@ -79,7 +80,7 @@ def first_state(
     weight[0] = 1.0 - there
     numbers = [math.nan, there, 1.0, 0.0, 0.0, ROUGH, 0.0]
     numbers += [math.nan, math.nan, math.inf, math.inf, 0.0, 0.0, 0.0]
-    numbers += [0.0] * (TOLD + 1 - STILL)
+    numbers += [0.0] * (RIVAL_TIME + 1 - STILL)
     if steady:
         numbers += first_unsteady(directions)
     first = Hypotheses(x, X, weight, np.array(numbers))

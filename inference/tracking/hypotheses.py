@@ -20,6 +20,7 @@ __all__ = [
     "COUNT",
     "CROSSTALK1",
     "CROSSTALK2",
+    "HELD",
     "LATE1",
     "LATE2",
     "LEVEL1",
@@ -27,7 +28,14 @@ __all__ = [
     "LOST",
     "PENDING",
     "RESTING",
+    "RIVAL",
+    "RIVAL1",
+    "RIVAL2",
+    "RIVAL_GAIN",
+    "RIVAL_TIME",
+    "RIVAL_VARIANCE",
     "ROUGHNESS",
+    "RUN",
     "RUNNING",
     "SAME",
     "SINCE",
@@ -64,6 +72,7 @@ TIME, PENDING, RUNNING, COUNT, LOST, ROUGHNESS, SAME, _READ1, _READ2, _STEP1, _S
 RESTING, LEVEL1, LEVEL2 = range(11, 14)
 STILL, SINCE, STAYED, STAY1, STAY2, LATE1, LATE2, BRIGHT = range(14, 22)
 TOLD = 22
+HELD, RIVAL, RUN, RIVAL1, RIVAL2, RIVAL_VARIANCE, RIVAL_GAIN, RIVAL_TIME = range(23, 31)
 _LEAST = -700.0  # log of a weight that underflows
 _ROOT_8 = math.sqrt(8.0)
 # probability of no change at all from which on readings that do not change say nothing: thirty
@@ -80,7 +89,7 @@ class Hypotheses(NamedTuple):
     x: Array
     X: Array  # (rows, n, n + p): roots of the covariances
     weight: Array  # (rows,): probabilities
-    # (23,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
+    # (31,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
     # the last frame [s] (nan: none yet), probability of an object of which nothing is known yet,
     # running surprise, number of hypotheses, whether an object that was there may be anywhere by
     # now, the surprise of the last frames, each cut at 1, how many frames up to the last had the
@@ -88,8 +97,12 @@ class Hypotheses(NamedTuple):
     # the next (inf: none yet), where crosstalk is learnt whether its light may be that of an object
     # at rest (`inference.tracking.resting`), what the crosstalk was before anything changed, and
     # of readings that stay as they are (`inference.tracking.stillness`) whether they do, since when
-    # [s], in how many frames, their mean, that of late, and the gain's factor, and what is known of
-    # the crosstalk without any object (`inference.tracking.without_object`)
+    # [s], in how many frames, their mean, that of late, and the gain's factor, what is known of the
+    # crosstalk without any object (`inference.tracking.without_object`), and of frames that are
+    # stated empty (`inference.tracking.stated_empty`) how many agree with what is held of the
+    # crosstalk, how many with its rival, how many of the last were passed over, and of the rival
+    # the mean of its frames without the scene's light, its variance in that of a frame's noise, the
+    # mean of their factors on the gain, and the time that the variance is of [s]
     numbers: Array
 
 

@@ -134,7 +134,8 @@ def step(
         `Tracker.first`, or what the last step returned.
     frames : Frames
         With times that increase and are later than the state's. ``object_present`` false says that
-        no object is there; true says nothing. A known range is one more reading of its frame, and
+        no object is there; true says nothing. Where crosstalk is learnt, such a frame is an outlier
+        where it contradicts the others. A known range is one more reading of its frame, and
         says that an object is there; readings that contradict it are an outlier. Where the sensor
         follows its temperature, and that is not known, the readings say nothing: the status is
         none, and everything is predicted.
