@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from inference.estimates import Status
 from inference.tracking.borrowed import borrowed
+from inference.tracking.far_side import far_side_variance
 from inference.tracking.hypotheses import (
     COUNT,
     CROSSTALK1,
@@ -84,6 +85,8 @@ def _describe(row: Array, of: Hypotheses, j: int, from_scene: int, table: Readin
             scene += square
         own += square
         rate += X[j, V, k] * X[j, V, k]
+    if learns_crosstalk(of):
+        own += far_side_variance(of, j, table)
     # no range is beyond the support, and none is less known than anywhere within it
     row[POSITION] = min(max(x[j, U], table.start), table.end)
     most = (table.end - table.start) / _ROOT_12

@@ -7,6 +7,10 @@ nothing of readings that stay as they are (it is considered, as nuisance paramet
 hypothesis of the first rest has come to is forgotten as soon as something changes: all ranges are
 then as possible as they were, with the mean of these frames as the first.
 
+Crosstalk that drifts by more than the noise of that mean is another in every frame. It is learnt
+also at rest: held where the empty scene's goes on learning, an object that was slow for two seconds
+was taken for an empty scene, and came back at a wrong range.
+
 docs/model.md, stillness, has the rule.
 """
 
@@ -50,6 +54,9 @@ _LATE = 25.0  # frames of the mean of late
 _FRAMES, _SECONDS = 10.0, 0.25
 # and at rest: where an object turns round readings are still for a moment, too
 _REST_FRAMES, _REST_SECONDS = 20.0, 0.5
+# variance of the crosstalk by its drift, in that of the frames' mean, from which on they are no
+# longer one frame: what is learnt of crosstalk is then forgotten before it adds up
+_DRIFTED = 1.0
 # values of `STILL`
 _NO, _STILL, _REST = 0.0, 1.0, 2.0
 _MOST = 300.0  # frames of the mean: beyond them it follows what drifts
@@ -143,7 +150,8 @@ def take_still(
     numbers[STAYED] = n
     numbers[STAY1] += first / n
     numbers[STAY2] += second / n
-    if n >= _REST_FRAMES and seconds >= _REST_SECONDS * rules.rate_time:
+    one_frame = drifted * n < _DRIFTED
+    if one_frame and n >= _REST_FRAMES and seconds >= _REST_SECONDS * rules.rate_time:
         numbers[STILL] = _REST
     elif n >= _FRAMES and seconds >= _SECONDS * rules.rate_time:
         numbers[STILL] = _STILL
