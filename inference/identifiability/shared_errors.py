@@ -31,5 +31,6 @@ def fewer(errors: Array) -> Array:
     if errors.size == 0:
         return errors
     rows = errors.reshape(-1, errors.shape[2])
-    sizes, turn = np.linalg.eigh(rows.T @ rows)
-    return np.asarray(errors @ turn[:, sizes > _UNSEEN**2])
+    # of the triangular factor, not of the product: small ones keep their digits beside large ones
+    _, sizes, turn = np.linalg.svd(np.linalg.qr(rows, mode="r"), full_matrices=False)
+    return np.asarray(errors @ turn[sizes > _UNSEEN].T)
