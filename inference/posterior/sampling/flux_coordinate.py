@@ -80,9 +80,9 @@ class FluxCoordinate:
             span = ranges[[max(best - 1, 0), min(best + 1, _RATIOS - 1)]]
         return dataclasses.replace(self, range_m=float(ranges[best]))
 
-    def log_volume(self, z: Array) -> Array:
-        """Return log |dy/dz|, shape (n,): 0."""
-        return np.zeros(len(z))
+    def with_volume(self, z: Array) -> tuple[Array, Array]:
+        """Return y of z, shape (n, d), and log |dy/dz|, shape (n,), which is 0."""
+        return self.forward(z), np.zeros(len(z))
 
     def forward(self, z: Array) -> Array:
         """Return y of z, shape (n, d)."""

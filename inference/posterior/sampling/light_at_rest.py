@@ -65,13 +65,10 @@ class LightAtRest:
 
     def forward(self, z: Array) -> Array:
         """Return y of z, shape (n, d)."""
-        return self._changed(z)[0]
+        return self.with_volume(z)[0]
 
-    def log_volume(self, z: Array) -> Array:
-        """Return log |dy/dz|, shape (n,)."""
-        return self._changed(z)[1]
-
-    def _changed(self, z: Array) -> tuple[Array, Array]:
+    def with_volume(self, z: Array) -> tuple[Array, Array]:
+        """Return y of z, shape (n, d), and log |dy/dz|, shape (n,)."""
         y = self.flux.forward(z)
         log_flux = y[:, self.flux.c2] / self.flux.rate + self.log_unit
         log_volume, log_left = np.zeros(len(z)), np.zeros(len(z))

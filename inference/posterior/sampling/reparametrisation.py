@@ -61,9 +61,9 @@ class Reparametrisation:
         shares = [np.interp(z[:, self.distance], grid, share) for share in self.shares]
         return np.asarray(strength[:, None] * np.stack(shares, axis=1) * self.rates)
 
-    def log_volume(self, z: Array) -> Array:
-        """Return log |dy/dz|, shape (n,): 0."""
-        return np.zeros(len(z))
+    def with_volume(self, z: Array) -> tuple[Array, Array]:
+        """Return y of z, shape (n, d), and log |dy/dz|, shape (n,), which is 0."""
+        return self.forward(z), np.zeros(len(z))
 
     def forward(self, z: Array) -> Array:
         """Return y of z, shape (n, d)."""

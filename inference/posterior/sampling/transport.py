@@ -133,8 +133,8 @@ class TriangularMap:
         """Return x of shape (n, d) and log |dx/dz| of shape (n,)."""
         log_det = np.full(len(z), -self._log_volume)
         if self.coordinates is not None:
-            log_det += self.coordinates.log_volume(z)
-            z = self.coordinates.forward(z)
+            z, log_volume = self.coordinates.with_volume(z)
+            log_det += log_volume
         # the axes are orthogonal: their inverse is their transpose, rescaled
         inverse = self.axes / np.einsum("ij,ij->j", self.axes, self.axes)
         whitened = np.einsum("nj,jk->nk", z - self.centre, inverse)
@@ -158,7 +158,7 @@ class TriangularMap:
         z = self.centre + np.einsum("nk,jk->nj", whitened, self.axes)
         if self.coordinates is not None:
             z = self.coordinates.backward(z)
-            log_det -= self.coordinates.log_volume(z)
+            log_det -= self.coordinates.with_volume(z)[1]
         return z, log_det
 
 
