@@ -109,7 +109,7 @@ class Outcome:
     reasons: tuple[str, ...]
 
 
-def up_to_wall(candidates: Candidates, wall_m: float) -> Candidates:
+def up_to_wall(candidates: Candidates, wall_m: float, bare: Flags) -> Candidates:
     """Mark frames of which noise moves a root up to the wall, where the curve ends.
 
     Its standard deviation is a third of how far noise reaches there, not that of a normal law.
@@ -120,11 +120,13 @@ def up_to_wall(candidates: Candidates, wall_m: float) -> Candidates:
         Solutions before a wall.
     wall_m : float
         Its distance [m].
+    bare : ndarray of bool, shape (n,)
+        Frames that the bare wall may have given, see `free_light.may_be_none`.
     """
     with np.errstate(invalid="ignore"):
         ends = candidates.roots + NOISE_BAND * candidates.noise >= wall_m * _WALL
         alone = np.isfinite(candidates.roots) & (candidates.roots < wall_m * _WALL)
-    frames = candidates.near_frame | (ends & alone).any(axis=1)
+    frames = candidates.near_frame | ((ends | bare[:, None]) & alone).any(axis=1)
     return dataclasses.replace(candidates, near_frame=frames)
 
 

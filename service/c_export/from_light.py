@@ -5,6 +5,7 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from inference.realtime.assemble import END_BAND
 from inference.realtime.from_curve import curve_parameters
 from inference.realtime.registry import TECHNIQUES
 from inference.realtime.solving.curves import cancelling_ratio, intensity, intensity_w1
@@ -93,8 +94,9 @@ static int solved(real light, real variance, real whole, @_answer *out)
         }
         sd = LARGER(sd, LARGER(far - range, range - near) / 3);
     }
-    /* noise moves it up to the wall */
-    out->near_fold = NEARNESS > 0 && (range + 3 * sd) * NEARNESS >= 1 - R(1e-9);
+    /* noise moves it up to the wall, or may be all that is free of the wall's light */
+    out->near_fold = NEARNESS > 0 && ((range + 3 * sd) * NEARNESS >= 1 - R(1e-9)
+                                      || light < BAND * SQRT(variance));
     out->sd_m = SQRT(sd * sd + model * model);
     return @_UNIQUE;
 }
@@ -197,6 +199,7 @@ def _exported(asked: Asked, form: _Form, limits: _Limits, bracket: bool) -> Expo
         "C0": curve.c0,
         "C1": curve.c1,
         "NEARNESS": curve.nearness,
+        "BAND": END_BAND,
         "GOES_ON": float(limits.goes_on),
         **form.constants,
     }

@@ -16,6 +16,7 @@ from inference.realtime.assemble import (
     reasons_of,
     up_to_wall,
 )
+from inference.realtime.free_light import free_light, may_be_none
 from inference.realtime.from_curve import candidates_of, curve_parameters
 from inference.realtime.model_error import model_error_of, point_error, sd_of_roots
 from inference.realtime.net import UNREPRESENTABLE, Form, Net, known_net_readings
@@ -73,19 +74,17 @@ class _Parts(NamedTuple):
 
 def _parts(task: Task, net: Net) -> tuple[Curve, _Parts]:
     sensor, distance = task.sensor, task.known.get("background.distance_m")
+    free, to_free = free_light(sensor, net, distance)
     if isinstance(sensor, PulsedSensor):
         curve = cancelling_ratio.CURVE
-        free = weighted_differences(net.second, distance, net.first, sensor.r0) / distance
-        whole = net.second
-        to_free, to_whole = Form(-(sensor.r0 / distance), 1.0), Form(0.0, 1.0)
+        whole, to_whole = net.second, Form(0.0, 1.0)
     else:
         curve = cancelling_quadrature.CURVE
         angle = cycles_phase(sensor.frequency_hz, distance) + sensor.known_phase_rad
         cosine, sine = math.cos(angle), math.sin(angle)
-        # free = - Im(x e^-j(kR + offset)), whole = its real part
-        free = weighted_differences(net.first, sine, net.second, cosine)
+        # Re(x e^-j(kR + offset))
         whole = weighted_differences(net.first, cosine, net.second, -sine)
-        to_free, to_whole = Form(sine, -cosine), Form(cosine, sine)
+        to_whole = Form(cosine, sine)
     parts = _Parts(
         free=free,
         whole=whole,
@@ -127,7 +126,7 @@ def _solve(task: Task) -> TechniqueResult:
         candidates, slopes = candidates_of(
             task, curve, distance, target, sd, beside=beside, end_band=END_BAND
         )
-        candidates = up_to_wall(candidates, distance)
+        candidates = up_to_wall(candidates, distance, may_be_none(free, parts.var_free))
         physical = None
         if task.physical and known.has("background.strength"):
             scene, wave = seen_scene(task, net.relative)

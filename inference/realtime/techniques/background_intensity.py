@@ -16,6 +16,7 @@ from inference.realtime.assemble import (
     reasons_of,
     up_to_wall,
 )
+from inference.realtime.free_light import free_light, may_be_none
 from inference.realtime.from_curve import stacked
 from inference.realtime.model_error import model_error_of
 from inference.realtime.nearest_roots import nearest
@@ -83,7 +84,10 @@ def _solve(task: Task) -> TechniqueResult:
             model=np.abs(model) if error.range_m > 0 or error.shadow > 0 else None,
             merged=np.isnan(stacked(sds)) & stacked(near),
         )
-        candidates = up_to_wall(candidates, known.get("background.distance_m"))
+        wall_m = known.get("background.distance_m")
+        free, form = free_light(sensor, net, wall_m)
+        bare = may_be_none(free, net.covariance(form, form))
+        candidates = up_to_wall(candidates, wall_m, bare)
     if isinstance(sensor, PulsedSensor):
         reason = np.full(n, _BEYOND)
         reason[net.first <= 0] = _CONTACT
