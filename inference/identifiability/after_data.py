@@ -6,9 +6,10 @@ from numpy.typing import NDArray
 from inference.identifiability.erring import erring
 from inference.identifiability.expected_posterior import expected_posterior
 from inference.identifiability.experiment import Experiment
+from inference.identifiability.judged import Spread
 from inference.identifiability.reasons import Diagnosis
 from inference.identifiability.status import Identifiability
-from inference.identifiability.statuses import Spread, statuses_of
+from inference.identifiability.statuses import statuses_of
 from simulator.model_error import ModelError
 from simulator.parameters import Parameters
 from simulator.sensor import Sensor

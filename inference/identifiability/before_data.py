@@ -13,14 +13,18 @@ from inference.identifiability.expected_posterior import (
     STEP,
     ExpectedPosterior,
     expected_posterior,
+    log_range_spread,
 )
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.information import Information
+from inference.identifiability.judged import Spread
 from inference.identifiability.known_beside import planned_circuit, planned_rates, with_rates
+from inference.identifiability.lowered import lowered
 from inference.identifiability.offers import NOTHING_HELPS, NOTHING_IDENTIFIES, Offer, offers
+from inference.identifiability.over_priors import drawn, elsewhere, outside
 from inference.identifiability.reasons import Diagnosis
 from inference.identifiability.status import Identifiability
-from inference.identifiability.statuses import Spread, statuses_of
+from inference.identifiability.statuses import statuses_of
 from simulator.errors import InvalidInputError, Problem, RefusedError, escape
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import Scene
@@ -54,7 +58,10 @@ class Foresight:
     distinct : int
         Number of distinct ranges.
     identifiability : tuple of Identifiability
-        A row for every unknown and one for "range_m".
+        A row for every unknown and one for "range_m": as at least three of four draws of the priors
+        have it, where that is worse than at the values of reference.
+    over_priors : dict of str to dict of str to int
+        Of every row how many draws of the priors have each status; empty where ``at`` gives all.
     remedies : dict of str to tuple of Offer
         Of every parameter that is not identified what would help: what has it identified first,
         and of what achieves as much the cheapest.
@@ -66,6 +73,7 @@ class Foresight:
     needed: int
     distinct: int
     identifiability: tuple[Identifiability, ...]
+    over_priors: dict[str, dict[str, int]]
     remedies: dict[str, tuple[Offer, ...]]
 
     @property
@@ -164,16 +172,14 @@ def _check_ranges(experiment: Experiment, scene: Scene) -> None:
     ranges = np.exp(experiment.log_r)
     prior, background = experiment.range_prior, experiment.background
     low, high = prior.low, prior.high
-    outside = np.flatnonzero(
-        present & ~((ranges >= low * (1 - 1e-12)) & (ranges <= high * (1 + 1e-12)))
-    )
-    if outside.size:
+    beyond = outside(experiment)
+    if beyond.size:
         message = (
-            f"{ranges[outside[0]]:g} m lies outside the support of range_m, {low:g} to {high:g} m"
+            f"{ranges[beyond[0]]:g} m lies outside the support of range_m, {low:g} to {high:g} m"
         )
         if background is not None and low == -background.c1:
             message += " (nearer, a shadow with a negative c1 would be negative)"
-        raise InvalidInputError.at(f"/ranges_m/{outside[0]}", message)
+        raise InvalidInputError.at(f"/ranges_m/{beyond[0]}", message)
     moves = present.any() and np.ptp(experiment.log_r[present]) > 1e-9
     if scene.motion == "static" and moves:
         message = "differ, and the scene states an object that does not move"
@@ -216,7 +222,7 @@ def identifiability(
         False for a frame without the object, whose range plays no part.
     at : mapping of str to float, optional
         Values of unknowns, by scene path [SI units], at which the readings are linearised; the
-        others are at the medians of their priors.
+        others are at the medians of their priors, and statuses hold at draws of these, too.
     gain : sequence of float, optional
         Factor of each frame on the sensor's gain.
     known_range_sd_m : sequence of float or None, optional
@@ -271,6 +277,7 @@ def identifiability(
             "a reading, its noise or one of their derivatives is beyond what a number can hold; "
             "state the quantities in other units of reading"
         )
+
     posterior = expected_posterior(experiment)
     present = np.isfinite(log_r)
     still = bool(present.any()) and float(np.ptp(log_r[present])) < 1e-9
@@ -279,9 +286,16 @@ def identifiability(
     rows = statuses_of(diagnosis, spread, posterior)
     if 0 < diagnosis.distinct == diagnosis.needed and rates is None:
         rows = tuple(dataclasses.replace(row, reason=row.reason + _JUST_ENOUGH) for row in rows)
+    left = {j for j, name in enumerate(parameters.names) if name not in (at or {})}
+    draws = drawn(experiment.z, left)
+    over = elsewhere(experiment, draws)
+    units = [*np.ones(experiment.z.size).tolist(), log_range_spread(parameters)]
+    rows = tuple(
+        lowered(j, row, unit, over) for j, (row, unit) in enumerate(zip(rows, units, strict=True))
+    )
     found: dict[str, tuple[Offer, ...]] = {}
     if not all(row.status == "identified" for row in rows):
-        rows, found = _with_offers(diagnosis, rows, spread)
+        rows, found = _with_offers(diagnosis, rows, spread, draws)
     return Foresight(
         experiment,
         diagnosis.information,
@@ -289,22 +303,24 @@ def identifiability(
         diagnosis.needed,
         diagnosis.distinct,
         rows,
+        {row.parameter: over.counts(j) for j, row in enumerate(rows)} if left else {},
         found,
     )
 
 
 def _with_offers(
-    diagnosis: Diagnosis, rows: tuple[Identifiability, ...], spread: Spread
+    diagnosis: Diagnosis, rows: tuple[Identifiability, ...], spread: Spread, draws: Array
 ) -> tuple[tuple[Identifiability, ...], dict[str, tuple[Offer, ...]]]:
     """Return the rows, that nothing helps said in their reasons, and what would help."""
     said, found = [], {}
+    actions = [dataclasses.replace(action, draws=draws) for action in diagnosis.actions]
     for row, size in zip(rows, [*spread.parameters.tolist(), spread.scale], strict=True):
         name = row.parameter
         if row.status == "identified" or name.startswith("range_m."):
             said.append(row)
             continue
         blind = diagnosis.distinct == 0 and name == "range_m"
-        of = () if blind else offers(diagnosis.actions, row, diagnosis.bound(name), size)
+        of = () if blind else offers(actions, row, diagnosis.bound(name), size)
         found[name] = of
         more = ""
         if diagnosis.distinct > 0 and not any(each.status == "identified" for each in of):

@@ -13,7 +13,8 @@ from inference.identifiability.experiment import Experiment, information
 from inference.identifiability.information import Information
 from inference.identifiability.known_beside import with_rates
 from inference.identifiability.left_open import left_open
-from inference.identifiability.status import status_of
+from inference.identifiability.over_priors import Elsewhere, elsewhere
+from inference.identifiability.status import STATUSES, status_of
 from simulator.errors import InvalidInputError
 from simulator.parameters import OFFSET
 
@@ -61,6 +62,8 @@ class Remedy:
         Frames that it adds; 0 where it changes those that there are.
     asked : int, optional
         How many frames, the first, have ranges that are asked for; left out: all.
+    draws : ndarray, shape (n, d), optional
+        Values of the unknowns at which a status has to hold, too: see `over_priors`.
     """
 
     words: str
@@ -68,6 +71,7 @@ class Remedy:
     experiment: Experiment
     frames: int = 0
     asked: int | None = None
+    draws: Array | None = None
 
     @functools.cached_property
     def information(self) -> Information:
@@ -84,6 +88,10 @@ class Remedy:
     def expected(self) -> ExpectedPosterior:
         """The spread that a posterior of its readings should have."""
         return expected_posterior(dataclasses.replace(self.experiment), self.asked)
+
+    @functools.cached_property
+    def _elsewhere(self) -> Elsewhere | None:
+        return None if self.draws is None else elsewhere(self.experiment, self.draws, self.asked)
 
     @property
     def cost(self) -> tuple[int, int]:
@@ -113,7 +121,11 @@ class Remedy:
         if parameter == "range_m" and status == "weak":
             alike = left_open(dataclasses.replace(self.experiment), spread, self.expected)
             status = status if alike is None else "not_identified"
-        return status
+        if self._elsewhere is None:
+            return status
+        names = [*self.experiment.parameters.names, "range_m"]
+        most = self._elsewhere.status(names.index(parameter))
+        return STATUSES[max(STATUSES.index(status), most)]
 
 
 def span(log_r: Array) -> float:

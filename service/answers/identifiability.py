@@ -73,7 +73,11 @@ class ForeseenIdentifiability:
         The same for every range [m], null for a frame without object, and for the common scale of
         the ranges (the mean of log r).
     identifiability : list
-        A status and a reason for every unknown and for ``range_m``.
+        A status and a reason for every unknown and for ``range_m``: as at least three of four draws
+        of the priors have it, where that is worse than at the values of reference.
+    over_priors : dict
+        Of each of them how many of eight draws of the priors have each status; empty where ``at``
+        gives all unknowns.
     remedies : dict
         For each of them that is not identified what would help: the kind (``empty``: frames without
         the object; ``distance``, ``distances``: the object at one or two known distances;
@@ -92,6 +96,7 @@ class ForeseenIdentifiability:
     parameters: dict[str, Bound]
     range_m: RangeBounds
     identifiability: tuple[Identifiability, ...]
+    over_priors: dict[str, dict[str, int]]
     remedies: dict[str, tuple[Offer, ...]]
 
 
@@ -163,5 +168,6 @@ def identifiability_of(request: IdentifiabilityRequest) -> ForeseenIdentifiabili
             scale_posterior_sd=_number(found.posterior.scale_sd),
         ),
         identifiability=tuple(found.identifiability),
+        over_priors=found.over_priors,
         remedies=found.remedies,
     )
