@@ -5,8 +5,8 @@ import pytest
 from numpy.typing import NDArray
 
 from inference.identifiability.after_data import _is_still, statuses_of_draws
+from inference.identifiability.judged import Spread
 from inference.identifiability.status import Identifiability
-from inference.identifiability.statuses import Spread
 from simulator.model_error import ModelError
 from simulator.parameters import Parameters, parameters_of
 from simulator.scene import parse_scene

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.density.discrepant import DiscrepantDensity
-from inference.identifiability.statuses import Spread
+from inference.identifiability.judged import Spread
 from inference.posterior.answer.clock import as_ruled
 from inference.posterior.answer.draws import Draws
 from inference.posterior.answer.error_budget import ErrorBudget, error_budget
