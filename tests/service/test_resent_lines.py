@@ -66,7 +66,8 @@ OTHER = [
 @pytest.mark.parametrize("size", [1, 2, 10])
 def test_what_comes_again_is_the_line_that_was_answered(model: Tracker, size: int) -> None:
     """However lines are cut: those that are kept by their numbers, and those that are not."""
-    place, kept, answers = Place(model.first), Kept(), {}
+    answers: dict[int, bytes] = {}
+    place, kept = Place(model.first), Kept()
     for at in range(0, len(FIRST), size):
         found = taken(model, place, kept, *FIRST[at : at + size])
         kept.add(found)
