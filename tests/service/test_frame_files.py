@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from service.errors import MalformedError
-from service.frame_files import SUFFIXES, form_of, read_frames, write_frames
+from service.frame_files import SUFFIXES, form_of, read_frames, read_table, write_frames
 from simulator.errors import InvalidInputError
 from simulator.frames import frames_from_columns
 from simulator.sensor import parse_sensor
@@ -109,6 +109,11 @@ def test_a_name_with_another_unit_says_what_to_convert(
     (problem,) = caught.value.problems
     assert problem.pointer == f"/{name}"
     assert problem.message.startswith(f"is not a column: did you mean {hint} The columns are")
+
+
+def test_the_clock_of_something_else_stands_beside_the_times() -> None:
+    text = b"timestamp_ms,time_s,w1,w2\n5,1,1,2\n"
+    assert read_table(text, ".csv").ignored == ("timestamp_ms",)
 
 
 def test_a_column_without_a_name_says_so(tmp_path: Path) -> None:
