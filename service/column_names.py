@@ -18,6 +18,14 @@ _NULL = (
     "is null: leave that frame out of every column, or send frames one by one, as rows (.csv, "
     ".ndjson) or lines of a stream, where what is wrong with one is said of that one alone"
 )
+_NAMELESS = "is a column without a name: name it, or leave it out, as pandas does with index=False"
+# units that columns do not have, and the one that is meant
+_CONVERSIONS = {
+    "ms": ("milliseconds", "s"), "millis": ("milliseconds", "s"), "us": ("microseconds", "s"),
+    "ns": ("nanoseconds", "s"), "mm": ("millimetres", "m"), "cm": ("centimetres", "m"),
+    "um": ("micrometres", "m"), "km": ("kilometres", "m"),
+}  # fmt: skip
+_UNITS = {"s": "seconds", "m": "metres"}
 _ALIKE = 0.75  # difflib's ratio: one letter in four
 
 
@@ -40,7 +48,7 @@ def meant(name: str) -> list[str]:
         return same
     if plain in _OTHER_WORDS:
         return [_OTHER_WORDS[plain]]
-    if re.fullmatch(r"(time|t)(s|ms|us|ns|sec|seconds|millis)", plain):
+    if re.fullmatch(r"(timestamp|time|t)(s|ms|us|ns|sec|seconds|millis)", plain):
         return ["time_s"]
     if re.fullmatch(r"d?w\d?(dt)?", plain):
         return [known for known in NAMES if "w" in known and known[0] == plain[0]]
@@ -52,6 +60,17 @@ def meant(name: str) -> list[str]:
     from difflib import get_close_matches  # seldom needed
 
     return get_close_matches(plain, NAMES, n=2, cutoff=_ALIKE)
+
+
+def _conversion(name: str, likely: Sequence[str]) -> str:
+    """Return how to convert what stands in a column, empty where no other unit is named."""
+    found = re.search(r"(?:^t|time|[^a-z])(ms|millis|us|ns|mm|cm|um|km)[)\]]?$", name.lower())
+    if found is None:
+        return ""
+    unit, wanted = _CONVERSIONS[found[1]]
+    if not all(column.endswith(f"_{wanted}") for column in likely):
+        return ""
+    return f" Convert {unit} to {_UNITS[wanted]}."
 
 
 def check_names(names: Sequence[str]) -> None:
@@ -68,16 +87,22 @@ def check_names(names: Sequence[str]) -> None:
         A pointer for each name that is repeated, that is close to a column's, or that is a number,
         with a hint.
     """
+    if names and names[0].lower().startswith("sep="):  # for spreadsheets
+        raise InvalidInputError.at("", "the first line must name the columns: remove the line sep=")
     problems = [
         Problem(f"/{escape(name)}", "the column is repeated")
         for name in dict.fromkeys(names)
-        if names.count(name) > 1
+        if name and names.count(name) > 1
     ]
     for name in ignored_names(names):
         hint = ""
-        if likely := meant(name):
-            hint = f"did you mean {' or '.join(likely)}?"
-        elif re.fullmatch(r"[-+.\d]+(e[-+]?\d+)?|", name, re.IGNORECASE):
+        if "time_s" in names and re.fullmatch(r"timestamp[a-z]+", _plain(name)):
+            continue  # of another clock, beside the one that counts
+        if not name:
+            problems.append(Problem("/", _NAMELESS))
+        elif likely := meant(name):
+            hint = f"did you mean {' or '.join(likely)}?{_conversion(name, likely)}"
+        elif re.fullmatch(r"[-+.\d]+(e[-+]?\d+)?", name, re.IGNORECASE):
             hint = "the first line must name the columns."
         if hint:
             wanted = ", ".join(NAMES)

@@ -28,7 +28,7 @@
 
 from typing import Any
 
-from simulator.errors import HybridTofError
+from simulator.errors import HybridTofError, Problem
 
 __all__ = [
     "BodyTooLargeError",
@@ -114,7 +114,17 @@ class NotFoundError(ServiceError):
 
 
 class ConflictError(ServiceError):
-    """The resource is not in a state in which it could answer this."""
+    """The resource is not in a state in which it could answer this.
+
+    Attributes
+    ----------
+    problems : tuple of Problem
+        The field that is in conflict, where it is one.
+    """
+
+    def __init__(self, message: str, pointer: str | None = None) -> None:
+        super().__init__(message)
+        self.problems = () if pointer is None else (Problem(pointer, message),)
 
 
 class GoneError(ServiceError):

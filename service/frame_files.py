@@ -15,14 +15,19 @@ from simulator.frames import FrameColumns
 from simulator.validated import parse
 
 __all__ = [
+    "BYTE_ORDER_MARK",
     "SUFFIXES",
     "check_separator",
     "check_suffix",
     "form_of",
+    "no_frame",
     "read_frames",
     "read_table",
     "write_frames",
 ]
+
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+"""With which spreadsheets begin a text in UTF-8."""
 
 _SEPARATORS = ";\t| "
 
@@ -75,7 +80,7 @@ def read_table(raw: bytes, suffix: str) -> FrameTable:
         As `read_frames`, where no row is good or a column's name must be a mistake.
     """
     check_suffix(suffix)
-    return _READERS[suffix.lower()](raw)
+    return _READERS[suffix.lower()](raw.removeprefix(BYTE_ORDER_MARK))
 
 
 def form_of(raw: bytes) -> str:
@@ -92,10 +97,11 @@ def form_of(raw: bytes) -> str:
         ``.csv`` unless it begins with a brace; ``.ndjson`` where the first line is an object whose
         members are no lists.
     """
-    if not raw.lstrip().startswith(b"{"):
+    text = raw.removeprefix(BYTE_ORDER_MARK).lstrip()
+    if not text.startswith(b"{"):
         return ".csv"
     try:
-        first = json.loads(raw.lstrip().split(b"\n", 1)[0])
+        first = json.loads(text.split(b"\n", 1)[0])
     except ValueError:
         return ".json"
     return ".json" if any(isinstance(value, list) for value in first.values()) else ".ndjson"
@@ -111,6 +117,13 @@ def check_suffix(suffix: str, done: str = "read from") -> None:
     """
     if suffix.lower() not in _READERS:
         raise MalformedError(f"frames are {done} {', '.join(SUFFIXES)}, not '{suffix}'")
+
+
+def no_frame(suffix: str, header: bool = False) -> MalformedError:
+    """Return the error of a file in which nothing is, or nothing below a header."""
+    if header or suffix.lower() in (".json", ".ndjson"):
+        return MalformedError("the file holds no frame")
+    return MalformedError("the file is empty; its first line must name the columns")
 
 
 def _from_json(raw: bytes) -> FrameTable:
@@ -131,7 +144,7 @@ def _from_json(raw: bytes) -> FrameTable:
 def _from_ndjson(raw: bytes) -> FrameTable:
     lines = [(n, line) for n, line in enumerate(raw.splitlines(), start=1) if line.strip()]
     if not lines:
-        raise MalformedError("the file holds no frame")
+        raise no_frame(".ndjson")
     names: list[str] = []
     rows = []
     for number, line in lines:
@@ -154,7 +167,7 @@ def _from_ndjson(raw: bytes) -> FrameTable:
 
 def _from_csv(raw: bytes) -> FrameTable:
     try:
-        text = raw.decode("utf-8-sig")
+        text = raw.decode("utf-8")
     except UnicodeDecodeError as error:
         raise MalformedError(f"the file is not UTF-8 at byte {error.start}") from None
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
@@ -163,7 +176,7 @@ def _from_csv(raw: bytes) -> FrameTable:
     except csv.Error as error:
         raise MalformedError(f"line {reader.line_num}: {error}") from None
     if not read:
-        raise MalformedError("the file is empty; its first line must name the columns")
+        raise no_frame(".csv")
     header = [name.strip() for name in read[0][1]]
     check_separator(header)
     rows = [

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -13,7 +14,7 @@ from simulator.frames import FrameColumns
 from simulator.known_ranges import MAY_BE_NULL
 from simulator.validated import parse
 
-__all__ = ["BadRow", "FrameTable", "Row", "table_of", "value_of_json", "value_of_text"]
+__all__ = ["BadRow", "FrameTable", "Row", "no_value", "table_of", "value_of_json", "value_of_text"]
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -144,10 +145,7 @@ def _take(
         cell = row.cells[position]
         value = value_of(name, cell)
         if value is None:
-            must = _TRUE_OR_FALSE if name == "object_present" else "a finite number"
-            said = cell.strip() if isinstance(cell, str) else cell
-            hint = _comma(said)
-            return BadRow(index, row.line, name, f"must be {must}, is {repr(said)[:42]}{hint}")
+            return BadRow(index, row.line, name, no_value(name, cell))
         if name == "gain" and value <= 0:
             return BadRow(index, row.line, name, f"must be above 0, is {value:g}")
         values.append(None if math.isnan(value) else value)
@@ -156,9 +154,21 @@ def _take(
     return None
 
 
-def _comma(said: object) -> str:
-    """Return what to do about a decimal comma; nothing of any other cell."""
-    if not isinstance(said, str) or said.count(",") != 1:
+def no_value(name: str, cell: object) -> str:
+    """Return what is wrong with a cell that has no value."""
+    must = _TRUE_OR_FALSE if name == "object_present" else "a finite number"
+    said = cell.strip() if isinstance(cell, str) else cell
+    hint = _comma(said) if isinstance(said, str) else ""
+    return f"must be {must}, is {repr(said)[:42]}{hint}"
+
+
+def _comma(said: str) -> str:
+    """Return what to do about a comma in a number; nothing of any other cell."""
+    if re.fullmatch(r"[-+]?[1-9]\d{0,2},\d{3}", said):
+        return ": write no separators of thousands, and a point for a decimal comma"
+    if re.fullmatch(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?", said):
+        return ": write no separators of thousands"
+    if said.count(",") != 1:
         return ""
     try:
         float(said.replace(",", "."))

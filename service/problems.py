@@ -165,7 +165,8 @@ def describe(error: HybridTofError) -> dict[str, Any]:
         (kind for cls, kind in _KINDS.items() if isinstance(error, cls)),
         (HTTPStatus.INTERNAL_SERVER_ERROR, "internal", "The service failed"),
     )
-    problems = error.problems if isinstance(error, InvalidInputError | RefusedError) else ()
+    named = InvalidInputError | RefusedError | ConflictError
+    problems = error.problems if isinstance(error, named) else ()
     detail = str(error)
     if len(problems) > 1 and isinstance(error, InvalidInputError):
         detail = f"{len(problems)} fields break a rule; {detail}"

@@ -13,7 +13,7 @@ from inference.posterior.answer.draws import Draws
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.learnt_error import learnt_error
 from inference.posterior.selection.models import reduced
-from simulator.errors import RefusedError
+from simulator.errors import Problem, RefusedError
 from simulator.frames import Frames
 from simulator.joint import Joint
 from simulator.joint_checks import priors_of
@@ -97,8 +97,9 @@ def refuse_known_object(names: Iterable[str]) -> None:
     """
     if not any(name.startswith("object.") for name in names):
         raise RefusedError(
-            "the object is stated in numbers, which other objects do not have: state priors of "
-            "it, or leave it out, and calibrate again"
+            "object is stated in numbers, which other objects do not have: state priors of it, of "
+            "a known plate narrow ones, or leave it out, and calibrate again",
+            Problem("/scene/object", "is stated in numbers"),
         )
 
 

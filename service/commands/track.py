@@ -96,6 +96,7 @@ def _run(args: argparse.Namespace) -> int:
     from service.checked_system import checked_system
     from service.commands.files import naming, open_lines, read_document, reading
     from service.commands.output import write_result
+    from service.frame_files import BYTE_ORDER_MARK, no_frame
     from service.plausibility import doubts
     from service.requests import TrackedSystem
     from service.streams.forms import Form, form_like
@@ -111,23 +112,29 @@ def _run(args: argparse.Namespace) -> int:
         follower = _follower(args, sensor, scene, stated.tracking)
     for doubt in doubts(sensor):
         note(args, f"note: {doubt}")
-    place, kept = Place(follower.first), Kept()
+    place, kept, taken_in, repeated = Place(follower.first), Kept(), 0, 0
     with reading(args.frames), open_lines(args.frames) as lines:
         form: Form | None = None
         for line in lines:
             if not line.strip():
                 continue
             if form is None:
+                line = line.removeprefix(BYTE_ORDER_MARK)
                 form, is_frame = form_like(line)
                 if not is_frame:
                     continue
             taken = take(follower, place, [Line(line, time.perf_counter())], form, kept)
             kept.add(taken)
             place = taken.place
+            taken_in, repeated = taken_in + 1, repeated + taken.repeated
             write_result(taken.answers[0])
             if _SUPPOSES in taken.answers[0]:
                 for supposed in json.loads(taken.answers[0]).get("assumptions", ()):
                     note(args, f"note: {supposed}")
+        if not taken_in:
+            raise no_frame(args.frames.suffix, header=form is not None)
+    if repeated:
+        note(args, f"note: lines whose sequence was answered before: {repeated}")
     if place.errors:
         note(args, f"note: lines that are no frames: {place.errors}; their answers have an `error`")
     if place.misfit:

@@ -4,6 +4,7 @@ import functools
 import json
 import math
 from collections.abc import Mapping, Sequence
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,13 @@ from numpy.typing import NDArray
 from inference.estimates import Status
 from inference.tracking.reasons import REASONS, reason_codes
 from service.problems import describe
+from service.streams.digests import split
 from service.streams.laying import Column, json_of, laid
-from service.streams.lines import lines_in
+from service.streams.lines import Before, lines_in
 from service.streams.said import MARKS, OWN, Said, said_from_bytes
 from simulator.errors import HybridTofError
 
-__all__ = ["answers_in", "encoded", "error_of", "more_of", "text_of"]
+__all__ = ["before_in", "encoded", "error_of", "more_of", "text_of"]
 
 _STATUS = {int(status): status.name.lower().encode() for status in Status}
 _REASON = {
@@ -106,12 +108,17 @@ def more_of(also: Sequence[dict[str, Any] | None] | None) -> tuple[str, ...]:
     return tuple("," + encoded(of)[1:-1].decode() if of else "" for of in also)
 
 
-def answers_in(kept: bytes) -> dict[int, bytes]:
-    """Return answers by their numbers, from what a store keeps of them: numbers, or lines."""
-    if kept.startswith(MARKS):
-        said = said_from_bytes(kept)
-        return dict(zip(said.sequence.tolist(), lines_in(text_of(said)), strict=True))
-    return {orjson.loads(line)["sequence"]: line for line in kept.splitlines()}
+def before_in(kept: bytes) -> dict[int, Before]:
+    """Return what was answered by its numbers, from what a store keeps: numbers, or lines."""
+    answers, digests = split(kept)
+    if answers.startswith(MARKS):
+        said = said_from_bytes(answers)
+        numbers, lines = said.sequence.tolist(), lines_in(text_of(said))
+    else:
+        lines = answers.splitlines()
+        numbers = [orjson.loads(line)["sequence"] for line in lines]
+    before = map(Before, lines, repeat(None) if digests is None else digests)
+    return dict(zip(numbers, before, strict=True))
 
 
 def error_of(error: HybridTofError) -> dict[str, Any]:

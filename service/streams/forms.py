@@ -11,7 +11,7 @@ import orjson
 from service.column_names import NAMES, check_names
 from service.errors import MalformedError
 from service.frame_files import check_separator
-from service.frame_table import value_of_text
+from service.frame_table import no_value, value_of_text
 from service.streams.number_lines import NumberLines, number_lines
 from service.strict_json import MAX_DEPTH, SHORT, decode
 from simulator.errors import InvalidInputError, escape
@@ -161,7 +161,7 @@ class CsvLines:
     """
 
     def __init__(self, header: bytes) -> None:
-        self._names = [name.strip() for name in _fields(header.removeprefix(b"\xef\xbb\xbf"))]
+        self._names = [name.strip() for name in _fields(header)]
         check_separator(self._names)
         check_names([name for name in self._names if name != "sequence"])
 
@@ -175,7 +175,7 @@ class CsvLines:
         for name, cell in zip(self._names, cells, strict=True):
             value = value_of_text(name, cell)
             if value is None and name in NAMES:
-                raise InvalidInputError.at(f"/{name}", f"is {cell.strip()[:40]!r}")
+                raise InvalidInputError.at(f"/{name}", no_value(name, cell))
             if name == "sequence" and isinstance(value, float) and value.is_integer():
                 value = int(value)
             frame[name] = cell if value is None else value

@@ -12,6 +12,7 @@ __all__ = [
     "COUNTS",
     "LARGEST",
     "WINDOW",
+    "Before",
     "Earlier",
     "Line",
     "Place",
@@ -102,11 +103,27 @@ class Place:
     early: Sequence[Sequence[float]] | None = ()
 
 
+class Before(NamedTuple):
+    """What was answered to a number.
+
+    Attributes
+    ----------
+    answer : bytes
+        Without a line end.
+    digest : int or None
+        Of the line (`service.streams.digests`); None where it was answered before digests were
+        kept.
+    """
+
+    answer: bytes
+    digest: int | None
+
+
 class Earlier(Protocol):
     """Answers that were given before, to the last `WINDOW` numbers at least."""
 
-    def answer(self, sequence: int) -> bytes | None:
-        """Return the answer to a number; None where it has none."""
+    def answer(self, sequence: int) -> Before | None:
+        """Return what was answered to a number; None where it has no answer."""
         ...
 
 
@@ -120,7 +137,7 @@ class Taken(NamedTuple):
     text : bytes
         The answers, one a line, each with its end.
     kept : bytes
-        Those that were not given before, as `service.streams.answered.answers_in` reads them.
+        Those that were not given before, as `service.streams.answered.before_in` reads them.
     repeated : int
         How many lines had come before.
     changed : bool

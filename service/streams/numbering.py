@@ -1,11 +1,12 @@
-"""Which number a line has, and what is missing before it."""
+"""Which number a line has, what is missing before it, and what is said where it came before."""
 
 from typing import Any
 
-from service.streams.lines import LARGEST, Line
+from service.errors import ConflictError, GoneError
+from service.streams.lines import LARGEST, WINDOW, Before, Earlier, Line
 from simulator.errors import InvalidInputError
 
-__all__ = ["missing_before", "number_in"]
+__all__ = ["answered_before", "missing_before", "number_in"]
 
 
 def number_in(frame: dict[str, Any], after: int) -> int:
@@ -32,3 +33,36 @@ def missing_before(gap: int, line: Line) -> dict[str, Any]:
     if line.dropped:
         also["dropped"] = line.dropped
     return also
+
+
+def answered_before(found: Earlier | Before, sequence: int, last: int, digest: int) -> bytes:
+    """Return what was answered to a number.
+
+    Parameters
+    ----------
+    found : Earlier or Before
+        What was answered to this number, or to all that came before.
+    sequence, last : int
+        The number, and the last one that was answered before the line came.
+    digest : int
+        Of what the line says.
+
+    Raises
+    ------
+    GoneError
+        Where that is kept no longer.
+    ConflictError
+        Where nothing was answered to it, or what was is no answer to this line.
+    """
+    if sequence <= last - WINDOW:
+        raise GoneError(f"{last} was answered before: answers are kept of {WINDOW} numbers")
+    before = found if isinstance(found, Before) else found.answer(sequence)
+    if before is None:
+        raise ConflictError(f"it comes too late: {last} was answered before")
+    if before.digest not in (None, digest):
+        message = (
+            f"{sequence} was answered to a line with other content: go on counting, or, where the "
+            "counter began anew, make a new stream"
+        )
+        raise ConflictError(message, "/sequence")
+    return before.answer

@@ -15,12 +15,12 @@ from service.border.traces import Traces
 from service.errors import ConflictError, GoneError, NotFoundError, SlowClientError
 from service.store.stream_record import StreamChange, StreamRecord
 from service.store.stream_store import StreamStore
-from service.streams.answered import answers_in
+from service.streams.answered import before_in
 from service.streams.calibrations import Calibrations
 from service.streams.cutting import Cutter
 from service.streams.followers import Calibrating, Follower
 from service.streams.forms import JsonLines
-from service.streams.lines import COUNTS, Place, Taken
+from service.streams.lines import COUNTS, Before, Place, Taken
 from service.streams.model import model_of
 from service.streams.room import Room
 from service.streams.taking import take
@@ -67,14 +67,14 @@ class _Stored:
 
     def __init__(self, store: StreamStore, stream_id: str) -> None:
         self._store, self._id = store, stream_id
-        self._answers: Mapping[int, bytes] | None = None
+        self._answers: Mapping[int, Before] | None = None
 
-    def answer(self, sequence: int) -> bytes | None:
+    def answer(self, sequence: int) -> Before | None:
         """See `Earlier.answer`."""
         if self._answers is None:
-            found: dict[int, bytes] = {}
+            found: dict[int, Before] = {}
             for kept in self._store.answers(self._id):
-                found.update(answers_in(kept))
+                found.update(before_in(kept))
             self._answers = found
         return self._answers.get(sequence)
 

@@ -15,7 +15,16 @@ from simulator.frames import FrameColumns, Frames, frames_from_columns
 from simulator.known_ranges import MAY_BE_NULL
 from simulator.validated import parse
 
-__all__ = ["ANSWERED", "Shape", "frames_of", "of_one_frame", "one_frame", "passes", "shape_of"]
+__all__ = [
+    "ANSWERED",
+    "Shape",
+    "frames_of",
+    "of_one_frame",
+    "one_frame",
+    "passes",
+    "shape_of",
+    "tells",
+]
 
 ANSWERED = frozenset(
     {
@@ -75,6 +84,11 @@ def _kinds_of(column: str) -> Kinds:
 def passes(name: str) -> bool:
     """Tell whether a member is passed through."""
     return name not in ANSWERED and name not in NAMES
+
+
+def tells(name: str) -> bool:
+    """Tell whether the answer to a line depends on a member, beside the number that it states."""
+    return name in NAMES or passes(name)
 
 
 @functools.lru_cache(maxsize=256)

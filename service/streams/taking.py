@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.self_calibration.following import Piece
-from service.errors import BodyTooLargeError, ConflictError, GoneError
+from service.errors import BodyTooLargeError
 from service.streams.answered import encoded, error_of, more_of, text_of
 from service.streams.cutting import LONGEST
+from service.streams.digests import Digests, digests_of, with_digests
 from service.streams.followers import Follower
 from service.streams.forms import Form
-from service.streams.lines import COUNTS, WINDOW, Earlier, Line, Place, Taken, ended, lines_in
-from service.streams.numbering import missing_before, number_in
+from service.streams.lines import COUNTS, Before, Earlier, Line, Place, Taken, ended, lines_in
+from service.streams.numbering import answered_before, missing_before, number_in
 from service.streams.said import Said, said_of, said_to_bytes
 from service.streams.shapes import (
     Shape,
@@ -29,6 +30,7 @@ from service.streams.shapes import (
     one_frame,
     passes,
     shape_of,
+    tells,
 )
 from service.streams.supposing import More, Supposing, told_with
 from service.streams.together import together
@@ -90,7 +92,8 @@ class _Batch:
         self._told = Supposing(place.supposed, place.early)
         self._answers: list[bytes] = []
         self._at: dict[int, int] = {}
-        self._repeats: list[tuple[int, int, int]] = []
+        self._digests: dict[int, int] = {}
+        self._repeats: list[tuple[int, int, int, int]] = []
         self._waiting: list[_Waiting] = []
         self._names: tuple[str, ...] | None = None
         self._shape: Shape | None = None
@@ -98,16 +101,18 @@ class _Batch:
     def take(self, lines: Sequence[Line]) -> Taken:
         found = self._alike(lines)
         if found is not None:
-            text, kept = found
+            text, kept, digests = found
+            kept = with_digests(kept, digests)
             return self._taken(text, text[text.rfind(b"\n", 0, -1) + 1 : -1], kept)
         for line in lines:
             self._take(line)
         self._track()
         new = [self._answers[at] for at in self._at.values()]
-        for at, sequence, last in self._repeats:
-            self._answers[at] = self._said_before(sequence, last)
+        for at, *repeated in self._repeats:
+            self._answers[at] = self._said_before(*repeated)
         last_new = new[-1] if new else self._place.last
-        return self._taken(ended(self._answers), last_new, ended(new))
+        kept = with_digests(ended(new), list(self._digests.values()))
+        return self._taken(ended(self._answers), last_new, kept)
 
     def _taken(self, text: bytes, last: bytes, kept: bytes) -> Taken:
         """Return what has become of the lines."""
@@ -125,8 +130,8 @@ class _Batch:
         )
         return Taken(place, text, kept, len(self._repeats), any(self._counts.values()))
 
-    def _alike(self, lines: Sequence[Line]) -> tuple[bytes, bytes] | None:
-        """Return the answers to lines that are good and alike, and what is kept of them."""
+    def _alike(self, lines: Sequence[Line]) -> tuple[bytes, bytes, Digests] | None:
+        """Return the answers to lines that are good and alike, what is kept, and their digests."""
         if self._alone or not lines:
             return None
         after = max(self._sequence, 0) + 1 + self._unnumbered + lines[0].dropped
@@ -151,7 +156,7 @@ class _Batch:
         more = self._supposing(found.frames, also)
         said = self._say(pieces, found.sequences, found.times, arrivals, more)
         text = b"".join(map(text_of, said))
-        return text, said_to_bytes(said[0]) if len(said) == 1 else text
+        return text, said_to_bytes(said[0]) if len(said) == 1 else text, found.digests
 
     def _take(self, line: Line) -> None:
         """Answer a line, or let it wait for the tracker."""
@@ -170,13 +175,15 @@ class _Batch:
             self._unnumbered += line.dropped + 1
             self._refuse(at, after, error, missing_before(0, line), frame)
             return
+        names = list(filter(tells, frame))
+        (digest,) = digests_of(names, lambda name: [frame[name]], 1).tolist()
         if sequence <= self._sequence:
-            self._repeats.append((at, sequence, self._sequence))
+            self._repeats.append((at, sequence, self._sequence, digest))
             return
         also = missing_before(sequence - after if self._sequence >= 0 else 0, line)
         self._counts["gaps"] += also.get("gap", 0)
         self._sequence, self._unnumbered = sequence, 0
-        self._at[sequence] = at
+        self._at[sequence], self._digests[sequence] = at, digest
         try:
             self._wait(at, sequence, also, line, frame)
         except HybridTofError as error:
@@ -277,15 +284,11 @@ class _Batch:
         self._misfit = bool(track.misfit[-1])
         return said
 
-    def _said_before(self, sequence: int, last: int) -> bytes:
-        """Return what was answered to a number, or that there is nothing to be said of it."""
-        error: HybridTofError
-        if sequence <= last - WINDOW:
-            error = GoneError(f"{last} was answered before: answers are kept of {WINDOW} numbers")
-        else:
-            at = self._at.get(sequence)
-            before = self._earlier.answer(sequence) if at is None else self._answers[at]
-            if before is not None:
-                return before
-            error = ConflictError(f"it comes too late: {last} was answered before")
-        return encoded({"sequence": sequence, "error": error_of(error)})
+    def _said_before(self, sequence: int, last: int, digest: int) -> bytes:
+        """Return what was answered to a number, or why the line has no answer."""
+        at = self._at.get(sequence)
+        own = None if at is None else Before(self._answers[at], self._digests[sequence])
+        try:
+            return answered_before(own or self._earlier, sequence, last, digest)
+        except HybridTofError as error:
+            return encoded({"sequence": sequence, "error": error_of(error)})

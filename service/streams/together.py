@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.tracking.tracker import Tracker
+from service.streams.digests import Digests, digests_of
 from service.streams.forms import Form
 from service.streams.lines import LARGEST, Line
-from service.streams.shapes import frames_of, shape_of
+from service.streams.shapes import frames_of, shape_of, tells
 from simulator.errors import HybridTofError
 from simulator.frames import Frames
 
@@ -38,12 +39,15 @@ class Together(NamedTuple):
         Their times [s].
     passed : list of dict, or None
         What is passed through of each; None where nothing is.
+    digests : ndarray of uint64, shape (n,)
+        Of what they say.
     """
 
     frames: Frames
     sequences: Sequence[int]
     times: NDArray[np.float64]
     passed: list[dict[str, Any] | None] | None
+    digests: Digests
 
 
 def together(
@@ -97,7 +101,8 @@ def together(
     if shape.passed:
         rows = zip(*map(values_of, shape.passed), strict=True)
         passed = [dict(zip(shape.passed, row, strict=True)) for row in rows]
-    return Together(found, sequences, times, passed)
+    digests = digests_of(list(filter(tells, names)), values_of, len(lines))
+    return Together(found, sequences, times, passed, digests)
 
 
 def _alike(form: Form, raws: Sequence[bytes]) -> _Read | None:

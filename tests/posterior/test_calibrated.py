@@ -68,6 +68,7 @@ def test_draws_at_the_end_of_a_support_are_a_law() -> None:
 
 SENSOR = parse_sensor({"kind": "pulsed", "pulse_width_s": 3e-8, "noise": {"read": [1e-4, 1e-4]}})
 CROSSTALK = [{"prior": "halfnormal", "sd": 0.01}, {"prior": "halfnormal", "sd": 0.08}]
+SIZES = {"c0": 0.08, "c1": 0.05, "c2": 0.1}
 WALL = {"strength": {"prior": "lognormal", "median": 0.01, "sigma": 1.0}, "distance_m": 3.0}
 
 
@@ -103,10 +104,24 @@ def test_for_other_objects_nothing_is_kept_of_the_one_that_was_there(stated: Any
 
 
 def test_an_object_that_is_stated_in_numbers_is_no_other() -> None:
-    stated = {"object": {"c0": 0.08, "c1": 0.05, "c2": 0.1}, "crosstalk": CROSSTALK}
+    stated = {"object": SIZES, "crosstalk": CROSSTALK}
     assert learnt_of(stated, False).joint is not None
-    with pytest.raises(RefusedError, match="stated in numbers"):
+    with pytest.raises(RefusedError, match="of a known plate narrow ones") as told:
         learnt_of(stated, True)
+    assert [problem.pointer for problem in told.value.problems] == ["/scene/object"]
+
+
+def test_after_a_known_plate_other_objects_are_stated_in_its_place() -> None:
+    """The priors of the plate are the scene's still; the law stays, whatever takes their place."""
+    plate = {n: {"prior": "lognormal", "median": m, "sigma": 1e-3} for n, m in SIZES.items()}
+    document = learnt_of({"object": plate, "crosstalk": CROSSTALK}, True).model_dump(
+        mode="json", exclude_none=True
+    )
+    assert document.pop("object")["c0"]["sigma"] == 1e-3
+    for other in ({}, {"object": {"c0": 0.02, "c1": 0.01, "c2": 0.04}}):
+        scene = parse_scene(document | other)
+        assert scene.joint is not None
+        assert list(scene.joint.unknowns) == ["crosstalk.w1", "crosstalk.w2"]
 
 
 def test_where_the_object_alone_was_unknown_the_priors_are_left() -> None:

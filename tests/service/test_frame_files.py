@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from service.errors import MalformedError
-from service.frame_files import SUFFIXES, read_frames, write_frames
+from service.frame_files import SUFFIXES, form_of, read_frames, read_table, write_frames
 from simulator.errors import InvalidInputError
 from simulator.frames import frames_from_columns
 from simulator.sensor import parse_sensor
@@ -50,11 +50,6 @@ def test_csv_as_spreadsheets_write_it(tmp_path: Path) -> None:
     assert columns.object_present == [True, False]
 
 
-def test_integers(tmp_path: Path) -> None:
-    assert read(tmp_path, ".ndjson", '{"w1": 1, "w2": 2}\n\n{"w2": 3, "w1": 4}').w2 == [2, 3]
-    assert read(tmp_path, ".json", '{"w1": [1], "w2": [2]}').w1 == [1]
-
-
 NULLS = {
     ".csv": "w1,w2,known_range_m,known_range_sd_m\n1,2,0.5,1e-3\n1,2,,\n1,2, nan ,0.1\n",
     ".ndjson": '{"w1":1,"w2":2,"known_range_m":0.5,"known_range_sd_m":1e-3}\n'
@@ -63,6 +58,82 @@ NULLS = {
     ".json": '{"w1":[1,1,1],"w2":[2,2,2],"known_range_m":[0.5,null,null],'
     '"known_range_sd_m":[1e-3,null,0.1]}',
 }
+
+
+@pytest.mark.parametrize("suffix", NULLS)
+def test_a_byte_order_mark_is_no_text(tmp_path: Path, suffix: str) -> None:
+    raw = b"\xef\xbb\xbf" + NULLS[suffix].encode()
+    assert read(tmp_path, suffix, raw) == read(tmp_path, suffix, NULLS[suffix])
+    assert form_of(raw) == suffix
+
+
+@pytest.mark.parametrize(
+    ("cell", "hint"),
+    [
+        ("1,5", "'1,5': write a point for the decimal comma"),
+        ("0,024", "'0,024': write a point for the decimal comma"),
+        # a factor of a thousand, or of one
+        ("-1,024", "'-1,024': write no separators of thousands, and a point for a decimal comma"),
+        ("1,024,000", "'1,024,000': write no separators of thousands"),
+        ("1,024.5", "'1,024.5': write no separators of thousands"),
+        ("1,2,3", "'1,2,3'"),
+    ],
+)
+def test_a_comma_in_a_number_has_a_remedy(tmp_path: Path, cell: str, hint: str) -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        read(tmp_path, ".csv", f'w1,w2\n1,"{cell}"\n')
+    assert caught.value.problems[0].message == f"line 2: must be a finite number, is {hint}"
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("time_ms", "time_s? Convert milliseconds to seconds."),
+        ("t_us", "time_s? Convert microseconds to seconds."),
+        ("tns", "time_s? Convert nanoseconds to seconds."),
+        ("timestamp_ms", "time_s? Convert milliseconds to seconds."),
+        ("Time (ms)", "time_s? Convert milliseconds to seconds."),
+        ("known_range_mm", "known_range_m or known_range_sd_m? Convert millimetres to metres."),
+        ("displacement_cm", "displacement_m or displacement_sd_m? Convert centimetres to metres."),
+        ("Time_s", "time_s?"),
+        ("times", "time_s?"),
+        ("time", "time_s?"),
+        ("W1", "w1?"),
+    ],
+)
+def test_a_name_with_another_unit_says_what_to_convert(
+    tmp_path: Path, name: str, hint: str
+) -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        read(tmp_path, ".csv", f"{name},w2\n1,2\n")
+    (problem,) = caught.value.problems
+    assert problem.pointer == f"/{name}"
+    assert problem.message.startswith(f"is not a column: did you mean {hint} The columns are")
+
+
+def test_the_clock_of_something_else_stands_beside_the_times() -> None:
+    text = b"timestamp_ms,time_s,w1,w2\n5,1,1,2\n"
+    assert read_table(text, ".csv").ignored == ("timestamp_ms",)
+
+
+def test_a_column_without_a_name_says_so(tmp_path: Path) -> None:
+    for header, row in ((",w1,w2", "0,1,2"), ("w1,,w2,", "1,,2,")):
+        with pytest.raises(InvalidInputError) as caught:
+            read(tmp_path, ".csv", f"{header}\n{row}\n")
+        (problem,) = caught.value.problems
+        assert "a column without a name" in problem.message
+        assert "index=False" in problem.message
+
+
+@pytest.mark.parametrize("separator", ",;")
+def test_a_line_for_spreadsheets_is_to_be_removed(tmp_path: Path, separator: str) -> None:
+    with pytest.raises(InvalidInputError, match=r"remove the line sep=$"):
+        read(tmp_path, ".csv", f"sep={separator}\nw1,w2\n1,2\n")
+
+
+def test_integers(tmp_path: Path) -> None:
+    assert read(tmp_path, ".ndjson", '{"w1": 1, "w2": 2}\n\n{"w2": 3, "w1": 4}').w2 == [2, 3]
+    assert read(tmp_path, ".json", '{"w1": [1], "w2": [2]}').w1 == [1]
 
 
 @pytest.mark.parametrize("suffix", NULLS)

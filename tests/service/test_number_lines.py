@@ -16,7 +16,7 @@ from inference.estimates import Status
 from inference.tracking.reasons import REASONS, reason_codes
 from service.errors import MalformedError
 from service.streams import laying
-from service.streams.answered import answers_in, more_of, text_of
+from service.streams.answered import before_in, more_of, text_of
 from service.streams.forms import JsonLines
 from service.streams.number_lines import number_lines
 from service.streams.said import OWN, Said, said_from_bytes, said_to_bytes
@@ -145,9 +145,9 @@ def test_a_batch_of_answers_is_an_object_a_frame(said: Said) -> None:
     assert [json.loads(line)["sequence"] for line in lines] == said.sequence.tolist()
     kept = said_to_bytes(said)
     assert text_of(said_from_bytes(kept)) == text_of(said)
-    assert list(answers_in(kept).values()) == lines
+    assert [of.answer for of in before_in(kept).values()] == lines
     # as it was written before: all numbers of the table
     text = "\n".join(said.more).encode()
     head = struct.pack("<cIIQ", b"\0", len(lines), len(said.table), len(text))
     before = b"".join([head, *(array.tobytes() for array in said[:-1]), text])
-    assert list(answers_in(before).values()) == lines
+    assert [of.answer for of in before_in(before).values()] == lines

@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 from inference.tracking.tracker import Tracker, tracker
 from service.errors import MalformedError
 from service.streams import room
-from service.streams.answered import answers_in
+from service.streams.answered import before_in
 from service.streams.cutting import LONGEST, Cutter
+from service.streams.digests import split
 from service.streams.followers import Plain
 from service.streams.forms import JsonLines
 from service.streams.kept import Kept
@@ -54,7 +55,7 @@ def answered(model: Tracker, batches: Sequence[Sequence[bytes | None]]) -> list[
 
 LINES = [
     frame(1, stamp={"sec": 1}), frame(2), b"junk", frame(3), frame(1), None, frame(5),
-    frame(6, sequence=20), frame(7, sequence=20), frame(7, sequence=3), frame(7, sequence=15),
+    frame(6, sequence=20), frame(6, sequence=20), frame(7, sequence=3), frame(7, sequence=15),
     frame(7, gain=2.0), frame(8, gain=0.0), frame(9, gain=1.0), frame(10, object_present=False),
     frame(11, w1=None), b"[1]", frame(12, w1=1), frame(12, sequence=-1), frame(13, w3=1.0),
 ]  # fmt: skip
@@ -304,9 +305,9 @@ def test_kept_numbers_are_the_same_answers(model: Tracker) -> None:
     lines = [frame(n, stamp=None if n % 2 else {"at": "ä\n"}) for n in range(1, 40)]
     batch = [Line(raw, time.perf_counter()) for raw in lines]
     taken = take(Plain(model), Place(model.first), batch, JsonLines(), Kept())
-    assert taken.kept.startswith(MARKS)
-    assert list(answers_in(taken.kept).values()) == taken.answers
-    assert list(answers_in(taken.kept)) == list(range(1, 40))
+    assert split(taken.kept)[0].startswith(MARKS)
+    assert [of.answer for of in before_in(taken.kept).values()] == taken.answers
+    assert list(before_in(taken.kept)) == list(range(1, 40))
     plain = [Line(frame(n), 0.0) for n in range(1, 40)]
     small = take(Plain(model), Place(model.first), plain, JsonLines(), Kept())
     assert 2 * len(small.kept) < sum(map(len, small.answers))

@@ -122,6 +122,51 @@ def test_a_stream_without_a_frame_is_bad_input(
     assert answers(said)[0]["error"]["pointer"] == "/time_s"
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        ("e.csv", "", "the file is empty; its first line must name the columns"),
+        ("b.csv", "\n\n", "the file is empty; its first line must name the columns"),
+        ("h.csv", "time_s,w1,w2\n", "the file holds no frame"),
+        ("e.ndjson", "", "the file holds no frame"),
+        ("e.json", '{"time_s": [], "w1": [], "w2": []}', "the file holds no frame"),
+    ],
+)
+def test_a_file_without_a_frame_is_no_answer(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path, name: str, content: str,
+    reason: str,
+) -> None:  # fmt: skip
+    path = written(tmp_path / name, content)
+    said = Said(capsys, "track", path, "--scene", scene)
+    assert (said.code, said.out, said.err) == (2, "", f"hybridtof: error: {path}: {reason}\n")
+
+
+def test_nothing_on_standard_input_is_no_answer(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scene: Path
+) -> None:
+    given(monkeypatch, "")
+    said = Said(capsys, "track", "-", "--scene", scene)
+    assert (said.code, said.out) == (2, "")
+    assert "standard input: the file is empty" in said.err
+
+
+def test_lines_begin_with_a_byte_order_mark_and_count_anew(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, scene: Path
+) -> None:
+    """As spreadsheets write files, and as two logs in one file do."""
+    rows = [(1, 0.1, 0.003866), (2, 0.2, 0.003866), (1, 0.3, 0.004), (2, 0.2, 0.003866)]
+    lines = [f'{{"sequence": {n}, "time_s": {t}, "w1": {w}, "w2": 0.1159}}' for n, t, w in rows]
+    cells = [f"{n},{t},{w},0.1159" for n, t, w in rows]
+    for name, text in (("f.ndjson", lines), ("f.csv", ["sequence,time_s,w1,w2", *cells])):
+        path = written(tmp_path / name, "\ufeff" + "\n".join(text))
+        said = Said(capsys, "track", path, "--scene", scene)
+        first, second, other, same = answers(said)
+        assert "error" not in first
+        assert other["error"]["pointer"] == "/sequence"
+        assert same == second
+        assert "note: lines whose sequence was answered before: 2" in said.err
+
+
 def test_settings_of_the_tracker(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     frames = written(tmp_path / "f.csv", CSV)
     system = {"sensor": SENSOR, "scene": SCENE, "tracking": {"hypotheses": 1}}
