@@ -123,7 +123,9 @@ def test_a_prior_of_the_crosstalk_counts_as_noise() -> None:
     """Crosstalk three standard deviations of its prior away lies within it, swapped it does not."""
     y = drawn(np.random.default_rng(11), pulse(RANGES))
     away = [{"prior": "normal", "mean": m + 3 * 0.002, "sd": 0.002} for m in CROSSTALK]
-    assert said(y, {"crosstalk": away}) is None
+    dark = drawn(np.random.default_rng(15), np.zeros((30, 2)))
+    assert said(y, {"crosstalk": away}) is said(dark, {"crosstalk": away}) is None
+    assert said(dark, {"crosstalk": [law["mean"] for law in away]}) is not None
     sharp = [{"prior": "normal", "mean": m, "sd": 0.002} for m in CROSSTALK[::-1]]
     assert "w1 below zero" in str(said(y, {"crosstalk": sharp}))
     assert said(y, {"crosstalk": {"optional": True, "values": [0.05, 0.004]}}) is None
