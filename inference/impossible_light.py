@@ -18,7 +18,8 @@ from inference.stated_light import stated_light
 from simulator.compiled import compiled
 from simulator.errors import RefusedError
 from simulator.frames import Frames
-from simulator.joint_scene import around, centre
+from simulator.joint_scene import centre
+from simulator.parameters import parameters_of
 from simulator.scene import Scene
 from simulator.sensor import PulsedSensor, Sensor
 
@@ -31,6 +32,7 @@ Pair = tuple[float, float]
 _FALSE_ALARM = 1e-6
 _LEAST = 6.0  # standard deviations, and more where so many frames ask for it
 _ROUNDINGS = 8 * float(np.finfo(float).eps)
+_TAILS = (1.0, 2.0, 3.0, 4.0)  # standard deviations at which the width of a law is looked at
 _KINDS = ("w1 below zero", "w2 below zero", "w1 above w2")
 
 
@@ -100,14 +102,19 @@ def _crosstalk(scene: Scene, sensor: Sensor) -> _Crosstalk | None:
 
 
 def _with_law(sensor: Sensor, scene: Scene, sd: Pair) -> Pair:
-    """Add what a joint law leaves open of the crosstalk."""
-    first, second = sd
-    for plus, minus in around(sensor, scene):
-        ends = [known_of(at, of).crosstalk for of, at in (plus, minus)]
-        if ends[0] is not None and ends[1] is not None:
-            first = math.hypot(first, 0.5 * (ends[0][0] - ends[1][0]))
-            second = math.hypot(second, 0.5 * (ends[0][1] - ends[1][1]))
-    return first, second
+    """Add what a joint law leaves open of the crosstalk: as wide as its tails are."""
+    assert scene.joint is not None  # noqa: S101  # see above
+    parameters = parameters_of(sensor, scene)
+    names = parameters.names
+    directions = np.eye(len(names))[[names.index(name) for name in scene.joint.unknowns]]
+    middle = parameters.natural(np.zeros((1, len(names))))
+    reach = np.zeros((len(directions), len(names)))
+    for times in (*_TAILS, *(-times for times in _TAILS)):
+        moved = np.abs(parameters.natural(times * directions) - middle)
+        reach = np.maximum(reach, moved / abs(times))
+    whole = dict(zip(names, np.hypot.reduce(reach, axis=0).tolist(), strict=True))
+    first, second = (whole.get(f"crosstalk.{column}", 0.0) for column in sensor.columns)
+    return math.hypot(sd[0], first), math.hypot(sd[1], second)
 
 
 def _beyond(scene: Scene, sensor: PulsedSensor, readings: Array, crosstalk: _Crosstalk) -> Array:

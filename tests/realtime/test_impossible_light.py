@@ -126,6 +126,14 @@ def test_a_prior_of_the_crosstalk_counts_as_noise() -> None:
     dark = drawn(np.random.default_rng(15), np.zeros((30, 2)))
     assert said(y, {"crosstalk": away}) is said(dark, {"crosstalk": away}) is None
     assert said(dark, {"crosstalk": [law["mean"] for law in away]}) is not None
+    # a joint law in its place, of a lognormal law with long tails
+    long = {"prior": "lognormal", "median": 0.02, "sigma": 1.0}
+    mode = {"weight": 1.0, "mean": [0.0], "covariance": [[1.0]]}
+    law = {"unknowns": ["crosstalk.w2"], "modes": [mode]}
+    joint = {"crosstalk": [CROSSTALK[0], long], "joint": law}
+    assert said(dark + np.array([0.0, 0.02 * np.exp(-4.0) - 0.05]), joint) is None
+    mode["covariance"] = [[1e-4]]
+    assert "w2 below zero" in str(said(dark - np.array([0.0, 0.05]), joint))
     sharp = [{"prior": "normal", "mean": m, "sd": 0.002} for m in CROSSTALK[::-1]]
     assert "w1 below zero" in str(said(y, {"crosstalk": sharp}))
     assert said(y, {"crosstalk": {"optional": True, "values": [0.05, 0.004]}}) is None
