@@ -118,14 +118,16 @@ def _phase(x: Array, y: Array, offset: float) -> Array:
     return phase
 
 
-def _beside_zero(net: Net, phase: float) -> NDArray[np.bool_]:
-    """Tell whether noise may have brought a signal across a phase, which lies about its own."""
+def _beside_zero(net: Net, phase: float, error: float) -> NDArray[np.bool_]:
+    """Tell whether errors may have brought a signal across a phase, which lies about its own.
+
+    Those of noise, and a standard deviation of the phase itself [rad].
+    """
     cosine, sine = math.cos(phase), math.sin(phase)
     along = cosine * net.first + sine * net.second
     across = cosine * net.second - sine * net.first
-    return np.asarray(
-        (along > 0) & (np.abs(across) < END_BAND * np.sqrt(net.variance(-sine, cosine)))
-    )
+    sd = np.hypot(np.sqrt(net.variance(-sine, cosine)), along * error)
+    return np.asarray((along > 0) & (np.abs(across) < END_BAND * sd))
 
 
 def _same(value: float, n: int) -> Array:
@@ -208,11 +210,14 @@ def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
         sd = np.sqrt(net.variance(-net.second / safe / safe, net.first / safe / safe))
         turned = phase_reach(phase, sd, net, safe, 2 * np.pi)
         # a range that the scene allows lies within the noise of zero, or this is the far end
-        beside = _beside_zero(net, sensor.known_phase_rad + k * support[0])
-        contact = ((phase > np.pi) & beside) | (phase == 0.0)
-        usable = (modulus > 0) & np.isfinite(modulus)
         turn, turns = sensor.max_range_m, 1
         several = several_turns(sensor, task.known, turn)
+        # of one turn noise alone is asked
+        beside = _beside_zero(
+            net, sensor.known_phase_rad + k * support[0], k * error if several else 0.0
+        )
+        contact = ((phase > np.pi) & beside) | (phase == 0.0)
+        usable = (modulus > 0) & np.isfinite(modulus)
         if task.physical and not several:
             usable &= ~contact
         high = turns_to(task, turn)
