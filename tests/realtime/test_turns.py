@@ -231,7 +231,8 @@ def test_a_phase_below_zero_is_at_contact_or_a_turn_away() -> None:
     np.testing.assert_allclose(told.roots_m[0, 1], TURN, rtol=0.01)
     assert estimate(sensor, parse_scene({}), frames).results[0].status[0] == Status.NONE
     # noise is nothing there, and the effective distance errs by 0.8 mm
-    bright = columns(1e6 * np.exp(1j * WAVE * np.array([-1e-3, -8e-3])))
+    nearer = WAVE * np.array([-1e-3, -8e-3])
+    bright = 1e6 * np.column_stack([np.cos(nearer), np.sin(nearer)])
     scene = parse_scene(uniform(0.0, 14.0))
     told = estimate(sensor, scene, Frames(bright)).results[0]
     assert told.status.tolist() == [Status.AMBIGUOUS, Status.UNIQUE]
