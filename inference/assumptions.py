@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from inference.empty_scatter import scatter_of_empty
 from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK, taken_for_crosstalk
+from inference.impossible_light import impossible_light
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import PulsedSensor, Sensor
@@ -43,7 +44,11 @@ def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, .
         For a person; empty where everything is either stated in numbers or unknown, and nothing
         looks like a mistake.
     """
-    supposed = (_OWN_SHADOW,) if scene.shadow_is_object else ()
+    supposed: tuple[str, ...] = ()
+    if doubt := impossible_light(scene, sensor, frames):
+        supposed = (doubt,)
+    if scene.shadow_is_object:
+        supposed = (*supposed, _OWN_SHADOW)
     if sensor.temperature is None and frames.temperature_k is not None:
         supposed = (*supposed, _TEMPERATURE)
     if frames.temperature_k is not None and (doubt := _doubtful_temperature(frames.temperature_k)):

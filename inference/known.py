@@ -9,6 +9,10 @@ from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = ["Known", "known_of"]
 
+# standard deviations, of a normal law, at which ranges end whose law has none: as
+# inference.realtime.assemble takes an end of all ranges
+_ENDLESS = 4.5
+
 
 @dataclasses.dataclass(frozen=True)
 class Known:
@@ -24,11 +28,16 @@ class Known:
     support : (float, float)
         Where the scene's ``range_m`` has mass [m]; (0, inf) where it is not given. Of a pulse with
         a timing offset, where the late window is neither empty nor the whole pulse as well.
+    stated_end_m : float or None
+        Up to where ranges are to be expected that differ by whole turns of phase [m]: the end of
+        the stated ``range_m``, and of a law without an end what one range of 300,000 is beyond.
+        None where it is not given.
     """
 
     numbers: dict[str, float]
     crosstalk: tuple[float, float] | None
     support: tuple[float, float]
+    stated_end_m: float | None
 
     def get(self, path: str) -> float:
         """Return a known number."""
@@ -79,13 +88,15 @@ def known_of(scene: Scene, sensor: Sensor | None = None) -> Known:
             crosstalk = (float(first), float(second))
         if "crosstalk" in scene.optional_terms:
             crosstalk = None
-    support = (0.0, math.inf)
+    support, end = (0.0, math.inf), None
     if isinstance(scene.range_m, Stroke | Reference):
         support = (scene.range_m.low, scene.range_m.high)
+        end = support[1]
     elif scene.range_m is not None:
         distribution = scene.range_m.distribution()
         support = (max(distribution.low, 0.0), distribution.high)
+        end = support[1] if support[1] < math.inf else float(distribution.from_normal(_ENDLESS))
     if isinstance(sensor, PulsedSensor) and isinstance(sensor.timing_offset_s, float | int):
         shift = sensor.known_shift_m
         support = (max(support[0], -shift), min(support[1], sensor.r0 - shift))
-    return Known(numbers, crosstalk, support)
+    return Known(numbers, crosstalk, support, end)

@@ -9,6 +9,7 @@ import numpy as np
 from inference.estimates import LeftOut
 from inference.known import Known, known_of
 from inference.realtime.registry import TECHNIQUES as REALTIME
+from inference.realtime.turns import MOST_HALF_TURNS, half_turns, several_turns
 from inference.technique import Technique
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.errors import listed
@@ -21,11 +22,14 @@ from simulator.sensor_unknowns import DRIFTS, GAIN
 
 __all__ = ["Plan", "asked_with", "cheapest", "obstacle", "plan"]
 
-_MOST_HALF_TURNS = 1000.0  # of phase to the background, each of which may hold a root
 _OF_GAIN = (GAIN, DRIFTS[0])
 # yields to the other where this has one root: its intervals are three times as wide, of a wall's
 # shadow, and the other takes next to as long (python -m benchmarks.flat_wall)
 _WIDE, _SHARP = "background_intensity", "background_cancelling"
+# yields to the other where the stated ranges hold several turns of phase, which the other tells
+_PHASE, _AMOUNT = "conventional", "intensity"
+_SHAPE = ("object.c0", "object.c1")
+_ONE_ROOT = -math.sqrt(32.0 / 9.0)  # of sqrt(c0), from which on light falls with range
 _FEW = 1000  # frames whose estimates take no longer than their plan
 
 
@@ -94,11 +98,13 @@ def obstacle(
         return "is not immune to the scene's background"
     elif isinstance(sensor, SineWaveSensor) and technique.uses_background:
         turns = _half_turns(sensor, scene)
-        if turns > _MOST_HALF_TURNS:
+        if turns > MOST_HALF_TURNS:
             return (
                 f"the background lies {turns:.3g} half turns of phase away, and a frame may have "
                 "as many roots; a lower frequency would tell them apart"
             )
+    if (of_turns := _turns_obstacle(technique, sensor, known)) is not None:
+        return of_turns
     of_sensor = _sensor_obstacle(technique, sensor, scene, known)
     if of_sensor is not None:
         return of_sensor
@@ -108,6 +114,25 @@ def obstacle(
     if technique.obstacle is not None:
         return technique.obstacle(sensor, scene, known, frames)
     return None
+
+
+def _turns_obstacle(technique: Technique, sensor: Sensor, known: Known) -> str | None:
+    """Return why a technique cannot serve ranges of several turns of phase, None if it can."""
+    if not several_turns(sensor, known, sensor.max_range_m):
+        return None
+    if technique.name not in REALTIME:
+        return (
+            f"the stated range_m goes on beyond {sensor.max_range_m:.4g} m, where the phase begins "
+            "anew, and fits over many frames end there; a posterior of these frames does not"
+        )
+    turns = half_turns(sensor, known)
+    # the amount of light has no turns, and a wall ends what it serves
+    if technique.name == _AMOUNT or technique.uses_background or turns <= MOST_HALF_TURNS:
+        return None
+    return (
+        f"the stated range_m holds {turns:.3g} half turns of phase, and a frame may have as many "
+        "roots; narrow it, or take a lower frequency"
+    )
 
 
 def _sensor_obstacle(
@@ -153,12 +178,25 @@ def cheapest(names: Iterable[str], sensor: Sensor, scene: Scene) -> str | None:
         Techniques by name.
     sensor, scene : Sensor, Scene
         The request: `background_cancelling` has one root where a background lies no farther than
-        half a turn of phase, and then goes before `background_intensity`.
+        half a turn of phase, and then goes before `background_intensity`. `intensity` goes before
+        `conventional` where that has a root in several turns.
     """
     left = set(names)
     if _SHARP in left and _half_turns(sensor, scene) <= 1.0:
         left.discard(_WIDE)
+    if _AMOUNT in left and _amount_tells_turns(sensor, scene):
+        left.discard(_PHASE)
     return min(left, key=lambda name: ALL_TECHNIQUES[name].cost, default=None)
+
+
+def _amount_tells_turns(sensor: Sensor, scene: Scene) -> bool:
+    """Tell whether the light of a known object is of one range, and its phase is of several."""
+    of, stated = centre(sensor, scene)
+    known = known_of(stated, of)
+    if not (several_turns(of, known, of.max_range_m) and known.has(*_SHAPE)):
+        return False
+    c0, c1 = (known.get(path) for path in _SHAPE)
+    return c1 >= _ONE_ROOT * math.sqrt(c0)
 
 
 def _half_turns(sensor: Sensor, scene: Scene) -> float:
@@ -221,5 +259,9 @@ def _planned(sensor: Sensor, scene: Scene, frames: Frames | None) -> Plan:
 
 
 def _served_better(name: str, chosen: str | None) -> str:
-    sharper = (name, chosen) == (_WIDE, _SHARP)
-    return f"{chosen} serves the scene {'with less error' if sharper else 'at less cost'}"
+    how = "at less cost"
+    if (name, chosen) == (_WIDE, _SHARP):
+        how = "with less error"
+    elif (name, chosen) == (_PHASE, _AMOUNT):
+        how = "and tells the turns of phase"
+    return f"{chosen} serves the scene {how}"

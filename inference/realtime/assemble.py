@@ -1,6 +1,7 @@
 """From candidate roots to a result: filter, sort, status, reason, standard deviation."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ __all__ = [
     "assemble",
     "reasons_of",
     "up_to_wall",
+    "with_place",
 ]
 
 Array = NDArray[np.float64]
@@ -130,6 +132,37 @@ def up_to_wall(candidates: Candidates, wall_m: float, bare: Flags) -> Candidates
     return dataclasses.replace(candidates, near_frame=frames)
 
 
+def with_place(candidates: Candidates, frames: Flags, place_m: float) -> Candidates:
+    """Add a place at which an object may be whose root noise has moved away, as a fold's is.
+
+    Parameters
+    ----------
+    candidates : Candidates
+        The other solutions: alone such a place is no answer.
+    frames : ndarray of bool, shape (n,)
+        In which of them.
+    place_m : float
+        The place [m].
+    """
+    if not frames.any():
+        return candidates
+    n = frames.size
+
+    def beside(columns: NDArray[Any] | None, column: NDArray[Any]) -> NDArray[Any]:
+        first = np.zeros(candidates.roots.shape, column.dtype) if columns is None else columns
+        return np.column_stack([np.broadcast_to(first, candidates.roots.shape), column])
+
+    model = candidates.model
+    return Candidates(
+        roots=beside(candidates.roots, np.where(frames, place_m, np.nan)),
+        noise=beside(candidates.noise, np.full(n, np.nan)),
+        near=beside(candidates.near, frames),
+        near_frame=candidates.near_frame,
+        model=None if model is None else beside(model, np.zeros(n)),
+        merged=beside(candidates.merged, frames),
+    )
+
+
 def _moved_back(
     candidates: Candidates, outside: Flags, support: tuple[float, float]
 ) -> tuple[Array, Flags]:
@@ -142,7 +175,7 @@ def _moved_back(
     sd = candidates.noise
     if candidates.model is not None:
         sd = np.hypot(sd, candidates.model)
-    moved = outside & (np.abs(candidates.roots - ends) < NOISE_BAND * sd)
+    moved = outside & (np.abs(candidates.roots - ends) < END_BAND * sd)
     for end in support:
         here = moved & (ends == end)
         moved &= ~here | (np.cumsum(here, axis=1) == 1)

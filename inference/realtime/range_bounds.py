@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from inference.realtime.assemble import NOISE_BAND
 from inference.realtime.net import Net
 from inference.realtime.solving.ratio_reach import ratio_ends
+from inference.realtime.turns import several_turns
 from inference.technique import Task
 from simulator.sensor import PulsedSensor
 
@@ -46,7 +47,7 @@ def bounds_of(
     target: tuple[Array, Array, Array],
     rate: Net,
     contact: NDArray[np.bool_],
-    high: float,
+    turn: float,
 ) -> Bounds:
     """Bound the ranges of objects whose zeta lies within `_LEAST` and `_MOST`, noise included.
 
@@ -61,15 +62,18 @@ def bounds_of(
         Derivatives, with noise and bias.
     contact : ndarray of bool, shape (n,)
         Which are at contact as far as their noise tells.
-    high : float
-        Farthest range that derivatives tell [m].
+    turn : float
+        Farthest range that derivatives tell, of a sine wave that after which they begin anew [m].
 
     Returns
     -------
     Bounds
-        Of the ranges that `_COVERED` standard deviations of noise leave.
+        Of the ranges that `_COVERED` standard deviations of noise leave; of several turns from the
+        first to the last.
     """
     top, bottom, sd = target
+    several = task.high_m is None and several_turns(task.sensor, task.known, turn)
+    high = turn if task.high_m is None else task.high_m
     with np.errstate(all="ignore"):
         q = top / bottom
         if isinstance(task.sensor, PulsedSensor):
@@ -88,10 +92,21 @@ def bounds_of(
             any_way = NOISE_BAND * sd >= np.maximum(q, np.pi - q) * (1.0 - 1e-9)
             low, up = np.where(any_way, 0.0, low), np.where(any_way, np.pi, up)
             near = _turn_of(low, 1.0 / (1.0 - _MOST)) / k
-            far = np.where(up < np.pi, _turn_of(up, 1.0 / (1.0 - _LEAST)) / k, np.inf)
+            if several:
+                assert task.known.stated_end_m is not None  # noqa: S101  # it holds them
+                high = task.known.stated_end_m
+                # the phase of a derivative lies behind that of its range, by less than a quarter
+                least = np.where(any_way, 0.0, q - spread)
+                last = np.maximum(np.floor((k * high - least) / np.pi), 0.0)
+                beyond = _turn_of(least + np.pi * last, 1.0 / (1.0 - _MOST)) > k * high
+                last -= beyond & (last > 0)
+                far = _turn_of(up + np.pi * last, 1.0 / (1.0 - _LEAST)) / k
+                near = np.where(contact, 0.0, near)
+            else:
+                far = np.where(up < np.pi, _turn_of(up, 1.0 / (1.0 - _LEAST)) / k, np.inf)
         far = np.minimum(far, high)
         good = (q > 0) & (near <= far)
-        if task.physical:
+        if task.physical and not several:
             good &= ~contact
         nothing = good & (near <= 0) & (far >= high)
         good &= ~nothing

@@ -4,7 +4,9 @@ import math
 
 from inference.realtime.assemble import END_BAND
 from inference.realtime.solving.ratio_reach import FEW
+from inference.realtime.turns import several_turns
 from service.c_export.source import Asked, Bound, Exported, noise_lines
+from simulator.errors import Problem, RefusedError
 from simulator.sensor import PulsedSensor
 
 __all__ = ["conventional"]
@@ -107,6 +109,12 @@ static int answer(real first, real second, @_answer *out)
 def conventional(asked: Asked) -> Exported:
     """Write the conventional range; see `service.c_export.export_c`."""
     sensor, (low, high) = asked.sensor, asked.known.support
+    if several_turns(sensor, asked.known, sensor.max_range_m):
+        raise RefusedError(
+            f"conventional: the stated range_m goes on beyond {sensor.max_range_m:.4g} m, where "
+            "the phase begins anew, and the export gives one range a frame; narrow it",
+            Problem("/scene/range_m", "holds several turns of phase"),
+        )
     assert asked.known.crosstalk is not None  # noqa: S101  # what the plan leaves out
     first, second = asked.known.crosstalk
     read = sensor.noise.read

@@ -9,6 +9,7 @@ import numpy as np
 
 from inference.estimates import Status, TechniqueResult
 from inference.known import Known
+from inference.realtime.turns import several_turns
 from inference.technique import Technique
 from simulator.sensor import Sensor
 
@@ -95,7 +96,11 @@ def limits_of(technique: Technique, sensor: Sensor, known: Known) -> Limits:
         Of the scene: where its ranges are, and its background.
     """
     low, high = known.support
-    high = min(high, technique.farthest_m(sensor))
+    turn = technique.farthest_m(sensor)
+    end = known.stated_end_m
+    if end is not None and several_turns(sensor, known, turn):
+        turn = end
+    high = min(high, turn)
     if technique.uses_background and known.has("background.distance_m"):
         high = min(high, known.get("background.distance_m"))
     return low, high

@@ -39,7 +39,7 @@ WAVE = {
 OBJECT = {"c0": 0.08, "c1": -0.1, "c2": 0.1}
 FAR = {"strength": {"prior": "lognormal", "median": 0.01, "sigma": 0.3}, "distance_m": 5.0}
 CROSSTALK = [0.004, 0.02]
-BEYOND = {"prior": "uniform", "low": 1.0, "high": 20.0}
+BEYOND = {"prior": "uniform", "low": 1.0, "high": 7.4}
 
 # technique, sensor, scene; ranges of each lie in what the scene states
 CASES: dict[str, tuple[str, Any, Any]] = {

@@ -26,6 +26,7 @@ def noise_of(noise: float) -> dict[str, list[float]]:
 
 
 SINE_WAVE_NUMBER = 4.0 * math.pi * 2e7 / 299792458.0
+TURN = 2 * math.pi / SINE_WAVE_NUMBER  # to which ranges are told apart
 
 
 def reason_of(result: TechniqueResult, i: int = 0) -> str:
@@ -69,11 +70,11 @@ def test_a_phase_just_below_zero_is_contact() -> None:
     ("phase", "low", "high", "root", "words"),
     [
         (-2e-6, 0.0, 5.0, False, "at or near contact"),
-        (-2e-6, 0.0, 20.0, False, "at or near contact, or at the end of the unambiguous range"),
-        (-2e-6, 1.0, 20.0, True, ""),
+        (-2e-6, 0.0, TURN, False, "at or near contact, or at the end of the unambiguous range"),
+        (-2e-6, 1.0, TURN, True, ""),
         # a nearest range that is not zero, and lies within the noise of the phase too
-        (-2e-6, 3e-7 / SINE_WAVE_NUMBER, 20.0, False, "or at the end of the unambiguous range"),
-        (2e-6, 1.0, 20.0, False, "every solution lies outside the ranges of the scene"),
+        (-2e-6, 3e-7 / SINE_WAVE_NUMBER, TURN, False, "or at the end of the unambiguous range"),
+        (2e-6, 1.0, TURN, False, "every solution lies outside the ranges of the scene"),
     ],
 )
 def test_a_phase_below_zero_is_contact_only_where_the_scene_allows_it(

@@ -243,6 +243,11 @@ def explain(flat: Array, pulse: Pulse, codes: Codes, columns: Columns) -> None:
                 reason[i] = codes.negative
         elif late <= 0.0:
             reason[i] = codes.contact
+            # so near the error of the effective distance counts as noise does
+            moved = whole * (pulse.error / pulse.r0)
+            spread = read1 * read1 + pulse.shot * abs(raw1) + moved * moved
+            if -late > CONTRADICTED * math.sqrt(spread):
+                reason[i] = codes.negative
         elif late > whole:
             reason[i] = codes.beyond
             # photons that are late are part of all, and cancel: this is their most

@@ -10,10 +10,12 @@ from inference.realtime.model_error import model_error_of
 from inference.realtime.motion import law_of_model
 from inference.realtime.solving.curves import both_phase, both_ratio
 from inference.realtime.techniques.differential import (
+    at_contact,
     farthest_by_derivatives,
     target_of,
     with_law,
 )
+from inference.realtime.turns import turns_to
 from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor
 
@@ -34,7 +36,8 @@ def _solve(task: Task) -> TechniqueResult:
     sensor, known = task.sensor, task.known
     rate = derivatives_of(sensor, known.crosstalk, task.frames, _OWN)
     targets = target_of(task, rate)
-    high = min(known.get("background.distance_m"), farthest_by_derivatives(sensor))
+    # before the wall
+    high = min(known.get("background.distance_m"), turns_to(task, farthest_by_derivatives(sensor)))
     if isinstance(sensor, PulsedSensor):
         unit = known.unit
         candidates, _ = candidates_of(
@@ -47,8 +50,7 @@ def _solve(task: Task) -> TechniqueResult:
         )
     else:
         candidates, _ = candidates_of(task, both_phase.CURVE, high, targets.top, targets.sd)
-        if task.physical:
-            candidates.roots[targets.contact] = np.nan
+        candidates = at_contact(task, candidates, targets.contact)
     physical = None
     if task.physical:
         # the visible share of the background is not negative beyond -c1'

@@ -93,6 +93,8 @@ def _solve(task: Task) -> TechniqueResult:
         reason[net.first <= 0] = _CONTACT
         reason[net.second <= 0] = _DARK
         with np.errstate(all="ignore"):
+            moved = error.range_m / sensor.r0 * net.second
+            reason[-net.first > CONTRADICTED * np.hypot(np.sqrt(net.var1), moved)] = _NEGATIVE
             reason[-net.second > CONTRADICTED * np.sqrt(net.var2)] = _NEGATIVE
     else:
         reason = np.where((net.first == 0) & (net.second == 0), _SILENT, _NO_RANGE)

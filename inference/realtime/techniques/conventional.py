@@ -15,6 +15,7 @@ from inference.realtime.assemble import (
     Outcome,
     assemble,
     reasons_of,
+    with_place,
 )
 from inference.realtime.model_error import model_error_of
 from inference.realtime.net import (
@@ -34,6 +35,7 @@ from inference.realtime.solving.pulse_ratio import (
     pulsed_ranges,
     ranges_alone,
 )
+from inference.realtime.turns import contact_m, several_turns, turns_to
 from inference.technique import Task, Technique
 from simulator.frames import Frames
 from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor
@@ -116,14 +118,16 @@ def _phase(x: Array, y: Array, offset: float) -> Array:
     return phase
 
 
-def _beside_zero(net: Net, phase: float) -> NDArray[np.bool_]:
-    """Tell whether noise may have brought a signal across a phase, which lies about its own."""
+def _beside_zero(net: Net, phase: float, error: float) -> NDArray[np.bool_]:
+    """Tell whether errors may have brought a signal across a phase, which lies about its own.
+
+    Those of noise, and a standard deviation of the phase itself [rad].
+    """
     cosine, sine = math.cos(phase), math.sin(phase)
     along = cosine * net.first + sine * net.second
     across = cosine * net.second - sine * net.first
-    return np.asarray(
-        (along > 0) & (np.abs(across) < END_BAND * np.sqrt(net.variance(-sine, cosine)))
-    )
+    sd = np.hypot(np.sqrt(net.variance(-sine, cosine)), along * error)
+    return np.asarray((along > 0) & (np.abs(across) < END_BAND * sd))
 
 
 def _same(value: float, n: int) -> Array:
@@ -206,18 +210,23 @@ def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
         sd = np.sqrt(net.variance(-net.second / safe / safe, net.first / safe / safe))
         turned = phase_reach(phase, sd, net, safe, 2 * np.pi)
         # a range that the scene allows lies within the noise of zero, or this is the far end
-        beside = _beside_zero(net, sensor.known_phase_rad + k * support[0])
+        turn, turns = sensor.max_range_m, 1
+        several = several_turns(sensor, task.known, turn)
+        # of one turn noise alone is asked
+        beside = _beside_zero(
+            net, sensor.known_phase_rad + k * support[0], k * error if several else 0.0
+        )
         contact = ((phase > np.pi) & beside) | (phase == 0.0)
         usable = (modulus > 0) & np.isfinite(modulus)
-        if task.physical:
+        if task.physical and not several:
             usable &= ~contact
-        turns = 1
-        if task.high_m is not None:
-            turns = max(math.ceil(task.high_m * k / (2 * math.pi)), 1)
+        high = turns_to(task, turn)
+        if task.high_m is not None or several:
+            turns = max(math.ceil(high * k / (2 * math.pi)), 1)
         phases = phase[:, None] + 2 * np.pi * np.arange(turns)
         roots = np.where(usable[:, None], phases / k, np.nan)
-        if task.high_m is not None:
-            roots[roots > task.high_m] = np.nan
+        if task.high_m is not None or several:
+            roots[roots > high] = np.nan
         candidates = Candidates(
             roots=roots,
             noise=np.broadcast_to((turned / k)[:, None], roots.shape),
@@ -225,6 +234,8 @@ def _solve_sine_wave(task: Task, sensor: SineWaveSensor) -> TechniqueResult:
             near=np.zeros(roots.shape, dtype=np.bool_),
             near_frame=np.zeros(len(task.frames), dtype=np.bool_),
         )
+        if (nearest := contact_m(task, turn)) is not None:
+            candidates = with_place(candidates, contact & usable, nearest)
         far = (phase > np.pi) & (phase <= k * support[1])
     wrapped = np.where(far, _EITHER, _WRAPPED)
     reason = np.where(modulus > 0, wrapped, _SILENT).astype(np.uint8)
@@ -248,6 +259,6 @@ CONVENTIONAL = Technique(
     differential=False,
     cost=1.0,
     equations="4.47, 4.48 (r0 w1 / w2, phase / k)",
-    roots="1",
+    roots="1; sine wave: 1 per c/2f of the stated `range_m`",
     solve=_solve,
 )

@@ -14,6 +14,7 @@ from inference.realtime.assemble import (
     Outcome,
     assemble,
     reasons_of,
+    with_place,
 )
 from inference.realtime.derivatives import DERIVATIVE_REASONS, DROWNED_CHANGE, derivatives_of
 from inference.realtime.from_curve import candidates_of
@@ -24,12 +25,14 @@ from inference.realtime.phase_reach import phase_reach
 from inference.realtime.range_bounds import Bounds, bounds_of
 from inference.realtime.solving.curves import differential_phase, differential_ratio
 from inference.realtime.solving.ratio_reach import FEW, ratio_reaches
+from inference.realtime.turns import contact_m, several_turns, turns_to
 from inference.technique import Task, Technique
 from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = [
     "DIFFERENTIAL",
     "Targets",
+    "at_contact",
     "farthest_by_derivatives",
     "ranges_by_derivatives",
     "target_of",
@@ -149,6 +152,28 @@ def farthest_by_derivatives(sensor: Sensor) -> float:
     return sensor.max_range_m if pulsed else sensor.max_range_m / 2
 
 
+def at_contact(task: Task, candidates: Candidates, contact: NDArray[np.bool_]) -> Candidates:
+    """Return what explains a frame at contact: nothing else, or its aliases within stated ranges.
+
+    Parameters
+    ----------
+    task : Task
+        Of a pulse nothing is done, nor where roots are not filtered.
+    candidates : Candidates
+        All solutions; of frames at contact they may be changed.
+    contact : ndarray of bool, shape (n,)
+        As of `Targets`.
+    """
+    if not task.physical or isinstance(task.sensor, PulsedSensor):
+        return candidates
+    turn = farthest_by_derivatives(task.sensor)
+    if not several_turns(task.sensor, task.known, turn):
+        candidates.roots[contact] = np.nan
+        return candidates
+    nearest = contact_m(task, turn)
+    return candidates if nearest is None else with_place(candidates, contact, nearest)
+
+
 def ranges_by_derivatives(task: Task, uneven_too: bool) -> TechniqueResult:
     """Return the ranges that derivatives tell.
 
@@ -161,7 +186,8 @@ def ranges_by_derivatives(task: Task, uneven_too: bool) -> TechniqueResult:
     rate = derivatives_of(sensor, known.crosstalk, task.frames, OWN, uneven_too)
     targets = target_of(task, rate)
     pulsed = isinstance(sensor, PulsedSensor)
-    high = farthest_by_derivatives(sensor) if task.high_m is None else task.high_m
+    turn = farthest_by_derivatives(sensor)
+    high = turns_to(task, turn)
     bounds = None
     if task.scene.motion == "tangential":
         candidates = _fixed_distance(task, targets, high)
@@ -184,10 +210,10 @@ def ranges_by_derivatives(task: Task, uneven_too: bool) -> TechniqueResult:
         nothing = np.full((targets.top.size, 1), np.nan)
         candidates = _without_folds(nothing, nothing)
         bounds = bounds_of(
-            task, (targets.top, targets.bottom, targets.sd), rate, targets.contact, high
+            task, (targets.top, targets.bottom, targets.sd), rate, targets.contact, turn
         )
-    if task.physical and not pulsed:
-        candidates.roots[targets.contact] = np.nan
+    if bounds is None:
+        candidates = at_contact(task, candidates, targets.contact)
     reason = np.where(targets.contact, CONTACT, NO_RANGE)
     reason[targets.still] = STILL
     if bounds is not None:
