@@ -48,7 +48,7 @@ PRIORS: dict[str, list[dict[str, Any]]] = {
 def density_of(
     kind: str, law: str, change: dict[str, Any] | None = None, snr: float = 5.0, **columns: Any
 ) -> CollapsedDensity:
-    sensor = sensor_of(kind, snr, **LOOSE)
+    sensor = sensor_of(kind, snr, **(LOOSE if snr < 1e3 else {}))
     names = ("w1", "w2") if kind == "pulsed" else ("i", "q")
     read = sensor.noise.read[0] * np.random.default_rng(1).standard_normal((2, 4))
     readings = dict(zip(names, np.array([[0.04], [0.06]]) + read, strict=True))
