@@ -1,5 +1,6 @@
 """Files of the command line, read so that an error names the file and the field in it."""
 
+import codecs
 import contextlib
 import json
 import sys
@@ -29,6 +30,7 @@ __all__ = [
 T = TypeVar("T", bound=Validated)
 
 _STANDARD_INPUT = Path("-")
+_MARK = codecs.BOM_UTF8  # which some programs put before a text; it is no part of it
 
 
 @contextlib.contextmanager
@@ -90,7 +92,7 @@ def read_document(model: type[T], path: Path) -> T:
 def read_data(path: Path) -> Any:
     """Read a JSON file as plain data; see `read_document` for what is raised."""
     with reading(path):
-        data = decode(path.read_bytes())
+        data = decode(path.read_bytes().removeprefix(_MARK))
         check_bulk(data)
         return data
 
@@ -127,10 +129,10 @@ def read_table(path: Path) -> FrameTable:
     """
     with reading(path):
         if path == _STANDARD_INPUT:
-            raw = sys.stdin.buffer.read()
+            raw = sys.stdin.buffer.read().removeprefix(_MARK)
             return table_in(raw, form_of(raw))
         check_suffix(path.suffix)
-        return table_in(path.read_bytes(), path.suffix)
+        return _table(path)
 
 
 @contextlib.contextmanager
@@ -153,13 +155,23 @@ def open_lines(path: Path) -> Iterator[Iterable[bytes]]:
         Where it cannot be opened, or its name does not say what it is.
     """
     if path == _STANDARD_INPUT:
-        yield sys.stdin.buffer
+        yield _unmarked(sys.stdin.buffer)
         return
     check_suffix(path.suffix)
     if path.suffix.lower() == ".json":
-        columns = table_in(path.read_bytes(), path.suffix).columns.model_dump(exclude_unset=True)
+        columns = _table(path).columns.model_dump(exclude_unset=True)
         rows = zip(*columns.values(), strict=True)
         yield (json.dumps(dict(zip(columns, row, strict=True))).encode() for row in rows)
         return
     with path.open("rb") as lines:
-        yield lines
+        yield _unmarked(lines)
+
+
+def _table(path: Path) -> FrameTable:
+    return table_in(path.read_bytes().removeprefix(_MARK), path.suffix)
+
+
+def _unmarked(lines: Iterable[bytes]) -> Iterator[bytes]:
+    """Yield lines one by one, the first without a mark of the byte order."""
+    for number, line in enumerate(lines):
+        yield line.removeprefix(_MARK) if number == 0 else line
