@@ -22,6 +22,7 @@ from inference.posterior.sampling import from_the_prior
 from inference.posterior.sampling.from_the_prior import AtRest, at_rest, drawn_from_the_prior
 from inference.posterior.settings import SamplerSettings
 from simulator.scene import parse_scene
+from simulator.sensor import parse_sensor
 from tests.posterior.sampling.test_light_at_rest import C0, C2, WIDE, units
 from tests.posterior.sampling.test_light_at_rest import scene_of as scene
 from tests.posterior.scenes import KINDS, data, sensor_of
@@ -30,6 +31,15 @@ Array = NDArray[np.float64]
 
 REACH = (0.2, 3.0)
 LOOSE: dict[str, Any] = {"shot": 2e-4, "relative": 0.1}
+LATE = {"pulsed": "timing_offset_s", "sine_wave": "phase_offset_rad"}
+DELAYS: dict[str, dict[str, Any]] = {
+    "none": {"pulsed": None, "sine_wave": None},
+    "known": {"pulsed": -3e-9, "sine_wave": 0.4},
+    "unknown": {
+        "pulsed": {"prior": "normal", "mean": 0.0, "sd": 3e-9},
+        "sine_wave": {"prior": "normal", "mean": 0.4, "sd": 0.2},
+    },
+}
 HALF: dict[str, Any] = {"prior": "halfnormal", "sd": 0.05}
 NORMAL: dict[str, Any] = {"prior": "normal", "mean": 0.0, "sd": 0.05}
 PRIORS: dict[str, list[dict[str, Any]]] = {
@@ -46,9 +56,16 @@ PRIORS: dict[str, list[dict[str, Any]]] = {
 
 
 def density_of(
-    kind: str, law: str, change: dict[str, Any] | None = None, snr: float = 5.0, **columns: Any
+    kind: str,
+    law: str,
+    change: dict[str, Any] | None = None,
+    snr: float = 5.0,
+    late: Any = None,
+    **columns: Any,
 ) -> CollapsedDensity:
     sensor = sensor_of(kind, snr, **(LOOSE if snr < 1e3 else {}))
+    if late is not None:
+        sensor = parse_sensor({**sensor.model_dump(exclude_none=True), LATE[kind]: late})
     names = ("w1", "w2") if kind == "pulsed" else ("i", "q")
     read = sensor.noise.read[0] * np.random.default_rng(1).standard_normal((2, 4))
     readings = dict(zip(names, np.array([[0.04], [0.06]]) + read, strict=True))
@@ -64,9 +81,10 @@ def rest_of(density: CollapsedDensity) -> AtRest:
     return rest
 
 
+@pytest.mark.parametrize("delay", list(DELAYS))
 @pytest.mark.parametrize("kind", list(KINDS))
-def test_likelihood_and_light_are_those_of_the_kernels(kind: str) -> None:
-    density = density_of(kind, "mixed", gain=[2.0] * 4)
+def test_likelihood_and_light_are_those_of_the_kernels(kind: str, delay: str) -> None:
+    density = density_of(kind, "mixed", late=DELAYS[delay][kind], gain=[2.0] * 4)
     rest = rest_of(density)
     z = np.random.default_rng(1).standard_normal((20, len(density.parameters)))
     r = np.exp(np.random.default_rng(2).uniform(math.log(REACH[0]), math.log(REACH[1]), 20))
