@@ -18,7 +18,8 @@ where the points or populations agree with them; otherwise ensembles walk in the
 coordinates. Where linear response to the model's errors bends around such draws, rounds follow from
 where it moves them, with the errors integrated out; where it bends around draws of Laplace shapes
 that do not fit, they begin there. With `emcee` many walkers make some steps from what `auto` would
-answer with. What each stage does is in `inference.posterior.stages`.
+answer with. Of an object at rest before unknown crosstalk draws from the prior are the answer with
+either. What each stage does is in `inference.posterior.stages`.
 """
 
 import dataclasses

@@ -15,7 +15,8 @@ class SamplerSettings(Validated):
     Attributes
     ----------
     method : "emcee", "importance" or "auto"
-        Ensembles of walkers, which begin at weighted draws where these could be the answer;
+        Ensembles of walkers, which begin at weighted draws where these could be the answer, and
+        give way to draws from the prior where frames of an object at rest tell two numbers;
         Laplace with Student-t importance sampling, refused above a Pareto k-hat of 0.5; or such
         weighted draws themselves, where their weights, and points that came from the prior, say
         that they are good enough, ensembles otherwise.

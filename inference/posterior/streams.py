@@ -43,5 +43,7 @@ class Stream(enum.IntEnum):
     such rounds by its number."""
     RESPONSE = 16
     """Draws at which the response to errors of the model is looked at, and what moves them."""
+    AT_REST = 17
+    """Draws from the prior of what frames of an object at rest hardly tell."""
     CANDIDATES = 1000
     """Assessment of the models with and without optional terms, each by its number."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from service.errors import MalformedError
-from service.frame_files import check_suffix, form_of
+from service.frame_files import BYTE_ORDER_MARK, check_suffix, form_of
 from service.frame_files import read_table as table_in
 from service.frame_table import FrameTable
 from service.strict_json import check_bulk, decode
@@ -90,7 +90,7 @@ def read_document(model: type[T], path: Path) -> T:
 def read_data(path: Path) -> Any:
     """Read a JSON file as plain data; see `read_document` for what is raised."""
     with reading(path):
-        data = decode(path.read_bytes())
+        data = decode(path.read_bytes().removeprefix(BYTE_ORDER_MARK))
         check_bulk(data)
         return data
 
@@ -153,7 +153,7 @@ def open_lines(path: Path) -> Iterator[Iterable[bytes]]:
         Where it cannot be opened, or its name does not say what it is.
     """
     if path == _STANDARD_INPUT:
-        yield sys.stdin.buffer
+        yield _unmarked(sys.stdin.buffer)
         return
     check_suffix(path.suffix)
     if path.suffix.lower() == ".json":
@@ -162,4 +162,10 @@ def open_lines(path: Path) -> Iterator[Iterable[bytes]]:
         yield (json.dumps(dict(zip(columns, row, strict=True))).encode() for row in rows)
         return
     with path.open("rb") as lines:
-        yield lines
+        yield _unmarked(lines)
+
+
+def _unmarked(lines: Iterable[bytes]) -> Iterator[bytes]:
+    """Yield lines one by one, the first without a mark of the byte order."""
+    for number, line in enumerate(lines):
+        yield line.removeprefix(BYTE_ORDER_MARK) if number == 0 else line

@@ -96,7 +96,7 @@ def _run(args: argparse.Namespace) -> int:
     from service.checked_system import checked_system
     from service.commands.files import naming, open_lines, read_document, reading
     from service.commands.output import write_result
-    from service.frame_files import BYTE_ORDER_MARK, no_frame
+    from service.frame_files import no_frame
     from service.plausibility import doubts
     from service.requests import TrackedSystem
     from service.streams.forms import Form, form_like
@@ -119,7 +119,6 @@ def _run(args: argparse.Namespace) -> int:
             if not line.strip():
                 continue
             if form is None:
-                line = line.removeprefix(BYTE_ORDER_MARK)
                 form, is_frame = form_like(line)
                 if not is_frame:
                     continue

@@ -71,6 +71,27 @@ def test_track_is_the_tracker(
     ]
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".ndjson", ".json"])
+def test_a_mark_of_the_byte_order_is_no_part_of_a_file(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, suffix: str
+) -> None:
+    """As spreadsheets write it; `estimate` of a CSV took it before."""
+    texts = {
+        ".csv": "time_s,w1,w2\n0.0,0.02,1.7\n",
+        ".ndjson": '{"time_s": 0.0, "w1": 0.02, "w2": 1.7}\n',
+        ".json": '{"time_s": [0.0], "w1": [0.02], "w2": [1.7]}',
+    }
+    system = json.dumps({"sensor": SENSOR, "scene": SCENE})
+    marked = "\ufeff" + texts[suffix]
+    scene = written(tmp_path / "scene.json", "\ufeff" + system)
+    path = written(tmp_path / f"f{suffix}", marked)
+    for command in ("track", "estimate"):
+        assert Said(capsys, command, path, "--scene", scene).code == 0
+        if suffix != ".json":
+            given(monkeypatch, marked)
+            assert Said(capsys, command, "-", "--scene", scene).code == 0
+
+
 def test_times_that_go_far_back_say_that_a_new_stream_helps(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, scene: Path
 ) -> None:

@@ -9,6 +9,7 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.checks import check_best_fit, check_ranges
 from inference.posterior.job import Job
 from inference.posterior.sampling.aliases import aliases_of, with_aliases
+from inference.posterior.sampling.from_the_prior import at_rest, drawn_from_the_prior
 from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.represent import represent
@@ -200,9 +201,12 @@ def _first_stage(
     proposal = Proposal(mixture_of(optima), None, _SHARE)
     if job.settings.method == "importance":
         return _importance(density, proposal, job)
+    answer, before = _at_rest(job, density, proposal)
+    if answer is not None:
+        return answer, before
     draws = int(np.clip(evaluations(job) // 4, *_WARM_DRAWS))
     warm = warm_start(density, proposal, scouts.z, job.stream(Stream.WARM), draws)
-    calls = warm.calls
+    calls = before + warm.calls
     pending = Verdict(False, ("no steps were made",))
     if not warm.fits:
         known = None if warm.contradicted else warm.draws
@@ -226,6 +230,22 @@ def _first_stage(
     ensembles = from_weighted(job, density, warm.proposal, warm.draws, scouts.z)
     walking = Walking(warm.proposal, ensembles, pending, adaptations=0, weighted=warm.draws)
     return walking, calls + ensembles[0].walkers * len(ensembles)
+
+
+def _at_rest(
+    job: Job, density: CollapsedDensity, proposal: Proposal
+) -> tuple[Weighted | None, int]:
+    """Answer by draws from the prior where frames tell two numbers; with the evaluations.
+
+    Also with the method `emcee`: walkers do not follow the sheet that the posterior is.
+    """
+    rest = at_rest(density)
+    if rest is None:
+        return None, 0
+    drawn, calls = drawn_from_the_prior(rest, job.stream(Stream.AT_REST), job.settings.target_ess)
+    if drawn is None:
+        return None, calls
+    return Weighted(proposal.optima, drawn, Verdict(True, ())), calls
 
 
 def _with_scouts(density: CollapsedDensity, optima: list[Optimum], scouts: Scouts) -> list[Optimum]:
