@@ -16,7 +16,7 @@ from simulator.errors import listed
 from simulator.frames import Frames
 from simulator.joint_scene import centre
 from simulator.remembered import remembered
-from simulator.scene import Scene
+from simulator.scene import Reference, Scene, Stroke
 from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor
 from simulator.sensor_unknowns import DRIFTS, GAIN
 
@@ -30,6 +30,7 @@ _WIDE, _SHARP = "background_intensity", "background_cancelling"
 _PHASE, _AMOUNT = "conventional", "intensity"
 _SHAPE = ("object.c0", "object.c1")
 _ONE_ROOT = -math.sqrt(32.0 / 9.0)  # of sqrt(c0), from which on light falls with range
+_ONE_IN_100 = 2.326  # standard deviations that one of a hundred is beyond
 _FEW = 1000  # frames whose estimates take no longer than their plan
 
 
@@ -103,7 +104,7 @@ def obstacle(
                 f"the background lies {turns:.3g} half turns of phase away, and a frame may have "
                 "as many roots; a lower frequency would tell them apart"
             )
-    if (of_turns := _turns_obstacle(technique, sensor, known)) is not None:
+    if (of_turns := _turns_obstacle(technique, sensor, scene, known)) is not None:
         return of_turns
     of_sensor = _sensor_obstacle(technique, sensor, scene, known)
     if of_sensor is not None:
@@ -116,11 +117,14 @@ def obstacle(
     return None
 
 
-def _turns_obstacle(technique: Technique, sensor: Sensor, known: Known) -> str | None:
+def _turns_obstacle(technique: Technique, sensor: Sensor, scene: Scene, known: Known) -> str | None:
     """Return why a technique cannot serve ranges of several turns of phase, None if it can."""
     if not several_turns(sensor, known, sensor.max_range_m):
         return None
     if technique.name not in REALTIME:
+        # a fit says misfit of what few ranges of a law without an end are beyond
+        if known.support[1] == math.inf and _seldom_beyond(scene, sensor.max_range_m):
+            return None
         return (
             f"the stated range_m goes on beyond {sensor.max_range_m:.4g} m, where the phase begins "
             "anew, and fits over many frames end there; a posterior of these frames does not"
@@ -133,6 +137,14 @@ def _turns_obstacle(technique: Technique, sensor: Sensor, known: Known) -> str |
         f"the stated range_m holds {turns:.3g} half turns of phase, and a frame may have as many "
         "roots; narrow it, or take a lower frequency"
     )
+
+
+def _seldom_beyond(scene: Scene, range_m: float) -> bool:
+    """Tell whether the law of the ranges is beyond a range once in a hundred or less."""
+    law = scene.range_m
+    if law is None or isinstance(law, Reference | Stroke):
+        return False
+    return float(law.distribution().from_normal(_ONE_IN_100)) <= range_m
 
 
 def _sensor_obstacle(

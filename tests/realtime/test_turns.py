@@ -201,6 +201,11 @@ def test_what_several_turns_rule_out() -> None:
     left = {each.name: each.reason for each in estimate(sensor, scene, frames).left_out}
     for fit in ("object_fit", "joint_fit", "crosstalk_fit"):
         assert "goes on beyond 7.495 m" in left[fit]
+    # 0.4 % of this law's ranges are beyond, and 3 % of the other's
+    for sigma, refused in ((1.0, False), (1.4, True)):
+        law = parse_scene({"range_m": {"prior": "lognormal", "median": 0.5, "sigma": sigma}})
+        told = {each.name: each.reason for each in estimate(sensor, law, frames).left_out}
+        assert ("goes on beyond" in told["object_fit"]) == refused
     with pytest.raises(RefusedError, match=r"beyond 7\.495 m"):
         export_c("conventional", sensor, scene)
     export_c("conventional", sensor, parse_scene(uniform(0.1, 7.49)))
