@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from benchmarks.stop_and_go import OBJECT, PATHS, SENSORS, UNKNOWN_BY
 from inference.tracking.hypotheses import ANCHOR, Hypotheses, U
-from inference.tracking.readings_table import mean_at
+from inference.tracking.readings_table import ReadingsTable, mean_at
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.shared_error import bring_anchor, shared_part
 from inference.tracking.track import track
@@ -36,13 +36,13 @@ TABLES = [
     st.floats(1e-4, 0.1),
 )
 def test_what_is_common_is_worth_as_much_light_after_a_step_as_before(
-    table: object, u: float, step: float, unknown: float, own: float
+    table: ReadingsTable, u: float, step: float, unknown: float, own: float
 ) -> None:
     """Away and nearer: the common part times the tangent's length stays, the rest stays as it is.
 
     By the length of the tangent no step tells the crosstalk, however it went.
     """
-    slope = np.array(mean_at(u, table)[2:])  # type: ignore[arg-type]
+    slope = np.array(mean_at(u, table)[2:])
     X = np.zeros((1, 4, 4))
     X[0, 2:, 2:] = unknown * np.eye(2)
     X[0, 0, 2:] = -slope / (slope @ slope + 1.0) * unknown
@@ -50,9 +50,9 @@ def test_what_is_common_is_worth_as_much_light_after_a_step_as_before(
     of = Hypotheses(np.zeros((1, 5)), X.copy(), np.ones(1), np.zeros(31))
     of.x[0, U], of.x[0, ANCHOR] = u + step, u
     back = np.array(shared_part(of, 0)[:2])
-    bring_anchor(of, 0, u + step, 0.5, slope @ slope, 0.0, table)  # type: ignore[arg-type]
-    there = np.array(mean_at(of.x[0, ANCHOR], table)[2:])  # type: ignore[arg-type]
-    longer = min(np.linalg.norm(slope) / np.linalg.norm(there), 3.0)
+    bring_anchor(of, 0, u + step, 0.5, float(slope @ slope), 0.0, table)
+    there = np.array(mean_at(of.x[0, ANCHOR], table)[2:])
+    longer = min(float(np.linalg.norm(slope) / np.linalg.norm(there)), 3.0)
     common, told = back @ X[0, 2:], of.X[0, U] - X[0, U]
     np.testing.assert_allclose(told, (longer - 1.0) * common, rtol=1e-9, atol=1e-12)
     assert (of.X[0, 1:] == X[0, 1:]).all()
