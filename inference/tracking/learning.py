@@ -233,7 +233,7 @@ def learn(
         told = pull1 * tangent.slope1 + pull2 * tangent.slope2
         unsure = slope_variance(at, gain, tangent.slope1, tangent.slope2, table)
         if not held:
-            bring_anchor(of, row, at, prior.share, told, unsure)
+            bring_anchor(of, row, at, prior.share, told, unsure, table)
         along = at, tangent.slope1, tangent.slope2
         shared = straighten(of, row, gain, along, noise, table)
     if table.by_rate:

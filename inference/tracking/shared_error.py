@@ -9,9 +9,13 @@ what follows the crosstalk's error and the rest. Along the rest the curve is wha
 common part it is straight, its tangent taken at an anchor. What an update corrects, and what a rate
 moves that may be noise, turns the tangent with the errors of the readings kept: no knowledge comes
 from it. What is motion for certain turns it with the errors of the crosstalk kept, and that is how
-motion tells range and crosstalk apart. It is certain where the rate is known, and where a frame
-shows it well beyond what the frame itself may err: of an object far slower than it may be the rate
-is never known, and its motion taken for corrections would turn crosstalk that stays.
+motion tells range and crosstalk apart: by the direction of the tangent alone where a frame shows
+that motion, and by its length too where the rate foretold it. It is certain where the rate is
+known, and where a frame shows it well beyond what the frame itself may err: of an object far slower
+than it may be the rate is never known, and its motion taken for corrections would turn crosstalk
+that stays.
+
+docs/model.md, learnt-steps, has what a step that a frame shows tells.
 
 Errors of readings are kept as far as frames tell them. What nuisance parameters hide, far beyond
 what noise and crosstalk could be, no frame has told, and crosstalk that took it up would leave what
@@ -21,6 +25,7 @@ and 15 frames stated empty were unlearnt, by up to hundreds of noises. What is k
 any object takes up none, whatever the light (`inference.tracking.without_object`).
 """
 
+import math
 from typing import NamedTuple
 
 from inference.tracking.borrowed import borrowed
@@ -59,6 +64,7 @@ __all__ = [
 
 _MOST = 0.5  # of the common part that a change of tangent may take up
 _CERTAIN = 9.0  # variances of its error at which half of a motion counts as certain
+_LONGEST = 3.0  # times the common part may grow in a frame: where light drowns, tangents vanish
 _UNFELT = 1e-2  # variance of the noise: along what the crosstalk errs by less, nothing follows it
 _SINGULAR = 1e-14  # of a determinant against the product of its diagonal
 
@@ -184,14 +190,25 @@ def certainty(of: Hypotheses, row: int) -> float:
 
 @compiled
 def bring_anchor(
-    of: Hypotheses, row: int, at: float, share: float, told: float, unsure: float
+    of: Hypotheses,
+    row: int,
+    at: float,
+    share: float,
+    told: float,
+    unsure: float,
+    table: ReadingsTable,
 ) -> None:
     """Bring the anchor to where a frame shows that the object has moved, as far as that is certain.
+
+    How far a step goes is known by the light that the crosstalk leaves, and by nothing else: with
+    more light it is shorter. So the common part of u grows as the tangent becomes shorter, and what
+    tells range and crosstalk apart is that the tangent turns. By its length the law of the motion
+    would tell the crosstalk, in every frame that a step is unlikely, and to the same side.
 
     Parameters
     ----------
     of, row : Hypotheses, int
-        The hypothesis as predicted; its anchor is changed in place.
+        The hypothesis as predicted; its anchor and its root are changed in place.
     at : float
         log r at the frame's mode, less what that corrects of the common part.
     share : float
@@ -200,14 +217,24 @@ def bring_anchor(
         What the frame tells of log r: one over its variance.
     unsure : float
         Relative variance of the derivatives by which the readings tell it.
+    table : ReadingsTable
+        Mean readings.
     """
-    x = of.x
+    x, X = of.x, of.X
     own = (1.0 - share) * variance_of(of, row, U)
     error = own / (1.0 + own * told)
     moved = at - x[row, ANCHOR]
     square = moved * moved
-    if square > 0.0:
-        x[row, ANCHOR] += square / (square + _CERTAIN * (error + unsure * square)) * moved
+    if not square > 0.0:
+        return
+    _, _, before1, before2 = mean_at(x[row, ANCHOR], table)
+    x[row, ANCHOR] += square / (square + _CERTAIN * (error + unsure * square)) * moved
+    _, _, after1, after2 = mean_at(x[row, ANCHOR], table)
+    before, after = math.hypot(before1, before2), math.hypot(after1, after2)
+    longer = min(before / after, _LONGEST) - 1.0 if after > 0.0 else 0.0
+    back1, back2, _ = shared_part(of, row)
+    for j in range(X.shape[1]):
+        X[row, U, j] += longer * (back1 * X[row, CROSSTALK1, j] + back2 * X[row, CROSSTALK2, j])
 
 
 @borrowed
