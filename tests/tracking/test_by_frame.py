@@ -48,8 +48,9 @@ def test_a_hand_is_as_sure_as_its_frames_say_beside_the_prior(seed: int) -> None
     rng = np.random.default_rng([11, seed])
     time_s = np.arange(90) / 30.0
     way = 0.5 * (1.0 - np.cos(np.pi * np.clip((time_s - 0.5) / 1.5, 0.0, 1.0)))
-    r = 0.4 * (0.15 / 0.4) ** way
-    flux = np.asarray(object_flux(r, HAND["c0"] * HAND["c2"], HAND["c0"], HAND["c1"]))
+    r: Array = 0.4 * (0.15 / 0.4) ** way
+    strength = HAND["c0"] * HAND["c2"]
+    flux = np.array([object_flux(float(x), strength, HAND["c0"], HAND["c1"]) for x in r])
     light = flux[:, None] * np.stack([r / R0_M, np.ones(90)], axis=1) * (time_s > 0.5)[:, None]
     readings = light + CROSSTALK + READ * rng.standard_normal((90, 2))
     frames = frames_from_columns(
