@@ -146,6 +146,6 @@ def as_said(
     for row in range(count + 1):
         copy(into, row, of, row)
         into.weight[row] = of.weight[row]
-        holds = hold_told(into, row)
-        if readable and holds and row > 0:
+        opened = hold_told(into, row)
+        if readable and opened and row > 0:
             _take_range(into, row, frame, table, factors)

@@ -39,7 +39,7 @@ def hold_told(of: Hypotheses, row: int) -> bool:
     Returns
     -------
     bool
-        Whether what is known without an object holds: it does not contradict the hypothesis.
+        Whether it was opened, and what is known without an object does not contradict it.
     """
     x, X, numbers = of.x, of.X, of.numbers
     n, m = X.shape[1], X.shape[2]
@@ -53,7 +53,7 @@ def hold_told(of: Hypotheses, row: int) -> bool:
         return False
     some, rest = rest_of(known, held)
     if not some:
-        return True
+        return False
     both = add_root(held, rest)
     step1, step2 = times(held, solve(both, off1, off2))
     x[row, CROSSTALK1], x[row, CROSSTALK2] = x[row, CROSSTALK1] + step1, x[row, CROSSTALK2] + step2
