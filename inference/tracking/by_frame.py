@@ -35,7 +35,7 @@ from inference.tracking.readings_table import (
     nuisance_at,
     object_at,
 )
-from inference.tracking.roots import UNIT, add_factors, solve
+from inference.tracking.roots import UNIT, Root, add_factors, solve
 from inference.tracking.without_object import carry_told, told_root
 from simulator.compiled import compiled
 
@@ -45,6 +45,9 @@ _STEPS = 8  # of Gauss and Newton; a few are enough
 # of the light's square against the crosstalk's variance: of crosstalk known to a fifth of the
 # light a range is as straight in its error as least squares take it
 _BRIGHT = 25.0
+# standard deviations at which the crosstalk is taken: it is the same in all frames, as light is
+# (`inference.tracking.second_order`)
+_TAKEN_AT = 2.0
 _CLOSE = 0.1  # standard deviations that a last step may be long
 
 
@@ -62,6 +65,7 @@ def _take_range(
     for j in range(m):
         before += X[row, U, j] * X[row, U, j]
     unknown, crosstalk1, crosstalk2 = told_root(of), of.numbers[TOLD1], of.numbers[TOLD2]
+    unknown = Root(_TAKEN_AT * unknown.r11, _TAKEN_AT * unknown.r21, _TAKEN_AT * unknown.r22)
     square = unknown.r11 * unknown.r11 + unknown.r21 * unknown.r21 + unknown.r22 * unknown.r22
     light1 = frame.first - table.crosstalk1 - crosstalk1
     light2 = frame.second - table.crosstalk2 - crosstalk2

@@ -20,7 +20,7 @@ from simulator.compiled import compiled
 
 __all__ = ["hold_told"]
 
-_BEYOND = 16.0  # squared distance of both, which chance exceeds once in 3,000
+_BEYOND = 9.0  # squared distance of both, which chance exceeds once in 90
 
 
 @borrowed

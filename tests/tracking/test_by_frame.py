@@ -61,7 +61,8 @@ def test_a_hand_is_as_sure_as_its_frames_say_beside_the_prior(seed: int) -> None
     scene |= {"object": HAND, "discrepancy": {"flux": 0.7, "range_m": 0.0008}}
     found = track(SENSOR, parse_scene(scene), frames, TrackingSettings(rate_sd=2.0))
     assert found.status[-1] == Status.UNIQUE
-    assert found.best_sd_m[-1] < 1.5 * alone.sd_m[-1]
+    # the crosstalk is taken at two of its standard deviations
+    assert found.best_sd_m[-1] < 2.5 * alone.sd_m[-1]
     assert not found.misfit.any()
     there = time_s > 0.5
     # nan where no range is the only one
