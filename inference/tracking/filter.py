@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.estimates import Status
+from inference.tracking.by_frame import as_said
 from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import (
     COUNT,
@@ -139,7 +140,12 @@ def run_filter(
             own = min(surprise, rules.most_surprise) / model.table.channels
             numbers[RUNNING] += (1.0 - rules.memory) * (own - numbers[RUNNING])
             numbers[ROUGHNESS] += (min(own, 1.0) - numbers[ROUGHNESS]) / _LATE
-        report(out, rows, i, of, rules, model.table)
+        told = of
+        if learns_crosstalk(of) and nuisance_count(model.table) > 0:
+            readable = kinds[i] == USABLE and outlier < 0.5 and not known_rate > 0.0
+            told, factors = room.after, room.scratch.factors
+            as_said(told, of, frame, readable, model.table, factors)
+        report(out, rows, i, told, rules, model.table)
         if is_contradicted(of):
             describe_contradicted(
                 out, i, of, model.table, model.places.empty, model.first, rules, room.scratch

@@ -11,15 +11,14 @@ from inference.tracking.hypotheses import (
     ANCHOR,
     CROSSTALK1,
     RESTING,
-    RIVAL_TIME,
     STILL,
-    TOLD,
+    TOLD22,
     Hypotheses,
-    unknown_crosstalk,
 )
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
 from inference.tracking.unsteady import first_unsteady
+from inference.tracking.without_object import tell_all
 from simulator.scene import Scene
 
 __all__ = ["crosstalk_bounds", "first_state"]
@@ -80,12 +79,13 @@ def first_state(
     weight[0] = 1.0 - there
     numbers = [math.nan, there, 1.0, 0.0, 0.0, ROUGH, 0.0]
     numbers += [math.nan, math.nan, math.inf, math.inf, 0.0, 0.0, 0.0]
-    numbers += [0.0] * (RIVAL_TIME + 1 - STILL)
+    numbers += [0.0] * (TOLD22 + 1 - STILL)
     if steady:
         numbers += first_unsteady(directions)
     first = Hypotheses(x, X, weight, np.array(numbers))
     first.numbers[RESTING] = float(crosstalk is not None and hides(first, 0))
-    first.numbers[TOLD] = 0.0 if crosstalk is None else unknown_crosstalk(first, 0)
+    if crosstalk is not None:
+        tell_all(first)
     return TrackState(first)
 
 

@@ -45,6 +45,11 @@ __all__ = [
     "STILL",
     "TIME",
     "TOLD",
+    "TOLD1",
+    "TOLD2",
+    "TOLD11",
+    "TOLD21",
+    "TOLD22",
     "WITHOUT_CROSSTALK",
     "Hypotheses",
     "Scratch",
@@ -73,6 +78,7 @@ RESTING, LEVEL1, LEVEL2 = range(11, 14)
 STILL, SINCE, STAYED, STAY1, STAY2, LATE1, LATE2, BRIGHT = range(14, 22)
 TOLD = 22
 HELD, RIVAL, RUN, RIVAL1, RIVAL2, RIVAL_VARIANCE, RIVAL_GAIN, RIVAL_TIME = range(23, 31)
+TOLD1, TOLD2, TOLD11, TOLD21, TOLD22 = range(31, 36)
 _LEAST = -700.0  # log of a weight that underflows
 _ROOT_8 = math.sqrt(8.0)
 # probability of no change at all from which on readings that do not change say nothing: thirty
@@ -89,7 +95,7 @@ class Hypotheses(NamedTuple):
     x: Array
     X: Array  # (rows, n, n + p): roots of the covariances
     weight: Array  # (rows,): probabilities
-    # (31,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
+    # (36,), more where errors that frames share are felt (`inference.tracking.unsteady`): time of
     # the last frame [s] (nan: none yet), probability of an object of which nothing is known yet,
     # running surprise, number of hypotheses, whether an object that was there may be anywhere by
     # now, the surprise of the last frames, each cut at 1, how many frames up to the last had the
@@ -102,7 +108,8 @@ class Hypotheses(NamedTuple):
     # stated empty (`inference.tracking.stated_empty`) how many agree with what is held of the
     # crosstalk, how many with its rival, how many of the last were passed over, and of the rival
     # the mean of its frames without the scene's light, its variance in that of a frame's noise, the
-    # mean of their factors on the gain, and the time that the variance is of [s]
+    # mean of their factors on the gain, and the time that the variance is of [s], and of what is
+    # known of the crosstalk without any object its mean and the triangular root of its covariance
     numbers: Array
 
 

@@ -8,12 +8,25 @@ from numpy.typing import NDArray
 
 from simulator.compiled import compiled
 
-__all__ = ["UNIT", "Root", "add_factor", "add_factors", "add_root", "rotation", "slope_of", "solve"]
+__all__ = [
+    "UNIT",
+    "Root",
+    "add_factor",
+    "add_factors",
+    "add_root",
+    "in_units",
+    "rest_of",
+    "rotation",
+    "slope_of",
+    "solve",
+    "times",
+]
 
 Array = NDArray[np.float64]
 
 _LEAST_LENGTH = 1e-150  # below it squares come near the least number that has all its digits
 _LEAST_SQUARE = 1e-290  # below it a square has not all its digits
+_NONE = 1e-9  # of an information: less is none
 _SCALE = 2.0**600  # by which the least number of all is far from it
 
 
@@ -108,3 +121,55 @@ def solve(root: Root, first: float, second: float) -> tuple[float, float]:
     z2 = (second - root.r21 * z1) / root.r22
     y2 = z2 / root.r22
     return (z1 - root.r21 * y2) / root.r11, y2
+
+
+@compiled
+def in_units(root: Root, first: float, second: float) -> tuple[float, float]:
+    """Return root^-1 times a vector."""
+    own = first / root.r11
+    return own, (second - root.r21 * own) / root.r22
+
+
+@compiled
+def rest_of(known: Root, held: Root) -> tuple[bool, Root]:
+    """Return what is left to learn of what is known, where something else is held.
+
+    Parameters
+    ----------
+    known, held : Root
+        Of two covariances.
+
+    Returns
+    -------
+    (bool, Root)
+        Whether anything is, and the root of the covariance whose inverse is the first one's less
+        the second one's, along the directions in which that is positive.
+    """
+    first, second = in_units(known, held.r11, held.r21)
+    root = Root(first, second, held.r22 / known.r22)
+    # eigenvalues and vectors of the second in units of the first
+    v11, v12 = root.r11 * root.r11, root.r11 * root.r21
+    v22 = root.r21 * root.r21 + root.r22 * root.r22
+    large = 0.5 * (v11 + v22 + math.hypot(v11 - v22, 2.0 * v12))
+    if not large > 1.0 + _NONE:
+        return False, known
+    small = root.r11 * root.r22
+    small *= small / large
+    angle = 0.5 * math.atan2(2.0 * v12, v11 - v22)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    # of variance v: information 1 - 1/v
+    most = 1.0 / math.sqrt(1.0 - 1.0 / large)
+    least = 1.0 / math.sqrt(max(1.0 - 1.0 / max(small, 1.0), _NONE))
+    rest = Root(0.0, 0.0, 0.0)
+    for part, first, second in ((most, cosine, sine), (least, -sine, cosine)):
+        own = part * known.r11 * first
+        rest = add_factor(rest, own, part * (known.r21 * first + known.r22 * second))
+    return True, rest
+
+
+@compiled
+def times(root: Root, vector: tuple[float, float]) -> tuple[float, float]:
+    """Return root root^T times a vector."""
+    along1 = root.r11 * vector[0] + root.r21 * vector[1]
+    along2 = root.r22 * vector[1]
+    return root.r11 * along1, root.r21 * along1 + root.r22 * along2

@@ -31,7 +31,6 @@ from inference.tracking.hypotheses import (
     RIVAL_VARIANCE,
     RUN,
     TIME,
-    TOLD,
     Hypotheses,
     Scratch,
     copy,
@@ -45,7 +44,7 @@ from inference.tracking.readings_table import FIRST, SECOND, ReadingsTable
 from inference.tracking.report import CROSSTALK
 from inference.tracking.roots import Root
 from inference.tracking.square_root import Linear, move, update
-from inference.tracking.without_object import take_stated
+from inference.tracking.without_object import take_stated, tell_all
 from simulator.compiled import compiled
 
 __all__ = ["describe_contradicted", "is_contradicted", "learn_stated", "open_crosstalk"]
@@ -139,7 +138,7 @@ def _exchange(of: Hypotheses, gain: float) -> None:
     numbers[HELD], numbers[RIVAL] = numbers[RIVAL], numbers[HELD]
     numbers[RUN] = 0.0
     copy(of, 0, of, 1)
-    numbers[TOLD] = unknown_crosstalk(of, 0)  # the rival knows of no object
+    tell_all(of)  # the rival knows of no object
 
 
 @borrowed
@@ -187,7 +186,8 @@ def learn_stated(
         numbers[HELD] = 1.0
     if not odd:
         numbers[HELD], numbers[RUN] = numbers[HELD] + 1.0, 0.0
-        take_stated(of, expected.noise, scratch.nuisance)
+        residual = frame.first - expected.mean1, frame.second - expected.mean2
+        take_stated(of, residual, expected.noise, scratch.nuisance)
         return outlier, learn_empty(of, frame, table, empty, scratch)
     numbers[RUN] += 1.0
     numbers[COUNT] = 0.0  # row 1 is free
@@ -242,7 +242,7 @@ def open_crosstalk(
     merge(of, 0, 1, 0.5, CROSSTALK1, scratch.work)
     move(of, 0, Motion(0.0, 0.0, Root(0.0, 0.0, 0.0), half, half), scratch.work)
     of.numbers[HELD], of.numbers[RIVAL], of.numbers[RUN] = 0.0, 0.0, 0.0
-    of.numbers[TOLD] = unknown_crosstalk(of, 0)
+    tell_all(of)
 
 
 @borrowed

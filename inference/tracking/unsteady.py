@@ -51,7 +51,7 @@ Array = NDArray[np.float64]
 # that was none its time, what is left of its two readings, the direction across the curve (of an
 # empty scene nan and the gain), and what every nuisance parameter does along that; behind them what
 # lasts
-UNSTEADY, OUTLIERS, _TIME, _LEFT1, _LEFT2, _ACROSS1, _ACROSS2, _SHARED = range(31, 39)
+UNSTEADY, OUTLIERS, _TIME, _LEFT1, _LEFT2, _ACROSS1, _ACROSS2, _SHARED = range(36, 44)
 _GAIN = _ACROSS2
 # standard deviations that an error which frames share may be off by: beyond it one in a million is
 _ALLOWED = 5.0

@@ -36,7 +36,6 @@ from inference.tracking.frame_density import TrackedFrame
 from inference.tracking.hypotheses import (
     COUNT,
     PENDING,
-    TOLD,
     Hypotheses,
     Scratch,
     copy,
@@ -55,6 +54,7 @@ from inference.tracking.stillness import crosstalk_is_held
 from inference.tracking.too_faint import MOST_EMPTY, doubt_the_faint
 from inference.tracking.turning import may_turn
 from inference.tracking.unread import add_unread, learn_unread, odd_weight
+from inference.tracking.without_object import carry_told
 from simulator.compiled import compiled
 
 __all__ = ["Model", "Room", "room_for", "weigh_frame", "weigh_known"]
@@ -193,7 +193,7 @@ def _keep(
 ) -> Kept:
     """Take over the heaviest candidates, taught by the frame, until the rest is negligible."""
     rules, after, candidates = model.rules, room.after, room.candidates
-    after.numbers[TOLD] = of.numbers[TOLD]  # whoever learns asks for it
+    carry_told(after, of)  # whoever learns asks for it
     usual, odd = math.exp(empty.usual - best), math.exp(empty.odd - best)
     outlying = odd + math.exp(empty.odd_born - best)
     heaviest, surprise = usual, empty.surprise
