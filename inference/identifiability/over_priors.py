@@ -11,7 +11,6 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from inference.identifiability.expected_posterior import expected_posterior
 from inference.identifiability.experiment import Experiment
@@ -24,7 +23,7 @@ Array = NDArray[np.float64]
 
 _DRAWS = 8
 _SHARE = 0.75  # of the draws that are as good as what is foreseen, or better
-_SEED = 0  # of the points' scrambling: the same question has the same answer
+_SEED = 0  # of the draws: the same question has the same answer
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -68,7 +67,8 @@ class Elsewhere:
 def drawn(z: Array, open_: Collection[int]) -> Array:
     """Return values of the unknowns drawn from their priors.
 
-    Points of Sobol's sequence, scrambled by a seed of their own, are spread more evenly than draws.
+    A Latin hypercube (McKay, Beckman and Conover 1979): each unknown has one value in every eighth
+    of its prior.
 
     Parameters
     ----------
@@ -85,9 +85,10 @@ def drawn(z: Array, open_: Collection[int]) -> Array:
     columns = sorted(open_)
     if not columns:
         return np.zeros((0, z.size))
-    points = qmc.Sobol(len(columns), scramble=True, rng=_SEED).random(_DRAWS)
+    rng, shape = np.random.default_rng(_SEED), (_DRAWS, len(columns))
+    eighths = rng.permuted(np.broadcast_to(np.arange(_DRAWS)[:, None], shape), axis=0)
     found = np.tile(z, (_DRAWS, 1))
-    found[:, columns] = ndtri(points)
+    found[:, columns] = ndtri((eighths + rng.random(shape)) / _DRAWS)
     return found
 
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from inference.identifiability.expected_posterior import ExpectedPosterior, expected_posterior
 from inference.identifiability.experiment import Experiment, information
 from inference.identifiability.information import Information
+from inference.identifiability.judged import Judgement, Spread, judged
 from inference.identifiability.known_beside import with_rates
-from inference.identifiability.left_open import left_open
 from inference.identifiability.over_priors import Elsewhere, elsewhere
-from inference.identifiability.status import STATUSES, status_of
+from inference.identifiability.status import STATUSES
 from simulator.errors import InvalidInputError
 from simulator.parameters import OFFSET
 
@@ -90,6 +90,11 @@ class Remedy:
         return expected_posterior(dataclasses.replace(self.experiment), self.asked)
 
     @functools.cached_property
+    def _judged(self) -> tuple[Judgement, ...]:
+        spread = Spread(self.expected.sd, self.expected.scale_sd)
+        return judged(dataclasses.replace(self.experiment), spread, self.expected)
+
+    @functools.cached_property
     def _elsewhere(self) -> Elsewhere | None:
         return None if self.draws is None else elsewhere(self.experiment, self.draws, self.asked)
 
@@ -116,16 +121,11 @@ class Remedy:
 
     def status(self, parameter: str) -> str:
         """Return what an unknown or "range_m" would be then."""
-        spread = self.spread(parameter)
-        status = status_of(parameter, spread)
-        if parameter == "range_m" and status == "weak":
-            alike = left_open(dataclasses.replace(self.experiment), spread, self.expected)
-            status = status if alike is None else "not_identified"
+        place = [*self.experiment.parameters.names, "range_m"].index(parameter)
+        status = self._judged[place].status
         if self._elsewhere is None:
             return status
-        names = [*self.experiment.parameters.names, "range_m"]
-        most = self._elsewhere.status(names.index(parameter))
-        return STATUSES[max(STATUSES.index(status), most)]
+        return STATUSES[max(STATUSES.index(status), self._elsewhere.status(place))]
 
 
 def span(log_r: Array) -> float:

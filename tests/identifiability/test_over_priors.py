@@ -26,10 +26,10 @@ def statuses(found: Foresight) -> dict[str, str]:
 
 @pytest.mark.parametrize("scene", [{}, CROSSTALK])
 def test_three_draws_of_four_are_as_good_as_what_is_foreseen(scene: dict[str, Any]) -> None:
-    """Held to independent draws: where fewer than half are as good, it is not foreseen.
+    """Held to independent draws: where fewer than a fifth are as good, it is not foreseen.
 
-    Of eight points of which six are as good, the share of all is below a half once in seven
-    (binomial; Sobol's points do better): allowed is two rows of eleven.
+    Six of eight draws are as good once in 800 where a fifth of all are (binomial): a false alarm
+    once in 80 of eleven rows, for the seed that stands.
     """
     found = foresee(scene)
     parameters = parameters_of(SENSOR, parse_scene(scene))
@@ -38,11 +38,9 @@ def test_three_draws_of_four_are_as_good_as_what_is_foreseen(scene: dict[str, An
         statuses(foresee(scene, dict(zip(parameters.names, values, strict=True))))
         for values in parameters.natural(z).tolist()
     ]
-    low = 0
     for name, status in statuses(found).items():
         as_good = [STATUSES.index(of[name]) <= STATUSES.index(status) for of in truths]
-        low += int(np.mean(as_good) < 0.5)
-    assert low <= 2
+        assert np.mean(as_good) >= 0.2, name
 
 
 def test_where_all_values_are_given_they_alone_decide() -> None:
