@@ -43,6 +43,9 @@ class Wanted:
         are none of the posterior.
     first : int
         Draws of each round until rounds tell what they left out.
+    shapes : int
+        Rounds, the first ones, whose only law is a shape that bends nothing and follows the draws:
+        the one to begin with is brought by the proposal. 0 where a map is fitted to the members.
     """
 
     target_ess: int
@@ -50,6 +53,7 @@ class Wanted:
     tolerated: float = _MOST_DISSENT
     tail: float = _TAIL
     first: int = 1000
+    shapes: int = 0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -150,6 +154,11 @@ class RoundsSoFar:
         if self.last is None:
             return self.pool.open
         return self.pool.z[:0] if self.last.drawn is None else self.last.drawn.open
+
+    @property
+    def shaped(self) -> bool:
+        """Whether the next law is still a shape."""
+        return len(self.pool.laws) < self.wanted.shapes
 
     @property
     def beyond(self) -> NDArray[np.bool_]:

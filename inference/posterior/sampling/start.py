@@ -6,7 +6,7 @@ biased (incidental parameters); each optimum is then refined on the collapsed de
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy
@@ -15,10 +15,20 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.density.profile import linearise
 
-__all__ = ["Optimum", "added", "climb", "find_optima", "refine"]
+__all__ = [
+    "Optimum",
+    "added",
+    "climb",
+    "curvature_factor",
+    "derivatives",
+    "find_optima",
+    "refine",
+]
 
 Array = NDArray[np.float64]
 
+# of a standard deviation: the log density is then near quadratic, differences are exact
+_DIFFERENCE = 0.05
 _SCREEN = 600  # points of the prior that are looked at
 _CLIMBS = 10  # of which the best, spread out, are climbed
 _ITERATIONS = 60
@@ -124,8 +134,8 @@ def climb(
     return z, float(value)
 
 
-def _curvature_factor(density: CollapsedDensity, z: Array) -> Array:
-    """Inverse square root of the Gauss-Newton information at z: a scale for differences."""
+def curvature_factor(density: CollapsedDensity, z: Array) -> Array:
+    """Return the inverse square root of the Gauss-Newton information at z, shape (d, d)."""
     positions = density.best_ranges(z[None])[0, :, 0]
     line = linearise(density, z, positions)
     matrix = np.concatenate([line.jacobian.reshape(-1, z.size), np.eye(z.size)])
@@ -133,10 +143,23 @@ def _curvature_factor(density: CollapsedDensity, z: Array) -> Array:
     return np.asarray(scipy.linalg.solve_triangular(r, np.eye(z.size)))
 
 
-def _derivatives(density: CollapsedDensity, z: Array, frame: Array) -> tuple[float, Array, Array]:
-    """Value, gradient and Hessian along the columns of a frame, by central differences."""
+def derivatives(
+    density: Callable[[Array], Array], z: Array, frame: Array, h: float = _DIFFERENCE
+) -> tuple[float, Array, Array]:
+    """Return value, gradient and Hessian along the columns of a frame, by central differences.
+
+    Parameters
+    ----------
+    density : callable
+        Log density of points of shape (n, d), shape (n,).
+    z : ndarray, shape (d,)
+        Where.
+    frame : ndarray, shape (d, d)
+        Directions, as long as the density is wide there.
+    h : float
+        Step, of a column.
+    """
     d = z.size
-    h = 0.05  # standard deviations: the log density is then near quadratic, differences are exact
     pairs = [(i, j) for i in range(d) for j in range(i)]
     steps = [np.zeros(d)]
     for i in range(d):
@@ -172,10 +195,10 @@ def refine(density: CollapsedDensity, z: Array) -> Optimum | None:
         None where the density is not finite around the point.
     """
     d = z.size
-    frame = _curvature_factor(density, z)
+    frame = curvature_factor(density, z)
     best = float(density(z[None])[0])
     for _ in range(25):
-        value, gradient, hessian = _derivatives(density, z, frame)
+        value, gradient, hessian = derivatives(density, z, frame)
         if not (np.isfinite(gradient).all() and np.isfinite(hessian).all()):
             frame = 0.3 * frame  # a bound of the support is near
             continue
@@ -193,7 +216,7 @@ def refine(density: CollapsedDensity, z: Array) -> Optimum | None:
             z, best = trials[k], float(found[k])
         if length < 0.02 or not found[k] > value:
             break
-    value, gradient, hessian = _derivatives(density, z, frame)
+    value, gradient, hessian = derivatives(density, z, frame)
     if not np.isfinite(hessian).all():
         return None
     values, vectors = np.linalg.eigh(-hessian)

@@ -37,6 +37,7 @@ from inference.posterior.stages.looking import (
 from inference.posterior.stages.optima import depend_on_errors, that_matter
 from inference.posterior.stages.scouting import from_scouts
 from inference.posterior.stages.setting_out import TOLERATED
+from inference.posterior.stages.shaping import begins_with_a_shape, from_shapes
 from inference.posterior.stages.stage import (
     Drawing,
     Settled,
@@ -166,7 +167,8 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum], scouts: Sc
     """
     whole, calls = job.density(), 0
     density, optima = whole, _with_scouts(some, optima, scouts)
-    if optima and depend_on_errors(job, some, optima):
+    shaped, all_found = begins_with_a_shape(job, whole), optima
+    if optima and not shaped and depend_on_errors(job, some, optima):
         return Checkpoint(Starting(), calls, None, integrated=True)
     optima = that_matter(optima)
     if job.is_large and optima:
@@ -183,6 +185,10 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum], scouts: Sc
         optima = with_aliases(aliases, density, optima)
     check_ranges(whole, job.scene, optima[0].z)
     check_best_fit(whole, optima[0].z)
+    if shaped:
+        with_shape = from_shapes(job, density, all_found, scouts)
+        if with_shape is not None:
+            return with_shape
     stage, used = _first_stage(job, density, optima, scouts)
     reached = Checkpoint(stage, calls + used, None, job.representatives)
     begun = at_once(job, density, optima, scouts) if isinstance(stage, Tempering) else None
