@@ -11,8 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from inference.density.collapsed import CollapsedDensity
+from inference.posterior.checks import check_best_fit, check_ranges
 from inference.posterior.job import Job
-from inference.posterior.sampling.aliases import aliases_of
+from inference.posterior.sampling.aliases import aliases_of, with_aliases
 from inference.posterior.sampling.population import arrived_at
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.reparametrisation import Reparametrisation, reparametrisation_of
@@ -46,7 +47,7 @@ def begins_with_a_shape(job: Job, density: CollapsedDensity) -> bool:
     """
     few = not job.is_large and len(density.frames) <= MOST_FRAMES
     may = few and job.settings.method != "importance"
-    return may and reparametrisation_of(density) is not None and aliases_of(density) is None
+    return may and reparametrisation_of(density) is not None
 
 
 def from_shapes(
@@ -69,6 +70,11 @@ def from_shapes(
     -------
     Checkpoint or None
         None where there are several optima that matter, or none that is one.
+
+    Raises
+    ------
+    RefusedError
+        Where no parameters explain the frames at all.
     """
     coordinates = reparametrisation_of(density)
     target = job.with_error_integrated().density() if job.can_integrate_error else density
@@ -79,7 +85,11 @@ def from_shapes(
     )
     if coordinates is None or not found or _are_several(target, coordinates, found):
         return None
-    shape = found[0]
+    shape, aliases = found[0], aliases_of(target)
+    if aliases is not None and len(with_aliases(aliases, target, [shape.optimum])) > 1:
+        return None
+    check_ranges(target, job.scene, shape.optimum.z)
+    check_best_fit(target, shape.optimum.z)
     proposal = Proposal(mixture_of([shape.optimum]), shape.transport, MAP_SHARE)
     rng = job.stream(Stream.MEMBERS)
     hot = scouts.hot

@@ -167,8 +167,11 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum], scouts: Sc
     """
     whole, calls = job.density(), 0
     density, optima = whole, _with_scouts(some, optima, scouts)
-    shaped, all_found = begins_with_a_shape(job, whole), optima
-    if optima and not shaped and depend_on_errors(job, some, optima):
+    if optima and begins_with_a_shape(job, whole):
+        begun = from_shapes(job, whole, optima, scouts)
+        if begun is not None:
+            return begun
+    if optima and depend_on_errors(job, some, optima):
         return Checkpoint(Starting(), calls, None, integrated=True)
     optima = that_matter(optima)
     if job.is_large and optima:
@@ -185,16 +188,12 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum], scouts: Sc
         optima = with_aliases(aliases, density, optima)
     check_ranges(whole, job.scene, optima[0].z)
     check_best_fit(whole, optima[0].z)
-    if shaped:
-        with_shape = from_shapes(job, density, all_found, scouts)
-        if with_shape is not None:
-            return with_shape
     stage, used = _first_stage(job, density, optima, scouts)
     reached = Checkpoint(stage, calls + used, None, job.representatives)
-    begun = at_once(job, density, optima, scouts) if isinstance(stage, Tempering) else None
-    if begun is None:
+    moved = at_once(job, density, optima, scouts) if isinstance(stage, Tempering) else None
+    if moved is None:
         return reached
-    erring, used = begun
+    erring, used = moved
     return dataclasses.replace(
         reached, stage=erring, calls=reached.calls + used, integrated=True, exact=stage
     )
