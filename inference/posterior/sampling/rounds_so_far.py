@@ -173,8 +173,12 @@ class RoundsSoFar:
 
     @property
     def draws(self) -> WeightedDraws | None:
-        """All draws so far, by weight; None where they tell little, or members contradict them."""
-        if not self.telling:
+        """All draws so far, by weight; None where they tell little, or members contradict them.
+
+        Draws of shapes follow the target itself, those of the first maps the members: few rounds
+        of the former tell as much as many of the latter.
+        """
+        if not (self.telling or (self.wanted.shapes and not self.shaped)):
             return None
         now = self
         if self.last is not None and self.last.drawn is not None:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.coordinates import Coordinates
 from inference.posterior.sampling.pool import Pool
-from inference.posterior.sampling.start import Optimum, curvature_factor, derivatives
+from inference.posterior.sampling.start import Optimum, curvature_factor, derivatives, lower_factor
 from inference.posterior.sampling.transport import TriangularMap, unbent_map
 
 __all__ = ["Shape", "followed", "shape_at"]
@@ -94,7 +94,7 @@ def shape_at(density: CollapsedDensity, coordinates: Coordinates, z: Array) -> S
     Shape or None
         None where the density is not finite around the point.
     """
-    target, d = _Straight(density, coordinates), z.size
+    target, _d = _Straight(density, coordinates), z.size
     y = coordinates.forward(z[None])[0]
     frame = _slopes(coordinates.forward, z) @ curvature_factor(density, z)
     best = -math.inf
@@ -126,8 +126,7 @@ def shape_at(density: CollapsedDensity, coordinates: Coordinates, z: Array) -> S
         return None
     top = coordinates.backward(y[None])[0]
     spread = _slopes(coordinates.backward, y) @ frame
-    factor = scipy.linalg.qr(spread.T, mode="r")[0][:d].T
-    factor = factor * np.sign(np.diagonal(factor))
+    factor = lower_factor(spread)
     if not (np.isfinite(factor).all() and np.diagonal(factor).all()):
         return None
     value = float(density(top[None])[0])
@@ -186,7 +185,7 @@ def followed(transport: TriangularMap, pool: Pool, members: int) -> TriangularMa
     if 1.0 / np.sum(weights**2) >= _BY_MOMENTS * d:
         mean = weights @ x
         centred = np.sqrt(weights)[:, None] * (x - mean)
-        factor = scipy.linalg.qr(centred, mode="r")[0][:d].T
+        factor = lower_factor(centred.T)
     else:
         terms = 1 + d + d * (d + 1) // 2
         weights = _flattened(log_weights, min(_BY_TERMS * terms, _HALF * len(x)))

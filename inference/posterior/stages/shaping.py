@@ -95,18 +95,16 @@ def from_shapes(
     hot = scouts.hot
     if len(hot) > _HELD_TO:
         hot = hot[rng.choice(len(hot), _HELD_TO, replace=False)]
-    stood = [z[np.isfinite(target(z))] for z in (scouts.z, hot)]
-    members = tuple(arrived_at(z) for z in stood if len(z))
+    members = tuple(arrived_at(z) for z in (scouts.z, hot) if len(z))
     if not members:
         return None
     pending = Verdict(False, ("no steps were made",))
     stage = Tempering(proposal, members, pending, scouted=True, shaped=True)
-    calls = len(optima) + sum(map(len, stood))
     if target is density:
-        return Checkpoint(stage, calls)
+        return Checkpoint(stage, len(optima))
     own = Proposal(mixture_of(optima), None, MAP_SHARE)
     exact = from_scouts(job, density, own, scouts, None)
-    return Checkpoint(stage, calls, integrated=True, exact=exact)
+    return Checkpoint(stage, len(optima), integrated=True, exact=exact)
 
 
 def _are_several(

@@ -14,7 +14,7 @@ from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, dr
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.represent import represent
 from inference.posterior.sampling.scouts import Scouts
-from inference.posterior.sampling.start import Optimum, added, climb, refine
+from inference.posterior.sampling.start import Finish, Optimum, added, climb, refine, roughly
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.sampling.warm import beyond, warm_start
 from inference.posterior.stages.checkpoint import Checkpoint
@@ -166,11 +166,14 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum], scouts: Sc
         Told of none of them.
     """
     whole, calls = job.density(), 0
-    density, optima = whole, _with_scouts(some, optima, scouts)
-    if optima and begins_with_a_shape(job, whole):
-        begun = from_shapes(job, whole, optima, scouts)
+    density = whole
+    if begins_with_a_shape(job, whole):
+        ends = _with_scouts(some, optima, scouts, roughly)
+        begun = from_shapes(job, whole, ends, scouts) if ends else None
         if begun is not None:
             return begun
+        optima = [one for one in (refine(some, end.z) for end in optima) if one is not None]
+    optima = _with_scouts(some, optima, scouts)
     if optima and depend_on_errors(job, some, optima):
         return Checkpoint(Starting(), calls, None, integrated=True)
     optima = that_matter(optima)
@@ -253,11 +256,13 @@ def _at_rest(
     return Weighted(proposal.optima, drawn, Verdict(True, ())), calls
 
 
-def _with_scouts(density: CollapsedDensity, optima: list[Optimum], scouts: Scouts) -> list[Optimum]:
+def _with_scouts(
+    density: CollapsedDensity, optima: list[Optimum], scouts: Scouts, finish: Finish = refine
+) -> list[Optimum]:
     """Add optima that the best scout leads to."""
     if len(scouts.z):
-        optima = added(optima, refine(density, climb(density, scouts.z[0])[0]))
-        optima = added(optima, refine(density, scouts.z[0]))
+        optima = added(optima, finish(density, climb(density, scouts.z[0])[0]))
+        optima = added(optima, finish(density, scouts.z[0]))
     return optima
 
 
