@@ -16,7 +16,7 @@ from inference.fits.likelihood.profile_slopes import profile_slopes
 from inference.fits.likelihood.screen import screen
 from inference.frame.blocks import DISPLACEMENT, DISPLACEMENT_RATE
 from inference.posterior.job import Job
-from inference.posterior.sampling.start import Finish, Optimum, climb, refine
+from inference.posterior.sampling.start import Optimum, climb, refine, roughly
 from simulator.compiled import at_once, soon
 from simulator.parameters import OFFSET
 from simulator.sensor_unknowns import TIMING
@@ -30,7 +30,7 @@ _DEVIANCE = 100.0  # above the best: what priors could make up for
 _FARTHEST = 6.0  # standard deviations of a prior at which a climb starts
 
 
-def fitted_optima(job: Job, density: CollapsedDensity, finish: Finish = refine) -> list[Optimum]:
+def fitted_optima(job: Job, density: CollapsedDensity, *, brief: bool = False) -> list[Optimum]:
     """Find maxima of the collapsed density from the optima of the fit over all frames.
 
     Parameters
@@ -39,8 +39,8 @@ def fitted_optima(job: Job, density: CollapsedDensity, finish: Finish = refine) 
         What was read, by what, of what.
     density : CollapsedDensity
         Of the same.
-    finish : callable
-        As of `find_optima`.
+    brief : bool
+        Whether one search of the fit is enough, and rough shapes: for what climbs on from there.
 
     Returns
     -------
@@ -61,7 +61,8 @@ def fitted_optima(job: Job, density: CollapsedDensity, finish: Finish = refine) 
     many = len(problem) > EASY
     kernels = screen, levenberg_marquardt, profile_slopes
     with at_once(*kernels) if many else soon(levenberg_marquardt):
-        fits = find_maxima(problem)
+        fits = find_maxima(problem, 0) if brief else find_maxima(problem)
+    finish = roughly if brief else refine
     found = []
     for fit in fits[:_MOST]:
         if not fit.deviance < fits[0].deviance + _DEVIANCE:

@@ -12,7 +12,7 @@ import numpy as np
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
 from inference.posterior.sampling.scouts import send_scouts, thinned
-from inference.posterior.sampling.start import Finish, find_optima, refine, roughly
+from inference.posterior.sampling.start import find_optima, refine, roughly
 from inference.posterior.stages.chunk import is_short_for_scouts
 from inference.posterior.stages.shaping import begins_with_a_shape
 from inference.posterior.stages.stage import Starting
@@ -53,22 +53,23 @@ class LookTask:
         Without optional terms, and with something unknown.
     way : str
         Which member of `Starting` is looked for.
-    finish : callable
-        As of `find_optima`.
+    brief : bool
+        Whether what is found is climbed on from, in coordinates of its own: rough shapes do.
     """
 
     job: Job
     way: Way
-    finish: Finish = refine
+    brief: bool = False
 
     def run(self) -> Looked:
         """Look."""
         job = of_some_frames(self.job) if self.job.is_large else self.job
         density = job.density()
         if self.way == "fitted":
-            return Looked(Starting(fitted=tuple(fitted_optima(job, density, self.finish))), 0)
+            return Looked(Starting(fitted=tuple(fitted_optima(job, density, brief=self.brief))), 0)
         if self.way == "climbed":
-            found = find_optima(density, self.job.stream(Stream.SCREEN), self.finish)
+            finish = roughly if self.brief else refine
+            found = find_optima(density, self.job.stream(Stream.SCREEN), finish)
             return Looked(Starting(climbed=tuple(found)), 0)
         scouts, calls = send_scouts(thinned(density), self.job.stream(Stream.SCOUTS))
         return Looked(Starting(scouts=scouts), calls)
@@ -85,8 +86,8 @@ def looking(job: Job, start: Starting, *, scouts: bool) -> tuple[LookTask, ...]:
     ways = ways_left(start, scouts=scouts)
     if len(ways) > 1 and is_short_for_scouts(job):
         ways = tuple(way for way in ways if way != "scouts")
-    finish = roughly if scouts and begins_with_a_shape(job, job.density()) else refine
-    return tuple(LookTask(job, way, finish) for way in ways)
+    brief = scouts and begins_with_a_shape(job, job.density())
+    return tuple(LookTask(job, way, brief) for way in ways)
 
 
 def taken_in(start: Starting, found: Sequence[Looked]) -> tuple[Starting, int]:
