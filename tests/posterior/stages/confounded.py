@@ -17,7 +17,7 @@ _SCENE = "crosstalk, background, R known"
 
 
 @functools.cache
-def confounded(snr: float = 1000.0, seed: int = 1, kind: str = "pulsed", **settings: Any) -> Job:
+def confounded(snr: float = 1000.0, seed: int = 1, kind: str = "sine_wave", **settings: Any) -> Job:
     """Return sixteen frames of an unknown object before an unknown wall and unknown crosstalk.
 
     Parameters

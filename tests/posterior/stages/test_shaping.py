@@ -60,6 +60,7 @@ def test_rounds_begin_with_a_shape_and_answer() -> None:
     assert last.calls < 40_000
 
 
+@pytest.mark.thorough
 def test_they_come_to_what_populations_from_the_prior_lead_to(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
