@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from inference.empty_scatter import scatter_of_empty
 from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK, taken_for_crosstalk
 from inference.impossible_light import impossible_light
+from inference.stuck_readings import stuck_readings
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import PulsedSensor, Sensor
@@ -47,6 +48,8 @@ def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, .
     supposed: tuple[str, ...] = ()
     if doubt := impossible_light(scene, sensor, frames):
         supposed = (doubt,)
+    if doubt := stuck_readings(sensor, frames):
+        supposed = (*supposed, doubt)
     if scene.shadow_is_object:
         supposed = (*supposed, _OWN_SHADOW)
     if sensor.temperature is None and frames.temperature_k is not None:
