@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from inference.empty_scatter import scatter_of_empty
 from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK, taken_for_crosstalk
+from inference.growing_light import growing_light
 from inference.impossible_light import impossible_light
 from inference.stuck_readings import stuck_readings
 from simulator.frames import Frames
@@ -46,7 +47,8 @@ def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, .
         looks like a mistake.
     """
     supposed: tuple[str, ...] = ()
-    if doubt := impossible_light(scene, sensor, frames):
+    doubt = impossible_light(scene, sensor, frames) or growing_light(scene, sensor, frames)
+    if doubt:
         supposed = (doubt,)
     if doubt := stuck_readings(sensor, frames):
         supposed = (*supposed, doubt)
