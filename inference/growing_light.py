@@ -27,7 +27,7 @@ _FEWEST = 10  # of fewer places no order is as rare
 _LOOKED_AT = 1000  # frames, evenly spaced
 _BRIGHT = 10.0  # noises of light, above which frames count
 _PLACES = 30  # at most that many parts of all ranges, so that an object at rest is one of them
-_APART = 6.0  # by so much more than crosstalk that is open may turn a frame
+_APART = 6.0  # standard deviations, to which an object at rest spreads by noise and open crosstalk
 _FARTHER = 0.1  # least difference of the medians of both halves [rad, or of r0]
 _BRIGHTER = 2.0  # least ratio of theirs
 _BELOW_ZERO = 0.2  # a phase or share that far below zero is still contact [rad, or of r0]
@@ -45,8 +45,8 @@ def growing_light(scene: Scene, sensor: Sensor, frames: Frames) -> str | None:
     -------
     str or None
         For a person. None where light is in no such order (false alarm at most 1e-6 a request
-        whose objects are as bright as they are independently of their range, or one that stands in
-        the beam), where fewer than ten places are seen, and before a wall.
+        of objects that are as bright as they are independently of their range, or of one whose
+        light falls with it), where fewer than ten places are seen, and before a wall.
     """
     if len(frames) < _FEWEST or scene.background is not None or sensor.temperature is not None:
         return None
@@ -60,13 +60,11 @@ def growing_light(scene: Scene, sensor: Sensor, frames: Frames) -> str | None:
     with np.errstate(all="ignore"):
         size, place = _seen(sensor, light)
         noise = np.square(sensor.noise.read) + sensor.noise.shot * np.abs(every.readings)
-        open_ = float(np.max(crosstalk.sd))
-        bright = size > _BRIGHT * np.sqrt(noise.max(axis=1) + open_**2)
-        bright &= np.isfinite(size) & (place > 0.0)
+        turned = np.sqrt(noise.max(axis=1) + max(crosstalk.sd) ** 2) / size
+        bright = (_BRIGHT * turned < 1.0) & np.isfinite(size) & (size > 0.0) & (place > 0.0)
     if bright.sum() < _FEWEST:
         return None
-    least = _APART * open_ / float(size[bright].min())
-    size = _by_place(size[bright] / every.gains[bright], place[bright], least)
+    size = _by_place(size[bright] / every.gains[bright], place[bright], turned[bright])
     n = size.size
     against = int(np.tril(size[:, None] <= size[None, :], -1).sum())
     if n < _FEWEST or _chance(n, against) > _FALSE_ALARM:
@@ -82,19 +80,23 @@ def _seen(sensor: Sensor, light: Array) -> tuple[Array, Array]:
     return np.hypot(*light.T), np.mod(phase + _BELOW_ZERO, 2.0 * math.pi) - _BELOW_ZERO
 
 
-def _by_place(size: Array, place: Array, least: float) -> Array:
+def _by_place(size: Array, place: Array, turned: Array) -> Array:
     """Return the light at each place, the nearest first; none where it does not differ much."""
     order = np.argsort(place, kind="stable")
-    size, place = size[order], place[order]
+    size, place, turned = size[order], place[order], turned[order]
     half = place.size // 2
     near, far = (np.median(place[part]) for part in (slice(half), slice(half, None)))
     dark, bright = (np.median(size[part]) for part in (slice(half), slice(half, None)))
     reach = float(place[-1] - place[0])
     if far < near + _FARTHER or bright < _BRIGHTER * dark or not reach > 0.0:
         return np.empty(0)
-    parts = min(_PLACES, int(reach / least)) if least > 0.0 else _PLACES
-    of = np.minimum((place - place[0]) / reach * parts, max(parts - 1, 0)).astype(int)
-    return np.array([np.median(size[of == part]) for part in np.unique(of)])
+    ends = place + np.maximum(reach / _PLACES, _APART * turned)
+    begins, end = list[int](), -math.inf
+    for i, (here, own) in enumerate(zip(place.tolist(), ends.tolist(), strict=True)):
+        if here > end:
+            begins.append(i)
+            end = own
+    return np.array([np.median(part) for part in np.split(size, begins[1:])])
 
 
 def _chance(n: int, against: int) -> float:
@@ -120,5 +122,5 @@ def _said(sensor: Sensor, n: int) -> str:
         "is brighter the farther it is. All ranges may be far off, each with a small error: check "
         f"{order}, `crosstalk`, and whether objects stand beyond {sensor.max_range_m:.3g} m, where "
         "ranges begin anew. It is right only where the farther objects are the brighter ones, or "
-        "one comes into the beam as it goes away"
+        "one comes into the beam, or turns to it, as it goes away"
     )

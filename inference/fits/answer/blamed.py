@@ -132,7 +132,7 @@ def _fitted_without(problem: FitProblem, top: Erring) -> Sequence[int]:
         start = dataclasses.replace(top, positions=np.delete(top.positions, out))
         ends = climb(rest, [start])
         if any(p_value_of(rest, end.chi_square) >= _FALSE_ALARM for end in ends):
-            return out.tolist()
+            return [int(frame) for frame in out]
     return ()
 
 
