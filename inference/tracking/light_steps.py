@@ -86,7 +86,13 @@ def _slope_off(u: float, table: ReadingsTable) -> float:
 @borrowed
 @compiled
 def may_step(
-    of: Hypotheses, row: int, frame: TrackedFrame, table: ReadingsTable, rules: Rules, work: Array
+    of: Hypotheses,
+    row: int,
+    frame: TrackedFrame,
+    empty: float,
+    table: ReadingsTable,
+    rules: Rules,
+    work: Array,
 ) -> bool:
     """Make a hypothesis as unsure of the range as the light has stepped, where it has.
 
@@ -96,6 +102,8 @@ def may_step(
         The hypothesis as it was predicted; changed in place where the light has stepped.
     frame : TrackedFrame
         The frame.
+    empty : float
+        Its squared surprise to an empty scene.
     table, rules : ReadingsTable, Rules
         Scene, sensor and rules.
     work : ndarray
@@ -109,7 +117,8 @@ def may_step(
     numbers, x, X = of.numbers, of.x, of.X
     if numbers.size <= UNSTEADY or math.isnan(numbers[SEEN1]):
         return False
-    if frame.known_rate > 0.0 or rules.rate_sd == 0.0:
+    # what an empty scene explains has left, or tells no range
+    if frame.known_rate > 0.0 or rules.rate_sd == 0.0 or not empty > _ALLOWED * _ALLOWED:
         return False
     u, gain, before = x[row, U], frame.gain, frame.gain / numbers[SEEN_GAIN]
     known1, known2, unknown = table.crosstalk1, table.crosstalk2, 0.0

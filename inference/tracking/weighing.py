@@ -126,7 +126,7 @@ def _of_followed(
         at_rest[h] = -math.inf
     for h in range(1, followed + 1):
         old, log_weight = found, log_of(of.weight[h])
-        if may_step(of, h, frame, table, model.rules, room.scratch.work):
+        if may_step(of, h, frame, empty.surprise, table, model.rules, room.scratch.work):
             log_weight += math.log(model.rules.outlier)
         prior = prior_of(of, h, frame.gain, log_weight + log_usual, table)
         found = find_candidates(candidates, found, h, frame, prior, table, scan, room.scanned)

@@ -112,13 +112,15 @@ def predicted(kind: str, rate: float, shot: float = 0.0) -> tuple[Tracker, Hypot
     return of, now, readings[-1]
 
 
-def steps(of: Tracker, state: Hypotheses, readings: Array, gain: float = 1.0) -> bool:
+def steps(
+    of: Tracker, state: Hypotheses, readings: Array, gain: float = 1.0, empty: float = 1e3
+) -> bool:
     """Tell whether light has stepped; the state is changed."""
     first, second = (readings * of.observed.scale).tolist()
     row = heaviest(state)
     work = scratch_for(state).work
     frame = TrackedFrame(first, second, gain)
-    return bool(may_step(state, row, frame, of.model.table, of.model.rules, work))
+    return bool(may_step(state, row, frame, empty, of.model.table, of.model.rules, work))
 
 
 def allowed(kind: str, state: Hypotheses, last: Array, factor: float, shot: float) -> float:
@@ -200,8 +202,18 @@ def test_what_is_known_to_rest_does_not_step(kind: str) -> None:
     bright = (CROSSTALK + 4.0 * (last - CROSSTALK)) * of.observed.scale
     first, second = bright.tolist()
     frame, work = TrackedFrame(first, second, 1.0), scratch_for(state).work
-    assert not may_step(state, heaviest(state), frame, of.model.table, still, work)
-    assert may_step(state, heaviest(state), frame, of.model.table, of.model.rules, work)
+    table, row = of.model.table, heaviest(state)
+    assert not may_step(state, row, frame, 1e3, table, still, work)
+    assert may_step(state, row, frame, 1e3, table, of.model.rules, work)
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_what_an_empty_scene_explains_is_no_step(kind: str) -> None:
+    """Of an object that has left the light is gone: it is not somewhere far away."""
+    of, state, last = predicted(kind, 0.0)
+    dark = CROSSTALK + 0.01 * (last - CROSSTALK)
+    assert not steps(of, copied(state), dark, empty=24.0)
+    assert steps(of, copied(state), dark, empty=26.0)
 
 
 def test_a_step_is_as_likely_as_an_outlier() -> None:
