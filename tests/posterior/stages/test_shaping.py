@@ -11,6 +11,7 @@ from inference.posterior import fold
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.sampling.rounds_so_far import Rounds, Wanted
 from inference.posterior.sampling.scouts import Scouts
+from inference.posterior.sampling.shape import Shape, shape_at
 from inference.posterior.stages import shaping, starting
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.ensembles import POPULATIONS
@@ -172,10 +173,10 @@ def test_two_tops_that_matter_are_left_to_populations(monkeypatch: pytest.Monkey
     job = confounded()
     start = _before_shapes(job)
     assert start.scouts is not None
-    real, tops = shaping.shape_at, []
+    tops: list[Shape] = []
 
-    def apart(*arguments: Any) -> Any:
-        shape = real(*arguments)
+    def apart(*arguments: Any) -> Shape:
+        shape = shape_at(*arguments)
         assert shape is not None
         if tops:  # the second one: as high, with nothing between
             z = shape.optimum.z + 3.0
