@@ -21,6 +21,7 @@ __all__ = ["LastDraws", "Rounds", "RoundsSoFar", "Wanted", "heaviest_of", "worst
 Array = NDArray[np.float64]
 
 _FEWEST = 6  # rounds: before, even weights are those of draws that all leave out the same
+_TAILS = 3  # rounds of maps behind shapes, from which on tails are in the draws
 _TAIL = 0.01  # of the draws' mass, in the heaviest of them: there may be
 _MOST_DISSENT = 0.03  # so many of a population's members
 
@@ -175,10 +176,12 @@ class RoundsSoFar:
     def draws(self) -> WeightedDraws | None:
         """All draws so far, by weight; None where they tell little, or members contradict them.
 
-        Draws of shapes follow the target itself, those of the first maps the members: few rounds
-        of the former tell as much as many of the latter.
+        Shapes follow the target itself, and first maps the members: behind the former few rounds
+        of maps tell as much as many behind the latter. Draws of shapes alone leave out tails.
         """
-        if not (self.telling or (self.wanted.shapes and not self.shaped)):
+        shapes = self.wanted.shapes
+        early = shapes > 0 and len(self.pool.laws) >= shapes + _TAILS * LAWS
+        if not (self.telling or early):
             return None
         now = self
         if self.last is not None and self.last.drawn is not None:

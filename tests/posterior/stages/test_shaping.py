@@ -91,7 +91,7 @@ def test_there_is_an_answer_as_soon_as_shapes_have_followed() -> None:
         for one in _shaped()
         if isinstance(one.stage, Tempering) and one.stage.rounds is not None
     }
-    early = [one for laws, one in sorted(stage_of.items()) if laws <= 10]
+    early = [one for laws, one in sorted(stage_of.items()) if laws <= 13]
     standing = [one for one in early if stands(one.stage)]
     assert standing
     posterior = _answer(job, standing[0])
