@@ -44,15 +44,31 @@ class Scouts:
     hot: Array
 
 
-def send_scouts(density: CollapsedDensity, rng: np.random.Generator) -> tuple[Scouts, int]:
+def send_scouts(
+    density: CollapsedDensity, rng: np.random.Generator, reach: float = 1.0
+) -> tuple[Scouts, int]:
     """Send out scouts; with the evaluations that it took.
 
     They stay where they are where readings that nothing explains keep them on their way.
+
+    Parameters
+    ----------
+    density : CollapsedDensity
+        Target.
+    rng : numpy.random.Generator
+        Source of randomness.
+    reach : float
+        Power of the likelihood from which on they need not go on.
+
+    Returns
+    -------
+    (Scouts, int)
+        The scouts, and density evaluations.
     """
     effort = scouts(_SCOUTS)
     found = first_population(density, rng, effort)
     hot = [found.z[:0]]
-    while not found.ended and found.steps < _MOST:
+    while not found.ended and found.power < reach and found.steps < _MOST:
         found = temper(density, found, rng, effort)
         if found.power > _HOT:
             hot.append(found.z)

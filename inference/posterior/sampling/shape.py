@@ -69,23 +69,33 @@ class _Straight:
     """A density in other coordinates y."""
 
     density: CollapsedDensity
-    coordinates: Coordinates
+    coordinates: Coordinates | None
+
+    def forward(self, z: Array) -> Array:
+        """Return y, shape (n, d)."""
+        return z if self.coordinates is None else self.coordinates.forward(z)
+
+    def backward(self, y: Array) -> Array:
+        """Return z, shape (n, d)."""
+        return y if self.coordinates is None else self.coordinates.backward(y)
 
     def __call__(self, y: Array) -> Array:
-        z = self.coordinates.backward(y)
-        value = self.density(z) - self.coordinates.with_volume(z)[1]
+        """Return log densities in y, shape (n,)."""
+        z = self.backward(y)
+        volume = 0.0 if self.coordinates is None else self.coordinates.with_volume(z)[1]
+        value = self.density(z) - volume
         return np.where(np.isnan(value), -np.inf, value)
 
 
-def shape_at(density: CollapsedDensity, coordinates: Coordinates, z: Array) -> Shape | None:
+def shape_at(density: CollapsedDensity, coordinates: Coordinates | None, z: Array) -> Shape | None:
     """Climb to the top in straight coordinates, and measure the curvature around it.
 
     Parameters
     ----------
     density : CollapsedDensity
         Target.
-    coordinates : FluxCoordinate, LightAtRest or Reparametrisation
-        In which it is nearly normal.
+    coordinates : FluxCoordinate, LightAtRest, Reparametrisation or None
+        In which it is nearly normal; None for z itself.
     z : ndarray, shape (d,)
         Start, in the coordinates of the density.
 
@@ -95,8 +105,8 @@ def shape_at(density: CollapsedDensity, coordinates: Coordinates, z: Array) -> S
         None where the density is not finite around the point.
     """
     target, _d = _Straight(density, coordinates), z.size
-    y = coordinates.forward(z[None])[0]
-    frame = _slopes(coordinates.forward, z) @ curvature_factor(density, z)
+    y = target.forward(z[None])[0]
+    frame = _slopes(target.forward, z) @ curvature_factor(density, z)
     best = -math.inf
     for _ in range(_MOST_STEPS):
         frame = _shortened(target, y, frame)
@@ -124,8 +134,8 @@ def shape_at(density: CollapsedDensity, coordinates: Coordinates, z: Array) -> S
             break
     if not (np.isfinite(best) and np.isfinite(frame).all()):
         return None
-    top = coordinates.backward(y[None])[0]
-    spread = _slopes(coordinates.backward, y) @ frame
+    top = target.backward(y[None])[0]
+    spread = _slopes(target.backward, y) @ frame
     factor = lower_factor(spread)
     if not (np.isfinite(factor).all() and np.diagonal(factor).all()):
         return None

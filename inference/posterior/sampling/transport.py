@@ -133,7 +133,7 @@ class TriangularMap:
         mean, factor : ndarray, shape (d,) and (d, d)
             Of the law.
         """
-        if self.coordinates is None or self.means.any() or self.scales.any():
+        if self.means.any() or self.scales.any():
             raise ValueError("a map that bends")
         centre, axes = self.centre + self.axes @ mean, self.axes @ factor
         return unbent_map(centre, axes, self.coordinates)
@@ -228,15 +228,15 @@ def straight_map(draws: Array) -> TriangularMap:
     return TriangularMap(centre, axes, np.zeros((2, d)), nothing, nothing, 0, None)
 
 
-def unbent_map(centre: Array, factor: Array, coordinates: Coordinates) -> TriangularMap:
+def unbent_map(centre: Array, factor: Array, coordinates: Coordinates | None) -> TriangularMap:
     """Return the map of a normal law in some coordinates to the standard one.
 
     Parameters
     ----------
     centre, factor : ndarray, shape (d,) and (d, d)
         Mean, and F with F F^T the covariance.
-    coordinates : FluxCoordinate, LightAtRest or Reparametrisation
-        Of both.
+    coordinates : FluxCoordinate, LightAtRest, Reparametrisation or None
+        Of both; None for z itself.
     """
     left, singular, _ = scipy.linalg.svd(factor)
     nothing = np.zeros((centre.size, math.comb(centre.size + 1, 2)))

@@ -14,6 +14,7 @@ from inference.posterior.job import Job
 from inference.posterior.sampling.scouts import send_scouts, thinned
 from inference.posterior.sampling.start import find_optima, refine, roughly
 from inference.posterior.stages.chunk import is_short_for_scouts
+from inference.posterior.stages.setting_out import HALFWAY
 from inference.posterior.stages.shaping import begins_with_a_shape
 from inference.posterior.stages.stage import Starting
 from inference.posterior.streams import Stream
@@ -54,7 +55,8 @@ class LookTask:
     way : str
         Which member of `Starting` is looked for.
     brief : bool
-        Whether what is found is climbed on from, in coordinates of its own: rough shapes do.
+        Whether what is found is climbed on from with the model's errors, in coordinates of its own:
+        rough shapes do, and scouts that stop on their way.
     """
 
     job: Job
@@ -71,7 +73,8 @@ class LookTask:
             finish = roughly if self.brief else refine
             found = find_optima(density, self.job.stream(Stream.SCREEN), finish)
             return Looked(Starting(climbed=tuple(found)), 0)
-        scouts, calls = send_scouts(thinned(density), self.job.stream(Stream.SCOUTS))
+        reach = HALFWAY if self.brief else 1.0
+        scouts, calls = send_scouts(thinned(density), self.job.stream(Stream.SCOUTS), reach)
         return Looked(Starting(scouts=scouts), calls)
 
 

@@ -35,6 +35,7 @@ from inference.posterior.stages.standing import best_known
 from inference.posterior.streams import Stream
 
 __all__ = [
+    "HALFWAY",
     "HALFWAY_DRAWS",
     "SCOUTED_DRAWS",
     "TOLERATED",
@@ -49,7 +50,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-_HALFWAY = 0.3  # power of the likelihood at which small populations stop
+HALFWAY = 0.3  # power of the likelihood at which small populations stop, and scouts before shapes
 _SHARE = 0.5  # of what the populations took, that importance sampling behind them may take
 _MOST_DRAWS = (12_000, 40_000)  # but so many at least, and at most
 SCOUTED_DRAWS = 20_000  # that rounds from scouts may take: as many as carry one population
@@ -234,7 +235,7 @@ def small_populations(stage: Tempering) -> Tempering:
     """Return the stage in which small populations set out from the prior, and stop on their way."""
     proposal = dataclasses.replace(stage.proposal, transport=None)
     populations = (None,) * POPULATIONS
-    return Tempering(proposal, populations, stage.verdict, stage.weighted, reach=_HALFWAY)
+    return Tempering(proposal, populations, stage.verdict, stage.weighted, reach=HALFWAY)
 
 
 def all_the_way(stage: Tempering) -> Tempering:

@@ -1,9 +1,10 @@
 """Rounds of importance draws that begin with a Laplace shape in straight coordinates.
 
-Where crosstalk and a background are confounded the posterior is a thin sheet that bends, and what
-comes from the prior takes long to unbend it. In coordinates in which it is straight it is nearly
-normal where the model's errors are most of its width, and are integrated out: rounds begin there at
-once, and scouts from the prior, which know of no optimum, are what they are held to.
+Before a background the posterior is a thin sheet that bends, the most where crosstalk is confounded
+with it, and what comes from the prior takes long to unbend it. In coordinates in which it is
+straight it is nearly normal where the model's errors are most of its width, and are integrated out:
+rounds begin there at once, and scouts from the prior, which know of no optimum, are what they are
+held to.
 """
 
 from collections.abc import Sequence
@@ -15,9 +16,9 @@ from inference.density.discrepant import DiscrepantDensity
 from inference.posterior.checks import check_best_fit, check_ranges
 from inference.posterior.job import Job
 from inference.posterior.sampling.aliases import aliases_of, with_aliases
+from inference.posterior.sampling.coordinates import Coordinates, coordinates_of
 from inference.posterior.sampling.population import arrived_at
 from inference.posterior.sampling.proposal import Proposal, mixture_of
-from inference.posterior.sampling.reparametrisation import Reparametrisation, reparametrisation_of
 from inference.posterior.sampling.scouts import MOST_FRAMES, Scouts
 from inference.posterior.sampling.shape import Shape, shape_at
 from inference.posterior.sampling.start import Optimum
@@ -34,7 +35,7 @@ _CLIMBED = 2  # optima, the best with the model's errors
 _HELD_TO = 1000  # of the places where scouts stood: one in a hundred counts
 _APART = 1.0  # nats below the lower of two tops, midway, from which on they are two
 _STEP = 0.3  # standard deviations, over which curvature is measured
-_WIDENED = 15.0  # times the curvature without errors, in the median direction
+_WIDENED = 15.0  # times the curvature without errors, in the median direction, where these lead
 _NEGLIGIBLE = 6.0  # nats of mass: what is less holds some thousandths
 
 
@@ -51,7 +52,7 @@ def begins_with_a_shape(job: Job, density: CollapsedDensity) -> bool:
     few = not job.is_large and len(density.frames) <= MOST_FRAMES
     errs = job.can_integrate_error or isinstance(density, DiscrepantDensity)
     may = few and errs and job.settings.method != "importance"
-    return may and reparametrisation_of(density) is not None
+    return may and density.parameters.has_background
 
 
 def from_shapes(
@@ -81,14 +82,14 @@ def from_shapes(
     RefusedError
         Where no parameters explain the frames at all.
     """
-    coordinates = reparametrisation_of(density)
+    coordinates = coordinates_of(density)
     target = job.with_error_integrated().density() if job.can_integrate_error else density
     best = np.argsort(-target(np.array([one.z for one in optima])))[:_CLIMBED]
-    climbed = [shape_at(target, coordinates, optima[i].z) for i in best] if coordinates else []
+    climbed = [shape_at(target, coordinates, optima[i].z) for i in best]
     found = sorted(
         (one for one in climbed if one is not None), key=lambda one: -one.optimum.log_density
     )
-    if coordinates is None or not found or _are_several(target, coordinates, found):
+    if not found or _are_several(target, coordinates, found):
         return None
     shape, aliases = found[0], aliases_of(target)
     if aliases is not None and len(with_aliases(aliases, target, [shape.optimum])) > 1:
@@ -118,7 +119,8 @@ def _errors_lead(density: CollapsedDensity, shape: Shape) -> bool:
     """Tell whether the model's errors are most of the width of a shape, in most directions.
 
     Where noise is, linear response around draws of the exact model mostly stands, and an evaluation
-    of that takes half as long.
+    of that takes half as long. Where the density of an exact model bends upwards within a step, the
+    shape stands on a slope of it, and it is the errors that keep it there.
 
     Parameters
     ----------
@@ -132,19 +134,21 @@ def _errors_lead(density: CollapsedDensity, shape: Shape) -> bool:
     value = density(shape.transport.bend(steps)[0])
     with np.errstate(invalid="ignore"):
         bends = (2.0 * value[0] - value[1 : d + 1] - value[d + 1 :]) / _STEP**2
-    return bool(np.median(np.where(np.isnan(bends), np.inf, bends)) > _WIDENED)
+    return bool(np.median(np.where(np.isnan(bends), np.inf, np.abs(bends))) > _WIDENED)
 
 
 def _are_several(
-    target: CollapsedDensity, coordinates: Reparametrisation, found: Sequence[Shape]
+    target: CollapsedDensity, coordinates: Coordinates | None, found: Sequence[Shape]
 ) -> bool:
     """Tell whether tops, the best first, lie in valleys of their own, and the others matter."""
     first = found[0].optimum
     for other in (one.optimum for one in found[1:]):
         if other.log_mass < first.log_mass - _NEGLIGIBLE or first.is_near(other.z):
             continue
-        ends = coordinates.forward(np.array([first.z, other.z]))
-        middle = coordinates.backward(ends.mean(axis=0)[None])
+        ends = np.array([first.z, other.z])
+        ends = ends if coordinates is None else coordinates.forward(ends)
+        middle = ends.mean(axis=0)[None]
+        middle = middle if coordinates is None else coordinates.backward(middle)
         if not target(middle)[0] > other.log_density - _APART:
             return True
     return False

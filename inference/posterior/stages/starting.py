@@ -13,7 +13,7 @@ from inference.posterior.sampling.from_the_prior import at_rest, drawn_from_the_
 from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.represent import represent
-from inference.posterior.sampling.scouts import Scouts
+from inference.posterior.sampling.scouts import Scouts, send_scouts, thinned
 from inference.posterior.sampling.start import Finish, Optimum, added, climb, refine, roughly
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.sampling.warm import beyond, warm_start
@@ -173,6 +173,8 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum], scouts: Sc
         if begun is not None:
             return begun
         optima = [one for one in (refine(some, end.z) for end in optima) if one is not None]
+        # they had stopped on their way
+        scouts, calls = send_scouts(thinned(some), job.stream(Stream.SCOUTS))
     optima = _with_scouts(some, optima, scouts)
     if optima and depend_on_errors(job, some, optima):
         return Checkpoint(Starting(), calls, None, integrated=True)

@@ -11,9 +11,9 @@ from simulator.sensor import parse_sensor
 from simulator.simulate import simulate
 from simulator.trajectories import RadialTrajectory
 
-__all__ = ["confounded"]
+__all__ = ["CONFOUNDED", "confounded"]
 
-_SCENE = "crosstalk, background, R known"
+CONFOUNDED = "crosstalk, background, R known"
 
 
 @functools.cache
@@ -33,7 +33,7 @@ def confounded(snr: float = 1000.0, seed: int = 1, kind: str = "sine_wave", **se
     """
     read = 7.7e-3 / snr
     sensor = parse_sensor({**SENSORS[kind], "noise": {"read": [read, read]}})
-    terms = SCENES[_SCENE]
+    terms = SCENES[CONFOUNDED]
     truth = {name: TRUTH[name] for name in ("object", *terms)}
     path = RadialTrajectory(from_m=0.1, to_m=2.0, frames=16, spacing="log")
     frames = simulate(sensor, parse_scene(truth), path, seed).frames

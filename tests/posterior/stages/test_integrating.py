@@ -1,6 +1,7 @@
 """Rounds with errors of the model integrated out from the start: an object before a known wall.
 
-The exact model's posterior is thin and bent, and its Laplace shapes do not fit it.
+The exact model's posterior is thin and bent, and its Laplace shapes do not fit it. Where a shape
+with errors integrated out is no beginning either, draws that follow these errors are.
 """
 
 import dataclasses
@@ -13,7 +14,7 @@ import pytest
 from benchmarks import hard_posteriors
 from inference.posterior import fold
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages import starting
+from inference.posterior.stages import looking, starting
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.responding import RespondTask, decided
 from inference.posterior.stages.stage import Starting, Tempering, Weighted
@@ -43,11 +44,14 @@ def _next(job: fold.Job, checkpoint: Checkpoint) -> Checkpoint:
 
 
 def _begun(job: fold.Job) -> Checkpoint:
-    """What the search for optima led to."""
-    checkpoint = fold.start(job)
-    while isinstance(checkpoint.stage, Starting):
-        checkpoint = _next(job, checkpoint)
-    return checkpoint
+    """What the search for optima led to, without a shape."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (looking, starting):
+            patch.setattr(module, "begins_with_a_shape", lambda *_: False)
+        checkpoint = fold.start(job)
+        while isinstance(checkpoint.stage, Starting):
+            checkpoint = _next(job, checkpoint)
+        return checkpoint
 
 
 @functools.cache
@@ -116,6 +120,22 @@ def test_it_is_the_law_that_rounds_behind_an_exact_model_come_to(
     while fold.tasks(job, checkpoint):
         checkpoint = _next(job, checkpoint)
     assert checkpoint.integrated
+    _are_one_law(job, checkpoint)
+
+
+def test_it_is_the_law_that_a_shape_leads_to() -> None:
+    """Of the same readings; with a shape there are fewer evaluations."""
+    job = _job(seed=2)
+    found = [fold.start(job)]
+    while fold.tasks(job, found[-1]):
+        found.append(_next(job, found[-1]))
+    assert any(isinstance(each.stage, Tempering) and each.stage.shaped for each in found)
+    assert found[-1].calls < _steps()[-1].calls
+    _are_one_law(job, found[-1])
+
+
+def _are_one_law(job: fold.Job, checkpoint: Checkpoint) -> None:
+    """Assert that an end has the means of `_steps`, within Monte Carlo errors."""
     one, other = (
         fold.summarise(of, each, 1.0, 1.0)
         for of, each in ((_job(), _steps()[-1]), (job, checkpoint))

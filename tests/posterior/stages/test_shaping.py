@@ -2,25 +2,32 @@
 
 import dataclasses
 import functools
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from benchmarks import hard_posteriors
+from inference.density.collapsed import CollapsedDensity
 from inference.posterior import fold
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.sampling.rounds_so_far import Rounds, Wanted
-from inference.posterior.sampling.scouts import Scouts
+from inference.posterior.sampling.scouts import Scouts, send_scouts
 from inference.posterior.sampling.shape import Shape, shape_at
-from inference.posterior.stages import shaping, starting
+from inference.posterior.sampling.start import Optimum
+from inference.posterior.sampling.transport import unbent_map
+from inference.posterior.stages import looking, shaping, starting
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.ensembles import POPULATIONS
-from inference.posterior.stages.looking import looking
 from inference.posterior.stages.shaping import begins_with_a_shape, from_shapes
 from inference.posterior.stages.stage import Starting, Tempering, Weighted
 from inference.posterior.stages.standing import stands
-from tests.posterior.stages.confounded import confounded
+from simulator.scene import parse_scene
+from tests.posterior.stages.confounded import CONFOUNDED, confounded
 from tests.posterior.stages.planted_rounds import plant_rounds
+
+Array = NDArray[np.float64]
 
 # of 8 means and 8 widths, at 6 standard errors of normal law: once in 3e7; of correlated draws with
 # unequal weights effective sizes are themselves known to a third
@@ -66,7 +73,7 @@ def test_they_come_to_what_populations_from_the_prior_lead_to(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Means and standard deviations of all unknowns."""
-    for module in (starting, shaping):
+    for module in (looking, starting):
         monkeypatch.setattr(module, "begins_with_a_shape", lambda *_: False)
     slow = _run(confounded())[-1]
     assert slow.integrated
@@ -169,6 +176,50 @@ def test_where_noise_leads_the_exact_model_comes_first() -> None:
     assert from_shapes(job, job.density(), start.optima, start.scouts) is None
 
 
+class _Bump:
+    """A log density that bends by so much in every direction."""
+
+    def __init__(self, bends: list[float]) -> None:
+        self.bends = np.array(bends)
+
+    def __call__(self, z: Array) -> Array:
+        return np.asarray(-0.5 * z**2 @ self.bends)
+
+
+@pytest.mark.parametrize(
+    ("bends", "lead"),
+    [([1.0, 1.0, 200.0], False), ([1.0, 20.0, 200.0], True), ([-90.0, -20.0, 2.0], True)],
+)
+def test_errors_lead_where_most_directions_bend_much(bends: list[float], lead: bool) -> None:
+    """Planted fault: a slope on which the exact model bends upwards counted as none."""
+    straight = unbent_map(np.zeros(3), np.eye(3), None)
+    shape = Shape(Optimum(np.zeros(3), 0.0, np.eye(3)), straight)
+    assert shaping._errors_lead(cast("CollapsedDensity", _Bump(bends)), shape) == lead
+
+
+def test_scouts_stop_on_their_way_and_go_on_where_noise_leads(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Planted fault: the exact model was begun with scouts that had stopped."""
+    job = confounded(snr=10.0)
+    before = _before_shapes(job)
+    sent: list[Scouts] = []
+
+    def recorded(*arguments: Any) -> tuple[Scouts, int]:
+        scouts, calls = send_scouts(*arguments)
+        sent.append(scouts)
+        return scouts, calls
+
+    monkeypatch.setattr(starting, "send_scouts", recorded)
+    fold.run(starting.StartTask(job, before))
+    assert before.scouts is not None
+    (whole,) = sent
+    short = before.scouts
+    assert np.log(short.z.std(axis=0)).mean() > np.log(whole.z.std(axis=0)).mean()
+    # the same way as far as they went
+    assert {row.tobytes() for row in short.hot} < {row.tobytes() for row in whole.hot}
+
+
 def test_two_tops_that_matter_are_left_to_populations(monkeypatch: pytest.MonkeyPatch) -> None:
     job = confounded()
     start = _before_shapes(job)
@@ -189,6 +240,14 @@ def test_two_tops_that_matter_are_left_to_populations(monkeypatch: pytest.Monkey
     assert from_shapes(job, job.density(), start.optima, start.scouts) is None
 
 
+def test_only_scenes_with_a_background_begin_so() -> None:
+    open_scene = confounded()
+    assert begins_with_a_shape(open_scene, open_scene.density())
+    terms = {"object": {}, "crosstalk": hard_posteriors.SCENES[CONFOUNDED]["crosstalk"]}
+    bare = dataclasses.replace(open_scene, scene=parse_scene(terms))
+    assert not begins_with_a_shape(bare, bare.density())
+
+
 def test_an_exact_model_and_importance_alone_begin_as_before() -> None:
     job = confounded()
     assert begins_with_a_shape(job, job.density())
@@ -200,8 +259,8 @@ def test_an_exact_model_and_importance_alone_begin_as_before() -> None:
 
 def test_the_search_before_a_shape_is_brief() -> None:
     job = confounded()
-    assert all(task.brief for task in looking(job, Starting(), scouts=True))
-    assert not any(task.brief for task in looking(job, Starting(), scouts=False))
+    assert all(task.brief for task in looking.looking(job, Starting(), scouts=True))
+    assert not any(task.brief for task in looking.looking(job, Starting(), scouts=False))
 
 
 def test_rounds_are_of_shapes_first_and_then_of_maps() -> None:
