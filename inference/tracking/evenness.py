@@ -23,6 +23,7 @@ from inference.tracking.hypotheses import (
     ROUGHNESS,
     Hypotheses,
     heaviest,
+    log_of,
     learns_crosstalk,
     unknown_crosstalk,
 )
@@ -36,6 +37,7 @@ __all__ = [
     "even_out",
     "hides",
     "let_rest",
+    "level_at_rest",
     "log_at_rest",
     "log_total",
     "take_width",
@@ -51,6 +53,9 @@ Of such motion the mean is 0.52, and over the last four frames below this in abo
 
 _LEARNT = 0.5  # share of the widths that counts of motion as rough as its law, crosstalk learnt
 _HIDDEN = 10.0  # variance of a reading by crosstalk, in that of the noise: light may be of either
+# nats by which a frame of an object at rest may fit worse than the best and tell nothing: by noise
+# alone two readings do once in 400
+_SAME_READINGS = 6.0
 _LOG_RESTING = math.log(0.25)  # least weight of an object that may rest, against the empty scene's
 
 
@@ -149,6 +154,33 @@ def even_out(of: TrackCandidates, last: int, log_before: float) -> None:
     if math.isfinite(change):
         for j in range(last):
             of.log_mass[j] += change
+
+
+@borrowed
+@compiled
+def level_at_rest(of: Hypotheses, at_rest: Array, log_usual: float) -> None:
+    """Take from masses at rest what frames say of them that are the first one over again.
+
+    Where an object at rest is bright its motion takes up more of the noise, and its readings fit
+    better, by half a nat in every frame: the nearest would be sure, and none of the frames tells.
+
+    Parameters
+    ----------
+    of : Hypotheses
+        As predicted.
+    at_rest : ndarray, shape (hypotheses + 1,)
+        As for `let_rest`; changed in place.
+    log_usual : float
+        Log of the probability that a frame is no outlier.
+    """
+    best = math.inf
+    for h in range(at_rest.size):
+        if at_rest[h] > -math.inf:
+            best = min(best, log_of(of.weight[h]) + log_usual - at_rest[h])
+    for h in range(at_rest.size):
+        if at_rest[h] > -math.inf:
+            before = log_of(of.weight[h]) + log_usual
+            at_rest[h] = before - max(best, before - at_rest[h] - _SAME_READINGS)
 
 
 @borrowed

@@ -123,7 +123,9 @@ def _fine_windows(begin: float, end: float, sd: float) -> Windows:
     """Return fine windows between two ends, in standard deviations from the mean."""
     first, last = max(begin, -_FINE_REACH), min(end, _FINE_REACH)
     spacing = max(_FINE / sd, (last - first) / (MOST_PARTS - 1))
-    return Windows(first, spacing, min(math.ceil((last - first) / spacing) + 1, MOST_PARTS), _FINE_WINDOWS)
+    return Windows(
+        first, spacing, min(math.ceil((last - first) / spacing) + 1, MOST_PARTS), _FINE_WINDOWS
+    )
 
 
 @compiled

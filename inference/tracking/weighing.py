@@ -28,6 +28,7 @@ from inference.tracking.evenness import (
     even_out,
     hides,
     let_rest,
+    level_at_rest,
     log_at_rest,
     log_total,
     take_width,
@@ -52,6 +53,7 @@ from inference.tracking.places import Places, mass_bound
 from inference.tracking.prediction import born_prior, own_prior, prior_of
 from inference.tracking.readings_table import ReadingsTable
 from inference.tracking.report import HYPOTHESIS_COLUMNS
+from inference.tracking.resting import nothing_has_changed
 from inference.tracking.stillness import crosstalk_is_held
 from inference.tracking.too_faint import MOST_EMPTY, doubt_the_faint
 from inference.tracking.turning import may_turn
@@ -111,7 +113,9 @@ def room_for(of: Hypotheses, places: Places) -> Room:
     empty = Hypotheses(np.zeros((1, of.x.shape[1])), np.zeros((1, n, m)), np.zeros(1), np.zeros(1))
     rest = np.zeros(capacity)
     described = np.zeros((capacity, HYPOTHESIS_COLUMNS))
-    return Room(after, candidates, scanned_for(places.scan), scratch_for(of), rest, empty, described)
+    return Room(
+        after, candidates, scanned_for(places.scan), scratch_for(of), rest, empty, described
+    )
 
 
 @compiled
@@ -150,6 +154,8 @@ def _of_followed(
             log_before = np.logaddexp(log_before, log_total(candidates, old, found))
             take_width(candidates, old, found, counted, rest)
     even_out(candidates, found, log_before)
+    if learns and nothing_has_changed(of):
+        level_at_rest(of, at_rest, log_usual)
     if learns and not frame.known_rate > 0.0:
         # a density is as high at best as that of the empty scene, whose readings these would be
         highest = empty.usual + 0.5 * empty.surprise - log_of(of.weight[0]) - log_usual
