@@ -23,8 +23,8 @@ from inference.tracking.hypotheses import (
     ROUGHNESS,
     Hypotheses,
     heaviest,
-    log_of,
     learns_crosstalk,
+    log_of,
     unknown_crosstalk,
 )
 from inference.tracking.readings_table import ReadingsTable
@@ -158,14 +158,19 @@ def even_out(of: TrackCandidates, last: int, log_before: float) -> None:
 
 @borrowed
 @compiled
-def level_at_rest(of: Hypotheses, at_rest: Array, log_usual: float) -> None:
-    """Take from masses at rest what frames say of them that are the first one over again.
+def level_at_rest(
+    candidates: TrackCandidates, last: int, of: Hypotheses, at_rest: Array, log_usual: float
+) -> None:
+    """Let frames that are the first one over again leave objects at rest their shares.
 
     Where an object at rest is bright its motion takes up more of the noise, and its readings fit
-    better, by half a nat in every frame: the nearest would be sure, and none of the frames tells.
+    better, by up to half a nat in every frame: the nearest would be sure, and none of them tells.
+    All fit as they do in the mean, so that nothing changes against the empty scene.
 
     Parameters
     ----------
+    candidates, last : TrackCandidates, int
+        The list, and its length; masses are changed in place.
     of : Hypotheses
         As predicted.
     at_rest : ndarray, shape (hypotheses + 1,)
@@ -173,14 +178,22 @@ def level_at_rest(of: Hypotheses, at_rest: Array, log_usual: float) -> None:
     log_usual : float
         Log of the probability that a frame is no outlier.
     """
-    best = math.inf
+    log_sum, log_before = -math.inf, -math.inf
     for h in range(at_rest.size):
         if at_rest[h] > -math.inf:
-            best = min(best, log_of(of.weight[h]) + log_usual - at_rest[h])
+            log_sum = np.logaddexp(log_sum, at_rest[h])
+            log_before = np.logaddexp(log_before, log_of(of.weight[h]) + log_usual)
+    if log_sum == -math.inf:
+        return
+    mean = log_before - log_sum
     for h in range(at_rest.size):
         if at_rest[h] > -math.inf:
-            before = log_of(of.weight[h]) + log_usual
-            at_rest[h] = before - max(best, before - at_rest[h] - _SAME_READINGS)
+            fit = log_of(of.weight[h]) + log_usual - at_rest[h]
+            change = fit - max(mean, fit - _SAME_READINGS)
+            at_rest[h] += change
+            for j in range(last):
+                if candidates.parent[j] == h:
+                    candidates.log_mass[j] += change
 
 
 @borrowed

@@ -155,7 +155,7 @@ def _of_followed(
             take_width(candidates, old, found, counted, rest)
     even_out(candidates, found, log_before)
     if learns and nothing_has_changed(of):
-        level_at_rest(of, at_rest, log_usual)
+        level_at_rest(candidates, found, of, at_rest, log_usual)
     if learns and not frame.known_rate > 0.0:
         # a density is as high at best as that of the empty scene, whose readings these would be
         highest = empty.usual + 0.5 * empty.surprise - log_of(of.weight[0]) - log_usual
