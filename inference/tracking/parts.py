@@ -59,7 +59,7 @@ class Windows(NamedTuple):
 
     first: float  # the middle of the first
     spacing: float  # between them, and their width
-    count: int
+    number: int
     reach: int  # windows that are this many further than the nearest one hold nothing
 
 
@@ -136,15 +136,15 @@ def _share_out(nodes: Nodes, size: int, mean: float, sd: float, windows: Windows
     hold.
     """
     weights, shares, shifts, squares = nodes.windows, nodes.shares, nodes.shifts, nodes.squares
-    for window in range(windows.count):
+    for window in range(windows.number):
         shares[window], shifts[window], squares[window] = 0.0, 0.0, 0.0
     for row in range(size):
         x = (nodes.aways[row] - mean) / sd
         at = (x - windows.first) / windows.spacing
-        nearest = min(max(round(at), 0), windows.count - 1)
+        nearest = min(max(round(at), 0), windows.number - 1)
         away, total = at - nearest, 0.0
         first = max(nearest - windows.reach, 0)
-        last = min(nearest + windows.reach, windows.count - 1)
+        last = min(nearest + windows.reach, windows.number - 1)
         for window in range(first, last + 1):
             off = at - window
             weights[window] = math.exp(0.5 * (away * away - off * off))
@@ -190,7 +190,7 @@ def divide(
         begin, end = nodes.aways[intervals], nodes.aways[size - 1]
         windows, least = _fine_windows((begin - mean) / sd, (end - mean) / sd, sd), _FINE_NEGLIGIBLE
     _share_out(nodes, size, mean, sd, windows)
-    for window in range(windows.count):
+    for window in range(windows.number):
         share, shift, square = nodes.shares[window], nodes.shifts[window], nodes.squares[window]
         if share > least * total:
             shift /= share
