@@ -156,6 +156,16 @@ def even_out(of: TrackCandidates, last: int, log_before: float) -> None:
             of.log_mass[j] += change
 
 
+@compiled
+def _log_total_of(of: TrackCandidates, last: int, parent: int) -> float:
+    """Return the log of the sum of the masses of one hypothesis's candidates."""
+    total = -math.inf
+    for j in range(last):
+        if of.parent[j] == parent:
+            total = np.logaddexp(total, of.log_mass[j])
+    return total
+
+
 @borrowed
 @compiled
 def level_at_rest(
@@ -178,22 +188,24 @@ def level_at_rest(
     log_usual : float
         Log of the probability that a frame is no outlier.
     """
-    log_sum, log_before = -math.inf, -math.inf
+    log_sum, log_before, log_own = -math.inf, -math.inf, -math.inf
     for h in range(at_rest.size):
         if at_rest[h] > -math.inf:
             log_sum = np.logaddexp(log_sum, at_rest[h])
             log_before = np.logaddexp(log_before, log_of(of.weight[h]) + log_usual)
+            log_own = np.logaddexp(log_own, _log_total_of(candidates, last, h))
     if log_sum == -math.inf:
         return
     mean = log_before - log_sum
     for h in range(at_rest.size):
         if at_rest[h] > -math.inf:
-            fit = log_of(of.weight[h]) + log_usual - at_rest[h]
-            change = fit - max(mean, fit - _SAME_READINGS)
-            at_rest[h] += change
+            before = log_of(of.weight[h]) + log_usual
+            worse = max(before - at_rest[h] - mean - _SAME_READINGS, 0.0)
+            at_rest[h] = before - mean - worse
+            own = _log_total_of(candidates, last, h)
             for j in range(last):
                 if candidates.parent[j] == h:
-                    candidates.log_mass[j] += change
+                    candidates.log_mass[j] += before + log_own - log_before - worse - own
 
 
 @borrowed
