@@ -24,6 +24,7 @@ from inference.tracking.hypotheses import (
     Hypotheses,
     heaviest,
     learns_crosstalk,
+    log_of,
     unknown_crosstalk,
 )
 from inference.tracking.readings_table import ReadingsTable
@@ -36,6 +37,7 @@ __all__ = [
     "even_out",
     "hides",
     "let_rest",
+    "level_at_rest",
     "log_at_rest",
     "log_total",
     "take_width",
@@ -51,6 +53,9 @@ Of such motion the mean is 0.52, and over the last four frames below this in abo
 
 _LEARNT = 0.5  # share of the widths that counts of motion as rough as its law, crosstalk learnt
 _HIDDEN = 10.0  # variance of a reading by crosstalk, in that of the noise: light may be of either
+# nats by which a frame of an object at rest may fit worse than the best and tell nothing: by noise
+# alone two readings do once in 400
+_SAME_READINGS = 6.0
 _LOG_RESTING = math.log(0.25)  # least weight of an object that may rest, against the empty scene's
 
 
@@ -149,6 +154,58 @@ def even_out(of: TrackCandidates, last: int, log_before: float) -> None:
     if math.isfinite(change):
         for j in range(last):
             of.log_mass[j] += change
+
+
+@compiled
+def _log_total_of(of: TrackCandidates, last: int, parent: int) -> float:
+    """Return the log of the sum of the masses of one hypothesis's candidates."""
+    total = -math.inf
+    for j in range(last):
+        if of.parent[j] == parent:
+            total = np.logaddexp(total, of.log_mass[j])
+    return total
+
+
+@borrowed
+@compiled
+def level_at_rest(
+    candidates: TrackCandidates, last: int, of: Hypotheses, at_rest: Array, log_usual: float
+) -> None:
+    """Let frames that are the first one over again leave objects at rest their shares.
+
+    Where an object at rest is bright its motion takes up more of the noise, and its readings fit
+    better, by up to half a nat in every frame: the nearest would be sure, and none of them tells.
+    All fit as they do in the mean, so that nothing changes against the empty scene.
+
+    Parameters
+    ----------
+    candidates, last : TrackCandidates, int
+        The list, and its length; masses are changed in place.
+    of : Hypotheses
+        As predicted.
+    at_rest : ndarray, shape (hypotheses + 1,)
+        As for `let_rest`; changed in place.
+    log_usual : float
+        Log of the probability that a frame is no outlier.
+    """
+    log_sum, log_before, log_own = -math.inf, -math.inf, -math.inf
+    for h in range(at_rest.size):
+        if at_rest[h] > -math.inf:
+            log_sum = np.logaddexp(log_sum, at_rest[h])
+            log_before = np.logaddexp(log_before, log_of(of.weight[h]) + log_usual)
+            log_own = np.logaddexp(log_own, _log_total_of(candidates, last, h))
+    if log_sum == -math.inf:
+        return
+    mean = log_before - log_sum
+    for h in range(at_rest.size):
+        if at_rest[h] > -math.inf:
+            before = log_of(of.weight[h]) + log_usual
+            worse = max(before - at_rest[h] - mean - _SAME_READINGS, 0.0)
+            at_rest[h] = before - mean - worse
+            own = _log_total_of(candidates, last, h)
+            for j in range(last):
+                if candidates.parent[j] == h:
+                    candidates.log_mass[j] += before + log_own - log_before - worse - own
 
 
 @borrowed

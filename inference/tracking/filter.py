@@ -145,7 +145,7 @@ def run_filter(
             readable = kinds[i] == USABLE and outlier < 0.5 and not known_rate > 0.0
             told, factors = room.after, room.scratch.factors
             as_said(told, of, frame, readable, model.table, factors)
-        report(out, rows, i, told, rules, model.table)
+        report(out, rows, i, told, rules, model.table, room.described)
         if is_contradicted(of):
             describe_contradicted(
                 out, i, of, model.table, model.places.empty, model.first, rules, room.scratch

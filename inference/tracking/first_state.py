@@ -15,6 +15,8 @@ from inference.tracking.hypotheses import (
     TOLD22,
     Hypotheses,
 )
+from inference.tracking.parts import MOST_PARTS, is_open
+from inference.tracking.roots import Root, add_factor
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.state import TrackState
 from inference.tracking.unsteady import first_unsteady
@@ -58,10 +60,10 @@ def first_state(
     steady : bool
         Whether changes from frame to frame are held to the noise.
     """
-    rows, n = settings.hypotheses + 1, 2 if crosstalk is None else 4
-    x, X = np.zeros((rows, n)), np.zeros((rows, n, n + directions))
+    n = 2 if crosstalk is None else 4
+    x, X = np.zeros((1, n)), np.zeros((1, n, n + directions))
     if crosstalk is not None:
-        x = np.zeros((rows, ANCHOR + 1))
+        x = np.zeros((1, ANCHOR + 1))
         x[0, CROSSTALK1:ANCHOR] = crosstalk
         values = scene.crosstalk_values
         if crosstalk_root.size:
@@ -74,6 +76,10 @@ def first_state(
                 if untold[k] and not isinstance(value, float | int):
                     mean, sd = _moments(value.distribution().from_normal)
                     x[0, state], X[0, state, state] = mean * scale[k], sd * scale[k]
+    # an object before crosstalk that is open comes in many parts
+    parts = MOST_PARTS if crosstalk is not None and is_open(_spread(X[0])) else 0
+    rows = 1 + max(settings.hypotheses, parts)
+    x, X = (np.concatenate([a, np.zeros((rows - 1, *a.shape[1:]))]) for a in (x, X))
     weight = np.zeros(rows)
     there = settings.visit_s / (settings.visit_s + settings.absence_s)
     weight[0] = 1.0 - there
@@ -118,6 +124,14 @@ def crosstalk_bounds(
             low, high = from_normal(np.array([-_BEYOND, _BEYOND])).tolist()
             bounds[k] = min(low, mean - _BEYOND * sd), max(high, mean + _BEYOND * sd)
     return bounds
+
+
+def _spread(X: Array) -> Root:
+    """Return the root of the covariance of the crosstalk of one hypothesis."""
+    root = Root(0.0, 0.0, 0.0)
+    for first, second in X[CROSSTALK1:].T.tolist():
+        root = add_factor(root, first, second)
+    return root
 
 
 def _moments(from_normal: Any) -> tuple[float, float]:

@@ -60,6 +60,7 @@ class Position(NamedTuple):
 
     born: bool  # whether u has the prior density of the ranges instead of a normal one
     again: bool  # whether it had so in frames before: an object that may be anywhere by now
+    alone: bool  # whether it is the first object that is followed, before crosstalk that is learnt
     # of a normal u; the log of sqrt(precision / 2 pi), for a born u the log of its weight
     centre: float
     precision: float

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.tracking.borrowed import borrowed
-from inference.tracking.hypotheses import Hypotheses, U, V, copy, learns_crosstalk
+from inference.tracking.hypotheses import Hypotheses, U, V, copy, learns_crosstalk, variance_of
 from inference.tracking.square_root import triangularise
 from simulator.compiled import compiled
 
@@ -127,6 +127,24 @@ def _loss(of: Hypotheses, heavy: int, light: int, share: float, work: Array) -> 
 
 @borrowed
 @compiled
+def _are_apart(of: Hypotheses, one: int, other: int, share: float, most: float) -> bool:
+    """Tell whether the distance along u alone says that a merger loses too much, without a root.
+
+    With W the mean of two covariances and d the distance of the means, that of the mixture has the
+    determinant |W| (1 + s (1 - s) d'W^-1 d) at least. log |W| is at least the mean of both
+    logarithms, and d'W^-1 d at least what one state has of it.
+    """
+    if not learns_crosstalk(of):
+        return False
+    gap = of.x[other, U] - of.x[one, U]
+    mean = (1.0 - share) * variance_of(of, one, U) + share * variance_of(of, other, U)
+    return (
+        0.5 * math.log1p(share * (1.0 - share) * gap * gap / mean) >= most if mean > 0.0 else False
+    )
+
+
+@borrowed
+@compiled
 def _replace(of: Hypotheses, row: int, other: int) -> None:
     """Put one hypothesis in the place of another."""
     of.weight[row] = of.weight[other]
@@ -176,6 +194,9 @@ def merge_equals(of: Hypotheses, count: int, same: float, work: Array) -> int:
         while k <= count:
             heavy, light = (j, k) if weight[j] >= weight[k] else (k, j)
             share = weight[light] / (weight[j] + weight[k])
+            if _are_apart(of, heavy, light, share, same * share):
+                k += 1
+                continue
             if not _loss(of, heavy, light, share, work) < same * share:
                 k += 1
                 continue

@@ -1,141 +1,26 @@
 """The mass of one mode along the range, as one Gaussian or as several."""
 
 import math
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from inference.tracking.candidates import TrackCandidate, TrackCandidates, add_candidate
 from inference.tracking.frame_density import Prior, TrackedFrame, log_density, spread_at
 from inference.tracking.hypotheses import WITHOUT_CROSSTALK
 from inference.tracking.mode_refinement import PeakedMode, bends, refined
-from inference.tracking.mode_search import edge
+from inference.tracking.parts import Nodes, divide
 from inference.tracking.readings_table import ReadingsTable, mean_at
 from inference.tracking.roots import Root
 from simulator.compiled import compiled
 
-__all__ = ["Nodes", "integrate", "nodes_for"]
-
-Array = NDArray[np.float64]
+__all__ = ["integrate"]
 
 _GAUSSIAN = 0.3  # nats by which a mode may leave its parabola at sqrt(3) standard deviations
-_WINDOWS = 4  # on either side of the middle one
-_SPACING = 0.5  # of windows, in standard deviations, and their width
-_NEGLIGIBLE_WINDOW = 1e-3  # share of a mode below which a window's part is left out
 _FAINT = 0.3  # standard deviations of the noise: nuisance parameters that do less are not felt
 _DROWNED = 1.0  # standard deviations of the noise: it hides nuisance parameters that do less
 _TAIL = 6.0  # standard deviations from a mode at which the noise may hold it open
 _OPEN = 0.5  # share of its parabola's fall that is less than a mode's with such a tail
 _NARROW = 0.03  # standard deviation of log r of modes that have none: their light is not faint
-_INTERVALS = 32  # of Simpson's rule on either side of a mode
 _ROOT3 = math.sqrt(3.0)
 _LOG_ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
-
-
-class Nodes(NamedTuple):
-    """Distances from a mode, and the masses there; overwritten."""
-
-    aways: Array
-    masses: Array
-    windows: Array  # sums of all windows there, against the nearest one
-
-
-@compiled
-def nodes_for() -> Nodes:
-    """Return room for both sides of a mode."""
-    size = 2 * _INTERVALS + 2
-    return Nodes(np.empty(size), np.empty(size), np.empty(size))
-
-
-@compiled
-def _simpson(
-    nodes: Nodes,
-    top: float,
-    mode: PeakedMode,
-    frame: TrackedFrame,
-    prior: Prior,
-    table: ReadingsTable,
-) -> tuple[float, float, float]:
-    """Fill distances from a mode and their masses; their sum, mean and standard deviation."""
-    aways, masses = nodes.aways, nodes.masses
-    u, scale = mode.u, mode.scale
-    begin = edge(u, top, mode.low, scale, frame, prior, table)
-    end = edge(u, top, mode.high, scale, frame, prior, table)
-    total, mean, square = 0.0, 0.0, 0.0
-    for side in range(2):
-        width = ((begin if side == 0 else end) - u) / _INTERVALS
-        for k in range(_INTERVALS + 1):
-            weight = 1.0 if k in (0, _INTERVALS) else (4.0 if k % 2 == 1 else 2.0)
-            away = k * width
-            density = log_density(u + away, frame, prior, table)
-            part = weight * abs(width) / 3.0 * math.exp(min(density - top, 50.0))
-            row = side * (_INTERVALS + 1) + k
-            aways[row], masses[row] = away, part
-            total += part
-            mean += part * away
-            square += part * away * away
-    if not total > 0.0:
-        return 0.0, 0.0, 0.0
-    mean /= total
-    return total, mean, math.sqrt(max(square / total - mean * mean, 0.0))
-
-
-@compiled
-def _window(x: float, window: int) -> float:
-    """Return one of the windows x standard deviations from the mean, against the nearest one.
-
-    Far out all are below what numbers hold.
-    """
-    nearest = min(max(round(x / _SPACING), -_WINDOWS), _WINDOWS)
-    away, off = x / _SPACING - nearest, x / _SPACING - window
-    return math.exp(0.5 * (away * away - off * off))
-
-
-@compiled
-def _divide(
-    to: TrackCandidates,
-    count: int,
-    parent: int,
-    mode: PeakedMode,
-    frame: TrackedFrame,
-    prior: Prior,
-    table: ReadingsTable,
-    nodes: Nodes,
-) -> int:
-    """Append one mode that is not near a Gaussian, as at folds and ends of the support.
-
-    Simpson's rule gives its moments. It is then divided by smooth windows, half a standard
-    deviation apart, into parts that are near enough to Gaussians.
-    """
-    u = mode.u
-    top = log_density(u, frame, prior, table)
-    aways, masses = nodes.aways, nodes.masses
-    total, mean, sd = _simpson(nodes, top, mode, frame, prior, table)
-    if not total > 0.0:
-        return count
-    if not sd > 0.0:
-        log_mass = top + math.log(total)
-        return add_candidate(to, count, TrackCandidate(log_mass, u + mean, sd, u + mean, parent))
-    for row in range(aways.size):
-        nodes.windows[row] = 0.0
-        for window in range(-_WINDOWS, _WINDOWS + 1):
-            nodes.windows[row] += _window((aways[row] - mean) / sd, window)
-    for window in range(-_WINDOWS, _WINDOWS + 1):
-        share, shift, square = 0.0, 0.0, 0.0
-        for row in range(aways.size):
-            x = (aways[row] - mean) / sd
-            part = masses[row] * (_window(x, window) / nodes.windows[row])
-            share += part
-            shift += part * x
-            square += part * x * x
-        if share > _NEGLIGIBLE_WINDOW * total:
-            shift /= share
-            own = sd * math.sqrt(max(square / share - shift * shift, 0.0))
-            at = u + mean + sd * shift
-            one = TrackCandidate(top + math.log(share), at, own, at, parent)
-            count = add_candidate(to, count, one)
-    return count
 
 
 @compiled
@@ -233,7 +118,7 @@ def integrate(
     shared = prior.added.spread.shape[1] > WITHOUT_CROSSTALK
     if shared and not once and not _by_noise(u, _FAINT, frame, prior, table):
         if _spills(mode, prior) or _fades(mode, frame, prior, table):
-            return _divide(to, count, parent, mode, frame, prior, table, nodes)
+            return divide(to, count, parent, mode, frame, prior, table, nodes)
         if not prior.position.born and bends(table):
             u, scale, top = refined(mode, frame, prior, table)
         else:
@@ -252,4 +137,4 @@ def integrate(
             log_mass = top + math.log(mass * scale) + _LOG_ROOT_2PI
             one = TrackCandidate(log_mass, u + shift * scale, sd, u, parent)
             return add_candidate(to, count, one)
-    return _divide(to, count, parent, mode, frame, prior, table, nodes)
+    return divide(to, count, parent, mode, frame, prior, table, nodes)

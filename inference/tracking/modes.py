@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from inference.tracking.candidates import TrackCandidates
 from inference.tracking.frame_density import Prior, TrackedFrame, log_density
-from inference.tracking.mode_integration import Nodes, integrate, nodes_for
+from inference.tracking.mode_integration import integrate
 from inference.tracking.mode_refinement import PeakedMode
 from inference.tracking.mode_search import ModeBracket, mode_by_differences, mode_of_plain
+from inference.tracking.parts import Nodes, nodes_for
 from inference.tracking.places import Scan
 from inference.tracking.readings_table import ReadingsTable, nuisance_count
 from inference.tracking.roots import UNIT, add_root

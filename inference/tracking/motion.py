@@ -29,6 +29,7 @@ class Rules(NamedTuple):
     # least width of the Cauchy law that such readings follow around what was expected, in units of
     # the noise
     breadth: float
+    hypotheses: int  # most that are kept, but for the parts in which an object comes
     log_negligible: float  # log weight below which a hypothesis is dropped
     # information lost, in nats per weight of the lighter one, below which two hypotheses merge
     same: float

@@ -169,7 +169,7 @@ def own_prior(
     if table.by_rate:
         rate = _rate_given_u(of, row, precision)
     return Prior(
-        Position(False, False, x[row, U], precision, log_scale),
+        Position(False, False, False, x[row, U], precision, log_scale),
         Added(offset1, offset2, slope1, slope2, own, root, of.X[row]),
         rate,
         share,
@@ -242,8 +242,10 @@ def born_prior(of: Hypotheses, log_weight: float, rate_sd: float, table: Reading
         offset1, offset2 = offset1 + of.x[0, CROSSTALK1], offset2 + of.x[0, CROSSTALK2]
         for j in range(of.X.shape[-1]):
             root = add_factor(root, of.X[0, CROSSTALK1, j], of.X[0, CROSSTALK2, j])
+    again = of.numbers[LOST] > 0.0
+    alone = learns_crosstalk(of) and of.numbers[COUNT] == 0.0 and not again
     return Prior(
-        Position(True, of.numbers[LOST] > 0.0, 0.0, 0.0, log_weight),
+        Position(True, again, alone, 0.0, 0.0, log_weight),
         Added(offset1, offset2, 0.0, 0.0, root, root, of.X[0, of.X.shape[1] - 2 :]),
         Rate(0.0, 0.0, rate_sd),
         0.0,

@@ -134,22 +134,22 @@ def _pool(out: Array, rows: Array, i: int, group: _Group) -> None:
     u, scene, model, rate = 0.0, 0.0, 0.0, 0.0
     total, seed = group.weight, group.seed
     for j in range(group.first, group.last + 1):
-        if not _belongs(rows[i], j, seed):
+        if not _belongs(rows, j, seed):
             continue
-        share = rows[i, j, WEIGHT] / total
-        u += share * (rows[i, j, POSITION] - rows[i, seed, POSITION])
-        scene += share * rows[i, j, SCENE_SD]
-        model += share * rows[i, j, MODEL_SD]
-        rate += share * rows[i, j, RATE]
-    u += rows[i, seed, POSITION]
+        share = rows[j, WEIGHT] / total
+        u += share * (rows[j, POSITION] - rows[seed, POSITION])
+        scene += share * rows[j, SCENE_SD]
+        model += share * rows[j, MODEL_SD]
+        rate += share * rows[j, RATE]
+    u += rows[seed, POSITION]
     square, rate_square = 0.0, 0.0
     for j in range(group.first, group.last + 1):
-        if not _belongs(rows[i], j, seed):
+        if not _belongs(rows, j, seed):
             continue
-        share = rows[i, j, WEIGHT] / total
-        sd, off = rows[i, j, SD], rows[i, j, POSITION] - u
+        share = rows[j, WEIGHT] / total
+        sd, off = rows[j, SD], rows[j, POSITION] - u
         square += share * (sd * sd + off * off)
-        rate_sd, rate_off = rows[i, j, RATE_SD], rows[i, j, RATE] - rate
+        rate_sd, rate_off = rows[j, RATE_SD], rows[j, RATE] - rate
         rate_square += share * (rate_sd * rate_sd + rate_off * rate_off)
     out[i, BEST + POSITION], out[i, BEST + SD] = u, math.sqrt(square)
     out[i, BEST + SCENE_SD], out[i, BEST + MODEL_SD] = scene, model
@@ -189,10 +189,33 @@ def _sort_in(
         _describe(rows[at], of, j, from_scene, table)
 
 
+@compiled
+def _take_heaviest(rows: Array, described: Array, count: int) -> int:
+    """Fill rows with the heaviest that are described, in their order; how many."""
+    taken = 0
+    for j in range(count):
+        heavier = 0
+        if count > rows.shape[0]:
+            for k in range(count):
+                same = described[k, WEIGHT] == described[j, WEIGHT] and k < j
+                heavier += int(described[k, WEIGHT] > described[j, WEIGHT] or same)
+        if heavier < rows.shape[0]:
+            for k in range(HYPOTHESIS_COLUMNS):
+                rows[taken, k] = described[j, k]
+            taken += 1
+    return taken
+
+
 @borrowed
 @compiled
 def report(
-    out: Array, rows: Array, i: int, of: Hypotheses, rules: Rules, table: ReadingsTable
+    out: Array,
+    rows: Array,
+    i: int,
+    of: Hypotheses,
+    rules: Rules,
+    table: ReadingsTable,
+    described: Array,
 ) -> None:
     """Describe the state after frame i.
 
@@ -203,7 +226,7 @@ def report(
         crosstalk and its standard deviations in units of the noise are filled in; the latter two
         stay nan where there is none.
     rows : ndarray, shape (frames, capacity, HYPOTHESIS_COLUMNS)
-        The hypotheses, by ascending range.
+        The heaviest hypotheses, by ascending range.
     i : int
         The frame.
     of : Hypotheses
@@ -212,20 +235,23 @@ def report(
         From what weight on a range is unique, and which nuisance parameters are the scene's.
     table : ReadingsTable
         Which ranges there are.
+    described : ndarray, shape (rows of the state, HYPOTHESIS_COLUMNS)
+        Overwritten.
     """
     count, weight = int(of.numbers[COUNT]), of.weight
-    out[i, PRESENT], out[i, HYPOTHESES], out[i, STATUS] = 1.0 - weight[0], count, _NONE
-    _sort_in(rows[i], of, count, rules.from_scene, table)
+    out[i, PRESENT], out[i, STATUS] = 1.0 - weight[0], _NONE
+    _sort_in(described, of, count, rules.from_scene, table)
+    out[i, HYPOTHESES] = _take_heaviest(rows[i], described, count)
     if learns_crosstalk(of):
         _describe_crosstalk(out, i, of)
     if weight[0] > 0.5 or count == 0:
         return
     best = _Group(-1.0, 0, 0, 0)
     for seed in range(count):
-        group = _around(rows[i], count, seed)
+        group = _around(described, count, seed)
         if group.weight > best.weight:
             best = group
-    _pool(out, rows, i, best)
+    _pool(out, described, i, best)
     heaviest = best.weight
     out[i, BEST + WEIGHT] = heaviest / (1.0 - weight[0])
     unique = heaviest > rules.unique_above * (1.0 - weight[0])

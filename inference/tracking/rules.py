@@ -49,6 +49,7 @@ def rules_of(
         drift2=drift2 * scale2,
         outlier=settings.outlier,
         breadth=_BREADTH,
+        hypotheses=settings.hypotheses,
         log_negligible=math.log(settings.negligible),
         same=_SAME,
         memory=1.0 - 1.0 / settings.window,

@@ -37,7 +37,8 @@ class TrackingSettings(Validated):
         out: it does not drift, and is learnt only where the scene gives a prior for it and no
         posterior is at hand.
     hypotheses : int
-        Most hypotheses that are kept.
+        Most hypotheses that are kept, but for the parts in which the first object comes before
+        crosstalk that is open; as many are reported.
     negligible : float
         Weight, relative to the heaviest, below which a hypothesis is dropped.
     unique_above : float

@@ -28,6 +28,7 @@ from inference.tracking.evenness import (
     even_out,
     hides,
     let_rest,
+    level_at_rest,
     log_at_rest,
     log_total,
     take_width,
@@ -51,6 +52,8 @@ from inference.tracking.motion import Rules
 from inference.tracking.places import Places, mass_bound
 from inference.tracking.prediction import born_prior, own_prior, prior_of
 from inference.tracking.readings_table import ReadingsTable
+from inference.tracking.report import HYPOTHESIS_COLUMNS
+from inference.tracking.resting import nothing_has_changed
 from inference.tracking.stillness import crosstalk_is_held
 from inference.tracking.too_faint import MOST_EMPTY, doubt_the_faint
 from inference.tracking.turning import may_turn
@@ -83,6 +86,7 @@ class Room(NamedTuple):
     scratch: Scratch  # for learning
     at_rest: Array  # log masses of hypotheses, were there no motion
     empty: Hypotheses  # what was known of the empty scene
+    described: Array  # what is said of them
 
 
 class Kept(NamedTuple):
@@ -108,7 +112,10 @@ def room_for(of: Hypotheses, places: Places) -> Room:
     candidates = candidates_for(2 * _SPARE * capacity)
     empty = Hypotheses(np.zeros((1, of.x.shape[1])), np.zeros((1, n, m)), np.zeros(1), np.zeros(1))
     rest = np.zeros(capacity)
-    return Room(after, candidates, scanned_for(places.scan), scratch_for(of), rest, empty)
+    described = np.zeros((capacity, HYPOTHESIS_COLUMNS))
+    return Room(
+        after, candidates, scanned_for(places.scan), scratch_for(of), rest, empty, described
+    )
 
 
 @compiled
@@ -147,6 +154,8 @@ def _of_followed(
             log_before = np.logaddexp(log_before, log_total(candidates, old, found))
             take_width(candidates, old, found, counted, rest)
     even_out(candidates, found, log_before)
+    if learns and nothing_has_changed(of):
+        level_at_rest(candidates, found, of, at_rest, log_usual)
     if learns and not frame.known_rate > 0.0:
         # a density is as high at best as that of the empty scene, whose readings these would be
         highest = empty.usual + 0.5 * empty.surprise - log_of(of.weight[0]) - log_usual
@@ -253,7 +262,9 @@ def _settle(
     total = kept.total + pending
     of.weight[0] = kept.empty / total
     of.numbers[PENDING] = pending / total
-    most = of.x.shape[0] - 1
+    # an object that has just come may come in more, and they stay until frames tell them apart
+    followed = int(of.numbers[COUNT])
+    most = max(model.rules.hypotheses, followed) if followed > 0 else of.x.shape[0] - 1
     count = prune(room.after, kept.hypotheses, most, model.rules.same, room.scratch.work)
     _take_over(of, room.after, count, total)
     return total

@@ -44,7 +44,8 @@ def told_sd(of: Hypotheses, learns: bool) -> float:
     model = LEARNS if learns else KNOWN
     out = np.full((1, REPORT_COLUMNS), np.nan)
     rows = np.full((1, 1, HYPOTHESIS_COLUMNS), np.nan)
-    report(out, rows, 0, of, model.rules, model.table)
+    described = np.zeros((len(of.weight), HYPOTHESIS_COLUMNS))
+    report(out, rows, 0, of, model.rules, model.table, described)
     return float(out[0, BEST + SD])
 
 

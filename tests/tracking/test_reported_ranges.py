@@ -39,7 +39,8 @@ def told(*rows: tuple[float, float, float]) -> tuple[Array, Array]:
     of.numbers[COUNT] = count
     out = np.full((1, REPORT_COLUMNS), np.nan)
     listed = np.full((1, count, HYPOTHESIS_COLUMNS), np.nan)
-    report(out, listed, 0, of, MODEL.rules, MODEL.table)
+    described = np.zeros((len(of.weight), HYPOTHESIS_COLUMNS))
+    report(out, listed, 0, of, MODEL.rules, MODEL.table, described)
     return out[0], listed[0]
 
 
