@@ -18,6 +18,9 @@ from inference.frame.arguments import Instrument, instrument_of
 from inference.frame.gaussian import covariance_slope, empty_gaussian, gaussian
 from inference.frame.light_by_arrays import gaussian as gaussian_by_arrays
 from inference.frame.noise import covariances
+from inference.tracking.light import noise_at_light
+from inference.tracking.readings_table import ReadingsNoise, noise_root
+from inference.tracking.roots import Root
 from inference.tracking.settings import TrackingSettings
 from inference.tracking.track import track
 from service.c_export import export_c
@@ -177,6 +180,16 @@ def test_tracks_and_fits_hold_their_ranges(kind: str, learnt: bool) -> None:
         fit = estimate(sensor_of(kind), scene, frames, ["joint_fit"]).results[0]
         assert fit.fit is not None
         assert not fit.fit["misfit"]
+
+
+def test_the_flicker_of_learnt_crosstalk_is_that_of_the_light_read() -> None:
+    """Where crosstalk is open the light is the reading, with its sign; a prior's mean has none."""
+    noise = ReadingsNoise(False, 0.0, 1.0, RELATIVE, False, True)
+    wide = Root(1e9, 0.0, 1e9)
+    for light in ((4e3, -3e3), (-4e3, -3e3)):
+        found = noise_at_light((0.0, 0.0), (0.0, 0.0), light, wide, noise)
+        wanted = noise_root(*light, 0.0, 0.0, noise)
+        assert np.array(found) == pytest.approx(np.array(wanted), rel=1e-6)
 
 
 def test_a_window_that_nearly_drowns_knows_of_the_flicker() -> None:
