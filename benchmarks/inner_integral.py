@@ -102,7 +102,7 @@ def fixed_grid(density: CollapsedDensity, z: Array) -> Array:
     u = low + 0.5 * (high - low) * (1 + nodes)
     r = np.exp(u)
     c0, c1, c2 = (column[:, None] for column in terms.object.T)
-    r0, wave, read, _, _ = density.instrument
+    r0, wave, read, _, _, _ = density.instrument
     flux = density.sensor.known_gain * c0 * c2 / (r**2 * (r**2 + c1 * r + c0))
     if wave is None:
         means = np.stack([flux * r / r0, flux])

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.beside_crosstalk import supposed_beside_crosstalk
 from inference.empty_scatter import scatter_of_empty
 from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK, taken_for_crosstalk
 from inference.growing_light import growing_light
@@ -65,6 +66,7 @@ def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, .
         supposed = (*supposed, _TIMES)
     if taken_for_crosstalk(scene, frames):
         supposed = (*supposed, TAKEN_FOR_CROSSTALK)
+    supposed = (*supposed, *supposed_beside_crosstalk(scene, sensor, frames))
     if doubt := scatter_of_empty(sensor, frames):
         supposed = (*supposed, doubt)
     if doubt := doubtful_unit(sensor):

@@ -130,6 +130,8 @@ def covariance_of_empty(sensor: Sensor, light: Array) -> Array:
     matrix = np.diag(np.square(sensor.noise.read) + shot)
     if isinstance(sensor, PulsedSensor):
         matrix[0, 1] = matrix[1, 0] = shot[0]
+    if sensor.noise.flickers:
+        matrix += np.outer(sensor.noise.relative * light, sensor.noise.relative * light)
     return matrix
 
 

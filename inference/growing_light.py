@@ -60,6 +60,8 @@ def growing_light(scene: Scene, sensor: Sensor, frames: Frames) -> str | None:
     with np.errstate(all="ignore"):
         size, place = _seen(sensor, light)
         noise = np.square(sensor.noise.read) + sensor.noise.shot * np.abs(every.readings)
+        if sensor.noise.flickers:
+            noise += np.square(sensor.noise.relative * every.readings)
         turned = np.sqrt(noise.max(axis=1) + max(crosstalk.sd) ** 2) / size
         bright = (_BRIGHT * turned < 1.0) & np.isfinite(size) & (size > 0.0) & (place > 0.0)
     if bright.sum() < _FEWEST:

@@ -81,6 +81,8 @@ def _beyond(
         # of light that is none the photons are those of the crosstalk: noise has lowered a reading
         # and, taken from it, its own size
         photons = sensor.noise.shot * np.maximum(np.abs(readings), np.abs(values))
+        if sensor.noise.flickers:
+            photons = photons + np.square(sensor.noise.relative * readings)
         rounding = _ROUNDINGS * (np.abs(readings) + np.abs(values))
         own = np.square(sensor.noise.read) + np.square(crosstalk.sd) + photons
         own = (own + np.square(rounding)).T
@@ -89,7 +91,7 @@ def _beyond(
             [
                 -late / np.sqrt(own[0] + moved),
                 -whole / np.sqrt(own[1]),
-                # photons that are late are part of all, and cancel: this is their most
+                # late photons and flicker are part of all, and cancel: this is their most
                 (late - whole) / np.sqrt(own[0] + own[1] + moved),
             ]
         )

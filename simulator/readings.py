@@ -19,6 +19,7 @@ __all__ = [
     "covariance",
     "late_rate",
     "late_share",
+    "light_that_errs",
     "noise_parts",
     "object_readings",
     "object_slopes",
@@ -180,6 +181,23 @@ def background_slopes(
 
 
 @compiled
+def light_that_errs(mean: Pair, signal: Pair, of_source: bool) -> Pair:
+    """Return the light that has the common relative error of a frame.
+
+    Parameters
+    ----------
+    mean : (float, float)
+        Mean readings, everything included; or their slopes along an unknown.
+    signal : (float, float)
+        The object's part of them.
+    of_source : bool
+        Whether the error is the source's: then all of its light has it, crosstalk and background
+        as the object's.
+    """
+    return mean if of_source else signal
+
+
+@compiled
 def noise_parts(
     read: Pair,
     shot: float | None,
@@ -198,13 +216,13 @@ def noise_parts(
         Variance per mean reading; of a pulse the late photons are part of the whole, so that the
         two windows share the variance of the smaller mean.
     relative : float or None
-        Standard deviation of a common relative error of the object's signal.
+        Standard deviation of a common relative error.
     pulsed : bool
         Whether the readings are windows of a pulse.
     mean : (float, float)
         Mean readings, everything included.
     signal : (float, float)
-        The object's part of them.
+        What of them has the relative error (`light_that_errs`).
 
     Returns
     -------

@@ -43,7 +43,10 @@ class Noise(Validated):
         Variance per mean reading [reading units]; for a pulse cov(w1, w2) = shot * abs(mean w1),
         because the late photons are part of the whole.
     relative : float
-        Standard deviation of one common relative error of the object's signal per frame.
+        Standard deviation of one common relative error per frame.
+    relative_of : {"object", "source"}
+        What has it: the object's signal, or all light of a source that flickers, which is that of
+        crosstalk and background too.
     derivative : (float, float), optional
         Standard deviations of the derivative columns [reading units / s].
     """
@@ -51,7 +54,13 @@ class Noise(Validated):
     read: PositivePair
     shot: NonNegative = 0.0
     relative: NonNegative = 0.0
+    relative_of: Literal["object", "source"] = "object"
     derivative: PositivePair | None = None
+
+    @property
+    def flickers(self) -> bool:
+        """Whether the relative error is that of all light of the source."""
+        return self.relative > 0.0 and self.relative_of == "source"
 
 
 def _number(value: Quantity, path: str) -> float:

@@ -17,6 +17,7 @@ from simulator.parameters import Terms, parameters_of
 from simulator.readings import (
     background_readings,
     late_share,
+    light_that_errs,
     noise_parts,
     object_readings,
 )
@@ -66,6 +67,7 @@ def _frame_moments(
     read: Pair,
     shot: float | None,
     relative: float | None,
+    of_source: bool,
 ) -> Array:
     """Return means and noise parts of every frame, shape (n, 7).
 
@@ -89,7 +91,8 @@ def _frame_moments(
             m1, m2 = m1 + b1, m2 + b2
         if crosstalk is not None:
             m1, m2 = m1 + crosstalk[0], m2 + crosstalk[1]
-        parts = noise_parts(read, shot, relative, wave is None, (m1, m2), (o1, o2))
+        errs = light_that_errs((m1, m2), (o1, o2), of_source)
+        parts = noise_parts(read, shot, relative, wave is None, (m1, m2), errs)
         out[i, 0], out[i, 1] = m1, m2
         for j in range(5):
             out[i, 2 + j] = parts[j]
@@ -115,6 +118,7 @@ def _moments(
         noise.read,
         noise.shot or None,
         noise.relative or None,
+        noise.flickers,
     )
 
 

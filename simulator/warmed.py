@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from simulator.at_temperature import delayed_light
 from simulator.errors import InvalidInputError
-from simulator.readings import noise_parts
+from simulator.readings import light_that_errs, noise_parts
 from simulator.sensor import Sensor
 from simulator.temperature import temperature_problems
 from simulator.terms import Terms
@@ -75,4 +75,6 @@ def warmed(
     noise = sensor.noise
     sizes = noise.read, noise.shot or None, noise.relative or None, sensor.kind == "pulsed"
     pairs = zip(map(tuple, mean.tolist()), map(tuple, signal.tolist()), strict=True)
-    return np.column_stack([mean, [noise_parts(*sizes, *pair) for pair in pairs]])
+    errs = ((m, light_that_errs(m, s, noise.flickers)) for m, s in pairs)
+    parts = [noise_parts(*sizes, *pair) for pair in errs]
+    return np.column_stack([mean, parts])

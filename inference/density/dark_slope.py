@@ -61,8 +61,8 @@ def add_dark_slope(
     dark = scene.range_prior.dark
     if not (weight > 0.0 and dark < 1.0):
         return
-    r0, wave, read, shot, _ = scene.instrument
-    instrument = Instrument(r0, wave, read, shot, None)  # that of the table's law
+    r0, wave, read, shot, _, _ = scene.instrument
+    instrument = Instrument(r0, wave, read, shot, None, False)  # that of the table's law
     n = table.shape[1]
     whole = weight * dark / (DARK_MASS * math.sqrt(LEAST_INFORMATION))
     for k in range(n):

@@ -50,7 +50,9 @@ class Instrument(NamedTuple):
     shot : float or None
         Variance per mean reading [reading units].
     relative : float or None
-        Standard deviation of a common relative error of the object's signal.
+        Standard deviation of a common relative error.
+    of_source : bool
+        Whether all light of the source has it, not the object's alone.
     """
 
     r0: Reach
@@ -58,6 +60,7 @@ class Instrument(NamedTuple):
     read: Pair
     shot: float | None
     relative: float | None
+    of_source: bool = False
 
 
 class Shape(NamedTuple):
@@ -203,7 +206,8 @@ def instrument_of(sensor: Sensor) -> Instrument:
     """Return a sensor as the kernels take it; noise of size zero is none."""
     r0, wave = instrument(sensor)
     noise = sensor.noise
-    return Instrument(r0, wave, noise.read, noise.shot or None, noise.relative or None)
+    shot, relative = noise.shot or None, noise.relative or None
+    return Instrument(r0, wave, noise.read, shot, relative, noise.flickers)
 
 
 def prior_of(numbers: Array) -> RangePrior:
@@ -281,7 +285,7 @@ def _instrument_of(
         wave = (wave[0], float(lags[i]))
     elif isinstance(r0, tuple):
         r0 = (r0[0], float(lags[i]))
-    return Instrument(r0, wave, of.read, of.shot, of.relative)
+    return Instrument(r0, wave, of.read, of.shot, of.relative, of.of_source)
 
 
 @when_compiling
@@ -312,10 +316,10 @@ def _overload_members() -> None:
             return lambda of, r0, wave, lags, i: of  # noqa: ARG005
         if is_none(wave):
             return lambda of, r0, wave, lags, i: Instrument(  # noqa: ARG005
-                (r0[0], lags[i]), None, of.read, of.shot, of.relative
+                (r0[0], lags[i]), None, of.read, of.shot, of.relative, of.of_source
             )
         return lambda of, r0, wave, lags, i: Instrument(  # noqa: ARG005
-            of.r0, (wave[0], lags[i]), of.read, of.shot, of.relative
+            of.r0, (wave[0], lags[i]), of.read, of.shot, of.relative, of.of_source
         )
 
     @overload(_offset_of)

@@ -9,6 +9,7 @@ import math
 from inference.frame.arguments import Instrument, Pair
 from inference.frame.noise import NoiseParts, determinant, in_units, noise_of
 from simulator.compiled import compiled
+from simulator.readings import light_that_errs
 
 __all__ = [
     "LOG_2PI",
@@ -38,8 +39,8 @@ def gaussian(residual: Pair, mean: Pair, signal: Pair, instrument: Instrument) -
 
 @compiled
 def empty_gaussian(residual: Pair, mean: Pair, instrument: Instrument) -> float:
-    """Return `gaussian` of a frame without object, which knows no relative error of its signal."""
-    return _gaussian(residual, mean, (0.0, 0.0), instrument, instrument.shot, None)
+    """Return `gaussian` of a frame without object, where a source may flicker, but no signal."""
+    return gaussian(residual, mean, (0.0, 0.0), instrument)
 
 
 @compiled
@@ -178,10 +179,10 @@ def _shot_slopes(mean: Pair, mean_slope: Pair, shot: float | None, pulsed: bool)
 
 
 @compiled
-def _common_slopes(signal_slope: Pair, relative: float | None) -> Pair:
+def _common_slopes(slope: Pair, relative: float | None) -> Pair:
     """Return the slopes of the common error's standard deviations."""
     if relative is not None:
-        return relative * signal_slope[0], relative * signal_slope[1]
+        return relative * slope[0], relative * slope[1]
     else:  # noqa: RET505
         return 0.0, 0.0
 
@@ -201,7 +202,8 @@ def covariance_slope(
     """
     pulsed = instrument.wave is None
     own = _shot_slopes(mean, mean_slope, instrument.shot, pulsed)
-    common = _common_slopes(signal_slope, instrument.relative)
+    errs = light_that_errs(mean_slope, signal_slope, instrument.of_source)
+    common = _common_slopes(errs, instrument.relative)
     return _covariance_slope(
         residual, mean, signal, own, common, instrument, instrument.shot, instrument.relative
     )

@@ -15,6 +15,7 @@ from inference.frame.arguments import FrameScene, Instrument
 from inference.frame.noise import NoiseParts, determinant, in_units
 from simulator.background import shadow, shadow_slope
 from simulator.object_model import log_slope, object_flux
+from simulator.readings import light_that_errs
 from simulator.uncompiled import twin
 
 __all__ = ["NotByArraysError", "gaussian", "information", "light", "of_each"]
@@ -53,7 +54,8 @@ def _noise(mean: Pairs, signal: Pairs, instrument: Instrument) -> NoiseParts:
             shared = np.where(second < first, second, first)
         own1, own2 = own1 + (first - shared), own2 + (second - shared)
     rate: Any = relative
-    common: Any = (0.0, 0.0) if rate is None else (rate * signal[0], rate * signal[1])
+    errs = twin(light_that_errs)(mean, signal, instrument.of_source)
+    common: Any = (0.0, 0.0) if rate is None else (rate * errs[0], rate * errs[1])
     return NoiseParts(own1, own2, shared, *common)
 
 

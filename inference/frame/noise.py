@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from inference.frame.arguments import Instrument, Pair
 from simulator.compiled import compiled
-from simulator.readings import noise_parts
+from simulator.readings import light_that_errs, noise_parts
 
 __all__ = [
     "NoiseParts",
@@ -70,7 +70,7 @@ def noise_of(mean: Pair, signal: Pair, instrument: Instrument) -> NoiseParts:
         instrument.relative,
         instrument.wave is None,
         mean,
-        signal,
+        light_that_errs(mean, signal, instrument.of_source),
     )
     return NoiseParts(own1, own2, shared, common1, common2)
 
@@ -152,7 +152,7 @@ def covariances(instrument: Instrument, means: Array, signals: Array) -> Array:
     means : ndarray, shape (n, 2)
         Mean readings, everything included; readings as measured where their means are not known.
     signals : ndarray, shape (n, 2)
-        The object's part of them, to which the relative error belongs.
+        The object's part of them, to which the relative error belongs where it is not the source's.
 
     Returns
     -------

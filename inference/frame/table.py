@@ -57,9 +57,9 @@ def _log_resolution(
     signal: Pair, mean: Pair, slope: Pair, strongest: float, scene: FrameScene
 ) -> float:
     """Return the log of a reference prior, that of the strongest frame."""
-    r0, wave, read, shot, _ = scene.instrument
+    r0, wave, read, shot, _, _ = scene.instrument
     # noise that does not depend on the object's part of the readings
-    instrument = Instrument(r0, wave, read, shot, None)
+    instrument = Instrument(r0, wave, read, shot, None, False)
     signal = strongest * signal[0], strongest * signal[1]
     slope = strongest * slope[0], strongest * slope[1]
     mean = with_crosstalk(mean, strongest, scene)

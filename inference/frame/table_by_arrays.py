@@ -79,8 +79,8 @@ def _columns(u: Array, strongest: float, scene: FrameScene) -> Array:
 
 def tabulate(bounds: Any, scene: Any, strongest: float) -> Any:
     """Tabulate the curve of mean readings, knots closer where it turns."""
-    r0, wave, read, shot, _ = scene.instrument
-    plain = scene._replace(instrument=Instrument(r0, wave, read, shot, None), offset=None)
+    r0, wave, read, shot, _, _ = scene.instrument
+    plain = scene._replace(instrument=Instrument(r0, wave, read, shot, None, False), offset=None)
     n = max(loops._FEWEST_KNOTS, math.ceil((bounds[1] - bounds[0]) / KNOT_SPACING) + 1)
     unit = (read[0] / strongest, read[1] / strongest)
     offset = twin(loops._offset)(scene.crosstalk, strongest)

@@ -85,7 +85,11 @@ def learnt_error(sensor: Sensor, terms: Terms, frames: Frames, unknowns: int) ->
     variance = (inverse**2 @ (read**2 + shot)[:, :, None])[:, :, 0] + ruler**2
     if sensor.kind == "pulsed":  # late photons are in both windows
         variance += 2.0 * inverse.prod(axis=2) * shot.min(axis=1)[:, None]
-    variance[:, 0] += sensor.noise.relative**2
+    if sensor.noise.flickers:
+        flicker = sensor.noise.relative * frames.readings[used][usable]
+        variance += np.square((inverse @ flicker[:, :, None])[:, :, 0])
+    else:
+        variance[:, 0] += sensor.noise.relative**2
     flux, range_m = (_size(e, v, spare) for e, v in zip(errors.T, variance.T, strict=True))
     return LearntError(frames=int(usable.sum()), flux=flux, range_m=range_m)
 

@@ -76,7 +76,8 @@ def derivatives_of(
     # the relative error is independent from frame to frame, so it does not cancel in a difference
     net = net_readings(sensor, crosstalk or (0.0, 0.0), frames, with_relative=True)
     usable = np.flatnonzero(net.state == 0)
-    if crosstalk is None and sensor.noise.relative > 0 and usable.size >= 3:
+    unsure = sensor.noise.relative > 0 and not sensor.noise.flickers
+    if crosstalk is None and unsure and usable.size >= 3:
         net = _with_larger_signals(sensor, frames, net, usable)
     gain = frames.gain if crosstalk is None else None
     n = len(frames)

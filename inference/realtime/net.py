@@ -125,7 +125,8 @@ def net_readings(
         The frames.
     with_relative : bool
         Whether the relative error of the object's signal, which frames do not share, is part of
-        the noise; it is apart otherwise.
+        the noise; it is apart otherwise. That of the source does not cancel beside crosstalk, and
+        always is.
 
     Returns
     -------
@@ -135,6 +136,7 @@ def net_readings(
     n = len(frames)
     noise = instrument_of(sensor)
     # sizes of zero rather than None: the machine code is one, and here costs nothing
+    with_relative = with_relative or sensor.noise.flickers
     whole = noise._replace(
         shot=noise.shot or 0.0, relative=(noise.relative or 0.0) if with_relative else 0.0
     )

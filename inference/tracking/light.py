@@ -8,6 +8,8 @@ So the light is taken where the frame says that it is, as far as crosstalk is op
 docs/model.md, learnt-light, has the derivation.
 """
 
+import math
+
 from inference.tracking.readings_table import ReadingsNoise, noise_root
 from inference.tracking.roots import Root, add_root, solve
 from simulator.compiled import compiled
@@ -50,7 +52,7 @@ def noise_at_light(
     root = noise_root(mean[0], mean[1], signal[0], signal[1], noise)
     open1, open2 = _square(unknown)
     photon = noise.shot
-    if photon == 0.0 or not open1 + open2 > 0.0:
+    if (photon == 0.0 and not noise.of_source) or not open1 + open2 > 0.0:
         return root
     for _ in range(_STEPS):
         pull1, pull2 = solve(add_root(root, unknown), residual[0], residual[1])
@@ -59,7 +61,8 @@ def noise_at_light(
         light2 = mean[1] + unknown.r21 * part1 + unknown.r22 * part2
         # given a reading, light of any size as likely is in the mean one photon above it
         own1, own2 = _square(root)
-        light1 = abs(light1) + photon / noise.ratio * (open1 / (open1 + own1))
-        light2 = abs(light2) + photon * (open2 / (open2 + own2))
+        more1, more2 = open1 / (open1 + own1), open2 / (open2 + own2)
+        light1 += math.copysign(photon / noise.ratio * more1, light1)
+        light2 += math.copysign(photon * more2, light2)
         root = noise_root(light1, light2, signal[0], signal[1], noise)
     return root

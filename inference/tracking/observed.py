@@ -56,5 +56,6 @@ def observed_of(sensor: Sensor, settings: TrackingSettings) -> Observed:
         ratio=first / second,
         relative=relative,
         pulsed=isinstance(sensor, PulsedSensor),
+        of_source=sensor.noise.flickers,
     )
     return Observed(by_rate, units, used, noise)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from inference.tracking.roots import Root, add_factor
 from simulator.compiled import compiled
-from simulator.readings import noise_parts
+from simulator.readings import light_that_errs, noise_parts
 
 __all__ = [
     "FIRST",
@@ -44,8 +44,9 @@ class ReadingsNoise(NamedTuple):
     plain: bool  # whether it does not depend on the range
     shot: float  # variance per mean reading, in units of the second reading's read noise
     ratio: float  # read noise of the first reading over that of the second
-    relative: float  # common relative error of the object's signal
+    relative: float  # common relative error
     pulsed: bool  # whether shot noise is shared by both readings
+    of_source: bool = False  # whether all light has the relative error, not the object's alone
 
 
 class ReadingsTable(NamedTuple):
@@ -144,8 +145,10 @@ def noise_root(m1: float, m2: float, o1: float, o2: float, noise: ReadingsNoise)
     nuisance parameters add goes on by the rotations that add the parts.
     """
     ratio = noise.ratio
+    mean = m1 * ratio, m2
+    errs = light_that_errs(mean, (o1 * ratio, o2), noise.of_source)
     own1, own2, shared, common1, common2 = noise_parts(
-        (ratio, 1.0), noise.shot, noise.relative, noise.pulsed, (m1 * ratio, m2), (o1 * ratio, o2)
+        (ratio, 1.0), noise.shot, noise.relative, noise.pulsed, mean, errs
     )
     root = Root(math.sqrt(own1) / ratio, 0.0, math.sqrt(own2))
     if shared > 0.0:

@@ -126,6 +126,12 @@ def export_c(technique: str, sensor: Sensor, scene: Scene, tolerance: float = 1e
             "the readings back to reference_k before the call (docs/scenes.md, temperature)",
             Problem("/sensor/temperature", "is not exported"),
         )
+    if sensor.noise.flickers:
+        raise RefusedError(
+            "the export to C knows no source that flickers: leave noise.relative out, and add "
+            "relative times the largest reading to noise.read",
+            Problem("/sensor/noise/relative_of", "is not exported"),
+        )
     reason = obstacle(ALL_TECHNIQUES[technique], sensor, scene, known, None)
     if reason is not None:
         raise RefusedError(f"{technique}: {reason}")

@@ -11,6 +11,7 @@ from simulator.errors import InvalidInputError
 from simulator.optics.detectors import Detector, Geiger, dead_time_rate
 from simulator.optics.emitters import Emitter
 from simulator.optics.light import Light
+from simulator.readings import light_that_errs
 from simulator.sensor import PulsedSensor, Sensor
 from simulator.validated import Validated
 
@@ -128,7 +129,8 @@ def draw_noise(sensor: Sensor, mean: Pair, signal: Pair, rng: np.random.Generato
         first += math.sqrt(noise.shot * abs(mean[0])) * normal[2]
         second += math.sqrt(noise.shot * abs(mean[1])) * normal[3]
     common = noise.relative * normal[4]
-    return float(first + common * signal[0]), float(second + common * signal[1])
+    errs = light_that_errs(mean, signal, noise.flickers)
+    return float(first + common * errs[0]), float(second + common * errs[1])
 
 
 def digitise(sensor: Sensor, electronics: Electronics, reading: Pair) -> tuple[Pair, bool]:

@@ -116,7 +116,7 @@ def test_residuals_are_white(kind: str) -> None:
     assert terms.background is not None
     background = tuple(terms.background[0])
     assert len(background) == 4
-    r0, wave, read, shot, _ = density.instrument
+    r0, wave, read, shot, _, _ = density.instrument
     bare = background_readings(math.inf, r0, wave, background)
     mean = terms.crosstalk[0] + bare
     v1, v2, v12 = covariance(read, shot, None, wave is None, (mean[0], mean[1]), (0.0, 0.0))

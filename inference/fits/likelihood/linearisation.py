@@ -19,6 +19,7 @@ from inference.frame.arguments import Instrument, Pair
 from inference.frame.noise import NoiseParts, Triangle, noise_of, whitener
 from inference.frame.sensitivity import SLOPES, Value, fill_slopes
 from simulator.compiled import compiled
+from simulator.readings import light_that_errs
 
 __all__ = [
     "fill_projected",
@@ -55,6 +56,7 @@ def _add_covariance(
     pulsed: bool,
     shot: float | None,
     relative: float | None,
+    of_source: bool,
 ) -> None:
     """Fill the rows of what the covariance tells, those of the readings given."""
     if shot is not None and relative is not None:
@@ -75,7 +77,12 @@ def _add_covariance(
             d12 = 0.0
             if pulsed:
                 d12 = d1 if abs(mean1) < abs(mean2) else d2
-            t1, t2 = relative * slopes[k, _SIGNAL_1], relative * slopes[k, _SIGNAL_2]
+            errs = light_that_errs(
+                (slopes[k, _FIRST], slopes[k, _SECOND]),
+                (slopes[k, _SIGNAL_1], slopes[k, _SIGNAL_2]),
+                of_source,
+            )
+            t1, t2 = relative * errs[0], relative * errs[1]
             v11, v22 = d1 + 2.0 * s1 * t1, d2 + 2.0 * s2 * t2
             v12 = d12 + s1 * t2 + s2 * t1
             a11 = i11 * i11 * v11
@@ -98,7 +105,8 @@ def _whiten(rows: Array, slopes: Array, frame: Pair, instrument: Instrument) -> 
         rows[0, k] = i11 * slopes[k, _FIRST]
         rows[1, k] = i21 * slopes[k, _FIRST] + i22 * slopes[k, _SECOND]
     pulsed = instrument.wave is None
-    _add_covariance(rows, slopes, noise, white, pulsed, instrument.shot, instrument.relative)
+    shot, relative, of_source = instrument.shot, instrument.relative, instrument.of_source
+    _add_covariance(rows, slopes, noise, white, pulsed, shot, relative, of_source)
 
 
 @compiled

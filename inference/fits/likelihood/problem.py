@@ -339,6 +339,7 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames, *, exact: bool = F
             (noise.read[0] / unit, noise.read[1] / unit),
             noise.shot / unit if varies else None,
             noise.relative if varies else None,
+            noise.flickers,
         ),
         background=True if parameters.has_background else None,
         support=(near, far),

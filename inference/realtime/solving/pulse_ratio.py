@@ -43,6 +43,9 @@ class Pulse(NamedTuple):
         Standard deviations of the read noise.
     shot : float
         Variance per reading.
+    flicker : float
+        Relative error of all light of the source; 0 where only the object's light has one, which
+        cancels in the ratio.
     low, high : float
         Ranges that are allowed [m].
     full_late, full_whole : float
@@ -58,6 +61,7 @@ class Pulse(NamedTuple):
     crosstalk_whole: float
     read: tuple[float, float]
     shot: float
+    flicker: float
     low: float
     high: float
     full_late: float
@@ -167,6 +171,9 @@ def pulsed_ranges(flat: Array, pulse: Pulse, columns: Columns) -> tuple[int, int
             pulse.read, pulse.shot, None, True, (raw1, raw2), (0.0, 0.0)
         )
         variance = own1 + share * share * own2 + (1.0 - share) * (1.0 - share) * shared
+        # of a source's flicker what the object has cancels
+        left = pulse.flicker * (pulse.crosstalk_late - share * pulse.crosstalk_whole)
+        variance += left * left
         sd = pulse.r0 * inverse * math.sqrt(variance)
         # readings are rounded, however little noise they have
         sd = max(sd, _ROUNDING * r)
@@ -179,10 +186,12 @@ def pulsed_ranges(flat: Array, pulse: Pulse, columns: Columns) -> tuple[int, int
         sds[i] = (whole_sd if sd < whole_sd < math.inf else sd) if good else math.nan
         reason[i] = 0 if good else 1
         # of an object there or farther the windows differ by noise alone
-        together = whole - late < pulse.band * math.sqrt(own1 + own2)
+        early = pulse.flicker * (raw2 - raw1)
+        together = whole - late < pulse.band * math.sqrt(own1 + own2 + early * early)
         near[i] = 1 if good & beyond & together else 0
         bad += 0 if good else 1
-        faint += 1 if good & (FEW * (own2 + shared) > whole * whole) else 0
+        bright = pulse.flicker * raw2
+        faint += 1 if good & (FEW * (own2 + shared + bright * bright) > whole * whole) else 0
     return bad, faint
 
 
@@ -203,6 +212,9 @@ def follow_noise(flat: Array, pulse: Pulse, columns: Columns) -> None:
         own1, own2, shared, _, _ = noise_parts(
             pulse.read, pulse.shot, None, True, (raw1, raw2), (0.0, 0.0)
         )
+        # of a common error s nothing is less than s s^T, and twice its diagonal is no less
+        own1 += 2.0 * (pulse.flicker * raw1) * (pulse.flicker * raw1)
+        own2 += 2.0 * (pulse.flicker * raw2) * (pulse.flicker * raw2)
         late, whole = raw1 - pulse.crosstalk_late, raw2 - pulse.crosstalk_whole
         if FEW * (own2 + shared) > whole * whole:
             reach = pulse.r0 * ratio_reach(late, whole, own1, own2, shared, end)
@@ -232,6 +244,7 @@ def explain(flat: Array, pulse: Pulse, codes: Codes, columns: Columns) -> None:
             continue
         raw1, raw2 = flat[2 * i], flat[2 * i + 1]
         late, whole = raw1 - pulse.crosstalk_late, raw2 - pulse.crosstalk_whole
+        s1, s2 = pulse.flicker * raw1, pulse.flicker * raw2
         r = _divided(late, whole, pulse.r0)
         if abs(raw1) >= pulse.full_late or abs(raw2) >= pulse.full_whole:
             reason[i] = codes.saturated
@@ -239,19 +252,19 @@ def explain(flat: Array, pulse: Pulse, codes: Codes, columns: Columns) -> None:
             reason[i] = codes.lost
         elif whole <= 0.0:
             reason[i] = codes.dark
-            if -whole > CONTRADICTED * math.sqrt(read2 * read2 + pulse.shot * abs(raw2)):
+            if -whole > CONTRADICTED * math.sqrt(read2 * read2 + pulse.shot * abs(raw2) + s2 * s2):
                 reason[i] = codes.negative
         elif late <= 0.0:
             reason[i] = codes.contact
             # so near the error of the effective distance counts as noise does
             moved = whole * (pulse.error / pulse.r0)
-            spread = read1 * read1 + pulse.shot * abs(raw1) + moved * moved
+            spread = read1 * read1 + pulse.shot * abs(raw1) + moved * moved + s1 * s1
             if -late > CONTRADICTED * math.sqrt(spread):
                 reason[i] = codes.negative
         elif late > whole:
             reason[i] = codes.beyond
             # photons that are late are part of all, and cancel: this is their most
-            photons = pulse.shot * (abs(raw1) + abs(raw2))
+            photons = pulse.shot * (abs(raw1) + abs(raw2)) + (s1 - s2) * (s1 - s2)
             if late - whole > CONTRADICTED * math.sqrt(read1 * read1 + read2 * read2 + photons):
                 reason[i] = codes.swapped
         elif not r > 0.0:

@@ -152,6 +152,7 @@ def _solve_pulsed(task: Task, sensor: PulsedSensor) -> TechniqueResult:
         crosstalk_whole=crosstalk_whole,
         read=sensor.noise.read,
         shot=sensor.noise.shot,
+        flicker=sensor.noise.relative if sensor.noise.flickers else 0.0,
         low=low * (1 - _SLACK) + shift,
         high=high * (1 + _SLACK) + shift,
         full_late=full_late,
