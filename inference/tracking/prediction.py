@@ -23,6 +23,7 @@ from inference.tracking.hypotheses import (
 from inference.tracking.merging import merge
 from inference.tracking.motion import Motion, Rules, motion_over, presence_over, wider
 from inference.tracking.readings_table import ReadingsTable, mean_at, noise_root, object_at
+from inference.tracking.resting import nothing_has_changed
 from inference.tracking.roots import UNIT, Root, add_factor
 from inference.tracking.second_order import add_products
 from inference.tracking.shared_error import certainty, known_part, shared_part
@@ -243,7 +244,8 @@ def born_prior(of: Hypotheses, log_weight: float, rate_sd: float, table: Reading
         for j in range(of.X.shape[-1]):
             root = add_factor(root, of.X[0, CROSSTALK1, j], of.X[0, CROSSTALK2, j])
     again = of.numbers[LOST] > 0.0
-    alone = learns_crosstalk(of) and of.numbers[COUNT] == 0.0 and not again
+    # crosstalk that a frame stated empty has told is no more open along a whole curve
+    alone = of.numbers[COUNT] == 0.0 and nothing_has_changed(of) and not again
     return Prior(
         Position(True, again, alone, 0.0, 0.0, log_weight),
         Added(offset1, offset2, 0.0, 0.0, root, root, of.X[0, of.X.shape[1] - 2 :]),

@@ -175,8 +175,9 @@ def test_a_later_known_range_teaches_what_its_frame_tells(kind: str, frame: int,
     assert ((of_crosstalk**2).sum(axis=1) < most).all()
     assert (of_range**2).sum() < most
     if not cut:
-        # what was known before can only add to what the frame tells alone, to first order
-        assert share.max() < 1.1
+        # what was known before can only add to what the frame tells alone, to first order; in the
+        # second frame range and crosstalk still lie on a curve, in parts that do not agree by that
+        assert share.max() < (1.3 if frame == 1 else 1.1)
 
 
 def test_a_known_range_that_contradicts_its_frame_is_an_outlier_and_then_a_misfit() -> None:
