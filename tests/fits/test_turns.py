@@ -157,8 +157,8 @@ def test_all_turns_that_explain_few_frames(r: Array, snr: float, seed: int) -> N
             assert (off < FALSE_ALARM).all()
 
 
-def test_a_search_in_windows_finds_what_a_search_of_all_ranges_misses() -> None:
-    """An object wholly beyond the first turn behind crosstalk, none of it known, no empty frame."""
+def test_an_unknown_object_beyond_the_first_turn_behind_crosstalk() -> None:
+    """None of it is known, and no frame is empty."""
     truth, told = scenes("crosstalk", BEYOND)
     del told["object"]
     for seed in range(4):
