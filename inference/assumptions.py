@@ -7,7 +7,10 @@ from numpy.typing import NDArray
 
 from inference.empty_scatter import scatter_of_empty
 from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK, taken_for_crosstalk
+from inference.growing_light import growing_light
 from inference.impossible_light import impossible_light
+from inference.known import known_of
+from inference.stuck_readings import stuck_readings
 from simulator.frames import Frames
 from simulator.scene import Scene
 from simulator.sensor import PulsedSensor, Sensor
@@ -26,6 +29,8 @@ _TEMPERATURE = (
 # unambiguous ranges that a sensor of this kind may have [m]: it ends neither where scenes begin by
 # default nor beyond a horizon
 _SHORTEST, _LONGEST = 2e-2, 3e3
+# turns of phase of which no frame tells which it is; in millimetres as much is within the first
+_TURNS, _MILLI = 10.0, 1e3
 _TURN = 2 * math.pi * (1 + 1e-6)  # of a whole turn that was typed with seven digits
 # temperatures at which no sensor is run [K]
 _COLDEST_K, _HOTTEST_K = 200.0, 500.0
@@ -45,8 +50,11 @@ def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, .
         looks like a mistake.
     """
     supposed: tuple[str, ...] = ()
-    if doubt := impossible_light(scene, sensor, frames):
+    doubt = impossible_light(scene, sensor, frames) or growing_light(scene, sensor, frames)
+    if doubt:
         supposed = (doubt,)
+    if doubt := stuck_readings(sensor, frames):
+        supposed = (*supposed, doubt)
     if scene.shadow_is_object:
         supposed = (*supposed, _OWN_SHADOW)
     if sensor.temperature is None and frames.temperature_k is not None:
@@ -61,7 +69,22 @@ def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, .
         supposed = (*supposed, doubt)
     if doubt := doubtful_unit(sensor):
         supposed = (*supposed, doubt)
+    if doubt := _doubtful_ranges(sensor, scene):
+        supposed = (*supposed, doubt)
     return supposed
+
+
+def _doubtful_ranges(sensor: Sensor, scene: Scene) -> str | None:
+    """Return the doubt whether `range_m` is in metres, None without one.
+
+    Ranges of a pulse that end beyond its reach are refused.
+    """
+    end, turn = known_of(scene, sensor).stated_end_m, sensor.max_range_m
+    if end is None or not _TURNS * turn <= end <= _MILLI * turn:
+        return None
+    return (
+        f"range_m goes on to {end:.4g}, and phases begin anew each {turn:.3g} m: is it in metres?"
+    )
 
 
 def _doubtful_temperature(temperature_k: NDArray[np.float64]) -> str | None:

@@ -7,40 +7,26 @@ impossible-light).
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inference.known import known_of
+from inference.crosstalk_in_numbers import CrosstalkInNumbers, crosstalk_in_numbers
 from inference.realtime.net import rule_out
-from inference.stated_light import stated_light
 from simulator.compiled import compiled
-from simulator.errors import RefusedError
 from simulator.frames import Frames
-from simulator.joint_scene import centre
-from simulator.parameters import parameters_of
 from simulator.scene import Scene
 from simulator.sensor import PulsedSensor, Sensor
 
 __all__ = ["impossible_light"]
 
 Array = NDArray[np.float64]
-Pair = tuple[float, float]
 
 # of a request whose numbers are as stated: how often it is doubted at most
 _FALSE_ALARM = 1e-6
 _LEAST = 6.0  # standard deviations, and more where so many frames ask for it
 _ROUNDINGS = 8 * float(np.finfo(float).eps)
-_TAILS = (1.0, 2.0, 3.0, 4.0)  # standard deviations at which the width of a law is looked at
 _KINDS = ("w1 below zero", "w2 below zero", "w1 above w2")
-
-
-class _Crosstalk(NamedTuple):
-    """What is subtracted, and what a prior or a joint law leaves open of it [reading units]."""
-
-    values: Pair
-    sd: Pair
 
 
 def impossible_light(scene: Scene, sensor: Sensor, frames: Frames) -> str | None:
@@ -61,7 +47,7 @@ def impossible_light(scene: Scene, sensor: Sensor, frames: Frames) -> str | None
     """
     if not isinstance(sensor, PulsedSensor):
         return None
-    crosstalk = _crosstalk(scene, sensor)
+    crosstalk = crosstalk_in_numbers(scene, sensor)
     if crosstalk is None:
         return None
     read = sensor.noise.read
@@ -85,39 +71,9 @@ def _any_beyond(flat: Array, crosstalk: tuple[float, float], least: tuple[float,
     return found > 0
 
 
-def _crosstalk(scene: Scene, sensor: Sensor) -> _Crosstalk | None:
-    """Return the crosstalk in numbers; None where it is optional, or not known so."""
-    light = stated_light(sensor, scene)
-    stated, sd = (scene, (0.0, 0.0)) if light is None else (light.scene, light.sd)
-    try:
-        of, numbers = centre(sensor, stated)
-        values = known_of(numbers, of).crosstalk
-        if values is None:
-            return None
-        if stated.joint is not None:
-            sd = _with_law(sensor, stated, sd)
-    except RefusedError:
-        return None
-    return _Crosstalk(values, sd)
-
-
-def _with_law(sensor: Sensor, scene: Scene, sd: Pair) -> Pair:
-    """Add what a joint law leaves open of the crosstalk: as wide as its tails are."""
-    assert scene.joint is not None  # noqa: S101  # see above
-    parameters = parameters_of(sensor, scene)
-    names = parameters.names
-    directions = np.eye(len(names))[[names.index(name) for name in scene.joint.unknowns]]
-    middle = parameters.natural(np.zeros((1, len(names))))
-    reach = np.zeros((len(directions), len(names)))
-    for times in (*_TAILS, *(-times for times in _TAILS)):
-        moved = np.abs(parameters.natural(times * directions) - middle)
-        reach = np.maximum(reach, moved / abs(times))
-    whole = dict(zip(names, np.hypot.reduce(reach, axis=0).tolist(), strict=True))
-    first, second = (whole.get(f"crosstalk.{column}", 0.0) for column in sensor.columns)
-    return math.hypot(sd[0], first), math.hypot(sd[1], second)
-
-
-def _beyond(scene: Scene, sensor: PulsedSensor, readings: Array, crosstalk: _Crosstalk) -> Array:
+def _beyond(
+    scene: Scene, sensor: PulsedSensor, readings: Array, crosstalk: CrosstalkInNumbers
+) -> Array:
     """Return by how many standard deviations frames are impossible, shape (3, n): `_KINDS`."""
     values = np.array(crosstalk.values)
     with np.errstate(all="ignore"):

@@ -16,7 +16,7 @@ from inference.fits.likelihood.profile_slopes import profile_slopes
 from inference.fits.likelihood.screen import screen
 from inference.frame.blocks import DISPLACEMENT, DISPLACEMENT_RATE
 from inference.posterior.job import Job
-from inference.posterior.sampling.start import Optimum, climb, refine
+from inference.posterior.sampling.start import Optimum, climb, refine, roughly
 from simulator.compiled import at_once, soon
 from simulator.parameters import OFFSET
 from simulator.sensor_unknowns import TIMING
@@ -30,7 +30,7 @@ _DEVIANCE = 100.0  # above the best: what priors could make up for
 _FARTHEST = 6.0  # standard deviations of a prior at which a climb starts
 
 
-def fitted_optima(job: Job, density: CollapsedDensity) -> list[Optimum]:
+def fitted_optima(job: Job, density: CollapsedDensity, *, brief: bool = False) -> list[Optimum]:
     """Find maxima of the collapsed density from the optima of the fit over all frames.
 
     Parameters
@@ -39,6 +39,8 @@ def fitted_optima(job: Job, density: CollapsedDensity) -> list[Optimum]:
         What was read, by what, of what.
     density : CollapsedDensity
         Of the same.
+    brief : bool
+        Whether one search of the fit is enough, and rough shapes: for what climbs on from there.
 
     Returns
     -------
@@ -59,7 +61,8 @@ def fitted_optima(job: Job, density: CollapsedDensity) -> list[Optimum]:
     many = len(problem) > EASY
     kernels = screen, levenberg_marquardt, profile_slopes
     with at_once(*kernels) if many else soon(levenberg_marquardt):
-        fits = find_maxima(problem)
+        fits = find_maxima(problem, 0) if brief else find_maxima(problem)
+    finish = roughly if brief else refine
     found = []
     for fit in fits[:_MOST]:
         if not fit.deviance < fits[0].deviance + _DEVIANCE:
@@ -69,7 +72,7 @@ def fitted_optima(job: Job, density: CollapsedDensity) -> list[Optimum]:
             natural = np.append(natural, _offset(density.frames, fit.positions))
         z = density.parameters.standard(natural[None])[0]
         start = np.clip(np.nan_to_num(z), -_FARTHEST, _FARTHEST)
-        found.append(refine(density, climb(density, start)[0]))
+        found.append(finish(density, climb(density, start)[0]))
     return [optimum for optimum in found if optimum is not None]
 
 

@@ -29,8 +29,8 @@ class TrackingSettings(Validated):
         Mean time that an object stays, and that none is there [s].
     outlier : float
         Probability that a frame's readings have nothing to do with the scene; as likely, where the
-        crosstalk is known, an object has moved as none of its motion does. As many in a row as are
-        less likely than `false_alarm`, two at least, are a misfit.
+        crosstalk is known or the light steps, an object has moved as none of its motion does. As
+        many in a row as are less likely than `false_alarm`, two at least, are a misfit.
     crosstalk_drift : (float, float), optional
         Standard deviation by which the crosstalk drifts in one second [reading units], in the order
         of the readings; it grows as the root of time. The crosstalk is then learnt on line. Left

@@ -42,16 +42,27 @@ from inference.tracking.readings_table import (
 from inference.tracking.roots import UNIT
 from simulator.compiled import compiled
 
-__all__ = ["OUTLIERS", "UNSTEADY", "first_unsteady", "take_empty", "take_unsteady"]
+__all__ = [
+    "OUTLIERS",
+    "SEEN1",
+    "SEEN2",
+    "SEEN_GAIN",
+    "SEEN_TIME",
+    "UNSTEADY",
+    "first_unsteady",
+    "take_empty",
+    "take_unsteady",
+]
 
 Array = NDArray[np.float64]
 
 # places in `Hypotheses.numbers` behind its own, only where errors that frames share are felt: the
 # running mean, how many frames up to the last were outliers one after another, and of the last
 # that was none its time, what is left of its two readings, the direction across the curve (of an
-# empty scene nan and the gain), and what every nuisance parameter does along that; behind them what
-# lasts
-UNSTEADY, OUTLIERS, _TIME, _LEFT1, _LEFT2, _ACROSS1, _ACROSS2, _SHARED = range(36, 44)
+# empty scene nan and the gain), its readings and factor on the gain (of an empty scene nan), and
+# what every nuisance parameter does along that direction; behind them what lasts
+UNSTEADY, OUTLIERS, SEEN_TIME, _LEFT1, _LEFT2, _ACROSS1, _ACROSS2 = range(36, 43)
+SEEN1, SEEN2, SEEN_GAIN, _SHARED = range(43, 47)
 _GAIN = _ACROSS2
 # standard deviations that an error which frames share may be off by: beyond it one in a million is
 _ALLOWED = 5.0
@@ -61,7 +72,7 @@ _MOST = 15.1  # squared change at which a single frame is cut: noise exceeds it 
 
 def first_unsteady(nuisance: int) -> list[float]:
     """Return these numbers before any frame, of so many nuisance parameters."""
-    return [1.0, 0.0] + [math.nan] * (_SHARED - _TIME + nuisance) + first_lasting(nuisance)
+    return [1.0, 0.0] + [math.nan] * (_SHARED - SEEN_TIME + nuisance) + first_lasting(nuisance)
 
 
 @borrowed
@@ -115,7 +126,7 @@ def take_unsteady(
         change = new - numbers[_SHARED + j]
         shared += change * change
         numbers[_SHARED + j] = new
-    seconds = time - numbers[_TIME]
+    seconds = time - numbers[SEEN_TIME]
     drift1, drift2 = rules.drift1 * across1, rules.drift2 * across2
     variance = 2.0 + _ALLOWED * _ALLOWED * shared + seconds * (drift1 * drift1 + drift2 * drift2)
     change = across1 * left1 + across2 * left2
@@ -129,8 +140,9 @@ def take_unsteady(
     if not math.isnan(change):
         own = min(change * change / variance, _MOST)
         numbers[UNSTEADY] += (1.0 - rules.memory) * (own - numbers[UNSTEADY])
-    numbers[_TIME], numbers[_LEFT1], numbers[_LEFT2] = time, left1, left2
+    numbers[SEEN_TIME], numbers[_LEFT1], numbers[_LEFT2] = time, left1, left2
     numbers[_ACROSS1], numbers[_ACROSS2] = across1, across2
+    numbers[SEEN1], numbers[SEEN2], numbers[SEEN_GAIN] = frame.first, frame.second, gain
 
 
 @borrowed
@@ -168,10 +180,10 @@ def take_empty(
     # what was before: nothing, an object, or an empty scene
     change1, change2 = first - numbers[_LEFT1], second - numbers[_LEFT2]
     after_empty = math.isnan(numbers[_ACROSS1]) and not math.isnan(change1)
-    seconds, brighter = time - numbers[_TIME], gain - numbers[_GAIN]
+    seconds, brighter = time - numbers[SEEN_TIME], gain - numbers[_GAIN]
     shared, hidden = 0.0, 0.0
-    numbers[_TIME], numbers[_LEFT1], numbers[_LEFT2] = time, first, second
-    numbers[_ACROSS1], numbers[_GAIN] = math.nan, gain
+    numbers[SEEN_TIME], numbers[_LEFT1], numbers[_LEFT2] = time, first, second
+    numbers[_ACROSS1], numbers[_GAIN], numbers[SEEN1] = math.nan, gain, math.nan
     if not after_empty:
         return
     n, m = of.X.shape[1], of.X.shape[-1]

@@ -44,6 +44,7 @@ from inference.tracking.hypotheses import (
     scratch_for,
 )
 from inference.tracking.learning import learn
+from inference.tracking.light_steps import may_step
 from inference.tracking.merging import prune
 from inference.tracking.modes import Scanned, find_candidates, scanned_for
 from inference.tracking.motion import Rules
@@ -125,6 +126,8 @@ def _of_followed(
         at_rest[h] = -math.inf
     for h in range(1, followed + 1):
         old, log_weight = found, log_of(of.weight[h])
+        if may_step(of, h, frame, empty.surprise, table, model.rules, room.scratch.work):
+            log_weight += math.log(model.rules.outlier)
         prior = prior_of(of, h, frame.gain, log_weight + log_usual, table)
         found = find_candidates(candidates, found, h, frame, prior, table, scan, room.scanned)
         if learns and model.rules.rate_sd > 0.0 and found > old:

@@ -95,3 +95,14 @@ def test_a_gain_that_nobody_measured_is_thought_of() -> None:
     told = reasons(*frames_of("pulsed", gain=3e4), gain=3e4)
     (text,) = [text for text in told if text.startswith("object.c2 lies")]
     assert "gain" in text
+
+
+@pytest.mark.parametrize("places", [(2,), (9, 20)])
+def test_frames_that_read_zero_are_named_where_they_bend_the_fit(places: tuple[int, ...]) -> None:
+    """Of an empty frame at zero, or two that hide one another, nothing is linear any more."""
+    sensor, frames = frames_of("sine_wave")
+    readings = frames.readings.copy()
+    readings[list(places)] = 0.0
+    told = reasons(sensor, dataclasses.replace(frames, readings=readings))
+    named = " and ".join(map(str, places))
+    assert any(f"{named} (counted from 0) alone" in text for text in told)

@@ -240,6 +240,26 @@ def test_units_that_cannot_be_meant_are_doubted(sensor: dict[str, Any], words: s
 
 
 @pytest.mark.parametrize(
+    ("ranges", "doubted"),
+    [((100.0, 2000.0), True), ((0.1, 74.0), False), ((0.1, 76.0), True), ((0.1, 7600.0), False)],
+)
+def test_ranges_of_many_turns_may_be_in_millimetres(
+    ranges: tuple[float, float], doubted: bool
+) -> None:
+    """A turn of 20 MHz is 7.49 m; more than a thousand of them are no millimetres of one."""
+    noise = {"read": [1e-3, 1e-3]}
+    parsed = parse_sensor({"kind": "sine_wave", "frequency_hz": 2e7, "noise": noise})
+    low, high = ranges
+    scene = parse_scene({"range_m": {"prior": "reference", "low": low, "high": high}})
+    found = estimate(parsed, scene, Frames(np.array([[0.1, 0.4]]))).assumptions
+    assert found == (
+        (f"range_m goes on to {high:.4g}, and phases begin anew each 7.49 m: is it in metres?",)
+        if doubted
+        else ()
+    )
+
+
+@pytest.mark.parametrize(
     ("columns", "words"),
     [
         ({"temperature_k": [25.0, 298.15]}, "temperature_k is 25 in frame 0: is it in kelvin"),

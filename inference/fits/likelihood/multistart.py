@@ -234,13 +234,15 @@ def find_near(problem: FitProblem) -> list[Maximum]:
     )
 
 
-def find_maxima(problem: FitProblem) -> tuple[Maximum, ...]:
+def find_maxima(problem: FitProblem, waves: int = _WAVES) -> tuple[Maximum, ...]:
     """Find the optima of a fit, the best first.
 
     Parameters
     ----------
     problem : FitProblem
         At least as many frames as the unknowns need.
+    waves : int
+        How often more are looked for from the best one, at most.
 
     Returns
     -------
@@ -255,7 +257,7 @@ def find_maxima(problem: FitProblem) -> tuple[Maximum, ...]:
         there = _climbed(part, *_screened(part))[: effort.polished]
         last += [maximum_from(problem, end.x) for end in there if np.isfinite(end.x).all()]
     last = _distinct(problem, last, _MOST)
-    for _ in range(_WAVES if last and len(problem) > EASY else 0):
+    for _ in range(waves if last and len(problem) > EASY else 0):
         before = last[0].deviance
         last = _distinct(problem, last + _second_wave(problem, last[0], starts), _MOST)
         if before - last[0].deviance < TOP:

@@ -17,9 +17,10 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.coordinates import coordinates_of
 from inference.posterior.sampling.pool import Pool
 from inference.posterior.sampling.proposal import Local, Mixture, Proposal
+from inference.posterior.sampling.shape import followed
 from inference.posterior.sampling.transport import fit_map
 
-__all__ = ["LAWS", "fitted", "next_laws"]
+__all__ = ["LAWS", "fitted", "next_laws", "next_shape"]
 
 Array = NDArray[np.float64]
 
@@ -68,6 +69,13 @@ def next_laws(
     wide = fitted(proposal, _sample(drawn, flatter, members[:0], 1, rng), density)
     proposal = fitted(proposal, sample, density)
     return proposal, wide, _around(proposal, pool.z, pool.log_ratios)
+
+
+def next_shape(proposal: Proposal, pool: Pool, members: int) -> Proposal:
+    """Return the proposal of a round whose shape follows the draws so far; members as of `Pool`."""
+    if proposal.transport is None:
+        raise ValueError("a proposal without a shape")
+    return dataclasses.replace(proposal, transport=followed(proposal.transport, pool, members))
 
 
 def fitted(proposal: Proposal, sample: Array, density: CollapsedDensity) -> Proposal:

@@ -20,7 +20,7 @@ from inference.posterior.sampling.importance import (
     pareto_k_hat,
     weighted_by,
 )
-from inference.posterior.sampling.next_laws import fitted, next_laws
+from inference.posterior.sampling.next_laws import fitted, next_laws, next_shape
 from inference.posterior.sampling.pool import (
     Pool,
     drawn_by,
@@ -87,14 +87,14 @@ def first_draws(
     rng: np.random.Generator,
     wanted: Wanted,
 ) -> RoundsSoFar:
-    """Begin rounds with a map that is fitted to members of populations.
+    """Begin rounds with a map that is fitted to members of populations, or with a shape.
 
     Parameters
     ----------
     density : CollapsedDensity
         Target.
     proposal : Proposal
-        With the optima that are known.
+        With the optima that are known, and the shape where one is wanted.
     populations : tuple of ndarray, shape (m, d) each
         Members of populations that came from the prior, of finite density.
     rng : numpy.random.Generator
@@ -109,7 +109,8 @@ def first_draws(
     """
     members = np.concatenate(populations)
     ends = np.cumsum([len(one) for one in populations]).tolist()
-    proposal = fitted(proposal, members, density)
+    if not wanted.shapes:
+        proposal = fitted(proposal, members, density)
     pool = Pool(members, np.empty(0), (), (), (), proposal.optima.log_density(members))
     pool = with_laws(pool, (proposal,), (wanted.first,), rng)
     return RoundsSoFar(wanted, proposal, pool, tuple(ends), 0)
@@ -141,6 +142,10 @@ def next_draws(
         drawn = drawn_by(so_far.pool, last.shares, min(last.count - made, STEP), rng)
         drawn = drawn if last.drawn is None else joined(last.drawn, drawn)
         return dataclasses.replace(so_far, last=dataclasses.replace(last, drawn=drawn))
+    if so_far.shaped:
+        proposal = next_shape(so_far.proposal, so_far.pool, so_far.members)
+        pool = with_laws(so_far.pool, (proposal,), (so_far.wanted.first,), rng)
+        return dataclasses.replace(so_far, proposal=proposal, pool=pool)
     laws = next_laws(density, so_far.proposal, so_far.pool, so_far.beyond, rng)
     size = STEP if so_far.telling else so_far.wanted.first
     local, far = int(_LOCAL_SHARE * size), int(_WIDE_SHARE * size)

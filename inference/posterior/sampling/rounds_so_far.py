@@ -21,6 +21,7 @@ __all__ = ["LastDraws", "Rounds", "RoundsSoFar", "Wanted", "heaviest_of", "worst
 Array = NDArray[np.float64]
 
 _FEWEST = 6  # rounds: before, even weights are those of draws that all leave out the same
+_TAILS = 3  # rounds of maps behind shapes, from which on tails are in the draws
 _TAIL = 0.01  # of the draws' mass, in the heaviest of them: there may be
 _MOST_DISSENT = 0.03  # so many of a population's members
 
@@ -43,6 +44,9 @@ class Wanted:
         are none of the posterior.
     first : int
         Draws of each round until rounds tell what they left out.
+    shapes : int
+        Rounds, the first ones, whose only law is a shape that bends nothing and follows the draws:
+        the one to begin with is brought by the proposal. 0 where a map is fitted to the members.
     """
 
     target_ess: int
@@ -50,6 +54,7 @@ class Wanted:
     tolerated: float = _MOST_DISSENT
     tail: float = _TAIL
     first: int = 1000
+    shapes: int = 0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -152,6 +157,11 @@ class RoundsSoFar:
         return self.pool.z[:0] if self.last.drawn is None else self.last.drawn.open
 
     @property
+    def shaped(self) -> bool:
+        """Whether the next law is still a shape."""
+        return len(self.pool.laws) < self.wanted.shapes
+
+    @property
     def beyond(self) -> NDArray[np.bool_]:
         """Which members lie beyond the heaviest draws, shape (members,)."""
         heaviest = heaviest_of(self.pool.log_ratios[self.members :], self.wanted.tail)
@@ -164,8 +174,14 @@ class RoundsSoFar:
 
     @property
     def draws(self) -> WeightedDraws | None:
-        """All draws so far, by weight; None where they tell little, or members contradict them."""
-        if not self.telling:
+        """All draws so far, by weight; None where they tell little, or members contradict them.
+
+        Shapes follow the target itself, and first maps the members: behind the former few rounds
+        of maps tell as much as many behind the latter. Draws of shapes alone leave out tails.
+        """
+        shapes = self.wanted.shapes
+        early = shapes > 0 and len(self.pool.laws) >= shapes + _TAILS * LAWS
+        if not (self.telling or early):
             return None
         now = self
         if self.last is not None and self.last.drawn is not None:

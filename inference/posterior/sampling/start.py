@@ -6,7 +6,7 @@ biased (incidental parameters); each optimum is then refined on the collapsed de
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy
@@ -15,10 +15,23 @@ from numpy.typing import NDArray
 from inference.density.collapsed import CollapsedDensity
 from inference.density.profile import linearise
 
-__all__ = ["Optimum", "added", "climb", "find_optima", "refine"]
+__all__ = [
+    "Finish",
+    "Optimum",
+    "added",
+    "climb",
+    "curvature_factor",
+    "derivatives",
+    "find_optima",
+    "lower_factor",
+    "refine",
+    "roughly",
+]
 
 Array = NDArray[np.float64]
 
+# of a standard deviation: the log density is then near quadratic, differences are exact
+_DIFFERENCE = 0.05
 _SCREEN = 600  # points of the prior that are looked at
 _CLIMBS = 10  # of which the best, spread out, are climbed
 _ITERATIONS = 60
@@ -56,6 +69,9 @@ class Optimum:
         """Tell whether z of shape (d,) lies within half a standard deviation."""
         step = scipy.linalg.solve_triangular(self.factor, z - self.z, lower=True)
         return bool(np.linalg.norm(step) < _NEAR)
+
+
+Finish = Callable[[CollapsedDensity, Array], Optimum | None]
 
 
 def added(optima: Sequence[Optimum], found: Optimum | None) -> list[Optimum]:
@@ -124,8 +140,8 @@ def climb(
     return z, float(value)
 
 
-def _curvature_factor(density: CollapsedDensity, z: Array) -> Array:
-    """Inverse square root of the Gauss-Newton information at z: a scale for differences."""
+def curvature_factor(density: CollapsedDensity, z: Array) -> Array:
+    """Return the inverse square root of the Gauss-Newton information at z, shape (d, d)."""
     positions = density.best_ranges(z[None])[0, :, 0]
     line = linearise(density, z, positions)
     matrix = np.concatenate([line.jacobian.reshape(-1, z.size), np.eye(z.size)])
@@ -133,10 +149,23 @@ def _curvature_factor(density: CollapsedDensity, z: Array) -> Array:
     return np.asarray(scipy.linalg.solve_triangular(r, np.eye(z.size)))
 
 
-def _derivatives(density: CollapsedDensity, z: Array, frame: Array) -> tuple[float, Array, Array]:
-    """Value, gradient and Hessian along the columns of a frame, by central differences."""
+def derivatives(
+    density: Callable[[Array], Array], z: Array, frame: Array, h: float = _DIFFERENCE
+) -> tuple[float, Array, Array]:
+    """Return value, gradient and Hessian along the columns of a frame, by central differences.
+
+    Parameters
+    ----------
+    density : callable
+        Log density of points of shape (n, d), shape (n,).
+    z : ndarray, shape (d,)
+        Where.
+    frame : ndarray, shape (d, d)
+        Directions, as long as the density is wide there.
+    h : float
+        Step, of a column.
+    """
     d = z.size
-    h = 0.05  # standard deviations: the log density is then near quadratic, differences are exact
     pairs = [(i, j) for i in range(d) for j in range(i)]
     steps = [np.zeros(d)]
     for i in range(d):
@@ -171,11 +200,10 @@ def refine(density: CollapsedDensity, z: Array) -> Optimum | None:
     Optimum or None
         None where the density is not finite around the point.
     """
-    d = z.size
-    frame = _curvature_factor(density, z)
+    frame = curvature_factor(density, z)
     best = float(density(z[None])[0])
     for _ in range(25):
-        value, gradient, hessian = _derivatives(density, z, frame)
+        value, gradient, hessian = derivatives(density, z, frame)
         if not (np.isfinite(gradient).all() and np.isfinite(hessian).all()):
             frame = 0.3 * frame  # a bound of the support is near
             continue
@@ -193,19 +221,46 @@ def refine(density: CollapsedDensity, z: Array) -> Optimum | None:
             z, best = trials[k], float(found[k])
         if length < 0.02 or not found[k] > value:
             break
-    value, gradient, hessian = _derivatives(density, z, frame)
+    value, gradient, hessian = derivatives(density, z, frame)
     if not np.isfinite(hessian).all():
         return None
     values, vectors = np.linalg.eigh(-hessian)
     spread = frame @ (vectors / np.sqrt(np.maximum(values, 1e-2)))
-    factor = scipy.linalg.qr(spread.T, mode="r")[0][:d].T
-    factor = factor * np.sign(np.diagonal(factor))
-    return Optimum(z, best, factor)
+    return Optimum(z, best, lower_factor(spread))
 
 
 def _previous(frame: Array, vectors: Array, values: Array) -> Array:
     """Undo the last rescaling of a frame."""
     return (frame * np.sqrt(np.maximum(values, 1e-2))) @ vectors.T
+
+
+def roughly(density: CollapsedDensity, z: Array) -> Optimum | None:
+    """Return a point as an optimum whose shape is that of Gauss-Newton information alone.
+
+    It takes one evaluation where `refine` takes thousands, and does for what climbs on in
+    coordinates of its own.
+
+    Parameters
+    ----------
+    z : ndarray, shape (d,)
+        A point near a maximum.
+
+    Returns
+    -------
+    Optimum or None
+        As of `refine`.
+    """
+    factor = curvature_factor(density, z)
+    value = float(density(z[None])[0])
+    if not (np.isfinite(value) and np.isfinite(factor).all() and np.diagonal(factor).all()):
+        return None
+    return Optimum(z, value, lower_factor(factor))
+
+
+def lower_factor(spread: Array) -> Array:
+    """Return the lower triangular L with L L^T = F F^T, its diagonal positive, shape (d, d)."""
+    factor = scipy.linalg.qr(spread.T, mode="r")[0][: len(spread)].T
+    return np.asarray(factor * np.sign(np.diagonal(factor)), dtype=np.float64)
 
 
 def _spread_out(points: Array, values: Array, count: int) -> Array:
@@ -221,7 +276,9 @@ def _spread_out(points: Array, values: Array, count: int) -> Array:
     return points[chosen]
 
 
-def find_optima(density: CollapsedDensity, rng: np.random.Generator) -> list[Optimum]:
+def find_optima(
+    density: CollapsedDensity, rng: np.random.Generator, finish: Finish = refine
+) -> list[Optimum]:
     """Find the maxima of the collapsed density that matter, the best first.
 
     Parameters
@@ -230,6 +287,8 @@ def find_optima(density: CollapsedDensity, rng: np.random.Generator) -> list[Opt
         The density; at least one unknown.
     rng : numpy.random.Generator
         Source of the screen.
+    finish : callable
+        What makes an optimum of the end of a climb: `refine` or `roughly`.
 
     Returns
     -------
@@ -244,7 +303,7 @@ def find_optima(density: CollapsedDensity, rng: np.random.Generator) -> list[Opt
             continue
         if any(one.is_near(z) for one in visited):
             continue
-        optimum = refine(density, z)
+        optimum = finish(density, z)
         if optimum is None:
             continue
         visited += [dataclasses.replace(optimum, z=z), optimum]

@@ -18,7 +18,7 @@ from inference.posterior.sampling.coordinates import Coordinates
 from inference.posterior.sampling.flux_coordinate import FluxCoordinate
 from simulator.compiled import compiled
 
-__all__ = ["TriangularMap", "fit_map", "straight_map"]
+__all__ = ["TriangularMap", "fit_map", "straight_map", "unbent_map"]
 
 Array = NDArray[np.float64]
 
@@ -125,6 +125,19 @@ class TriangularMap:
     cubic: int
     coordinates: Coordinates | None = None
 
+    def moved(self, mean: Array, factor: Array) -> "TriangularMap":
+        """Return the map of a normal law in the coordinates x of one that bends nothing.
+
+        Parameters
+        ----------
+        mean, factor : ndarray, shape (d,) and (d, d)
+            Of the law.
+        """
+        if self.coordinates is None or self.means.any() or self.scales.any():
+            raise ValueError("a map that bends")
+        centre, axes = self.centre + self.axes @ mean, self.axes @ factor
+        return unbent_map(centre, axes, self.coordinates)
+
     @property
     def _log_volume(self) -> float:
         return float(np.log(np.linalg.norm(self.axes, axis=0)).sum())
@@ -213,6 +226,23 @@ def straight_map(draws: Array) -> TriangularMap:
     centre, axes = _principal_axes(draws)
     nothing = np.zeros((d, math.comb(d + 1, 2)))
     return TriangularMap(centre, axes, np.zeros((2, d)), nothing, nothing, 0, None)
+
+
+def unbent_map(centre: Array, factor: Array, coordinates: Coordinates) -> TriangularMap:
+    """Return the map of a normal law in some coordinates to the standard one.
+
+    Parameters
+    ----------
+    centre, factor : ndarray, shape (d,) and (d, d)
+        Mean, and F with F F^T the covariance.
+    coordinates : FluxCoordinate, LightAtRest or Reparametrisation
+        Of both.
+    """
+    left, singular, _ = scipy.linalg.svd(factor)
+    nothing = np.zeros((centre.size, math.comb(centre.size + 1, 2)))
+    axes = left * np.maximum(singular, 1e-12 * singular[0] + 1e-300)
+    bounds = np.zeros((2, centre.size))
+    return TriangularMap(centre, axes, bounds, nothing, nothing, 0, coordinates)
 
 
 def fit_map(draws: Array, coordinates: Coordinates | None = None) -> TriangularMap:

@@ -12,8 +12,9 @@ import numpy as np
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
 from inference.posterior.sampling.scouts import send_scouts, thinned
-from inference.posterior.sampling.start import find_optima
+from inference.posterior.sampling.start import find_optima, refine, roughly
 from inference.posterior.stages.chunk import is_short_for_scouts
+from inference.posterior.stages.shaping import begins_with_a_shape
 from inference.posterior.stages.stage import Starting
 from inference.posterior.streams import Stream
 
@@ -52,19 +53,23 @@ class LookTask:
         Without optional terms, and with something unknown.
     way : str
         Which member of `Starting` is looked for.
+    brief : bool
+        Whether what is found is climbed on from, in coordinates of its own: rough shapes do.
     """
 
     job: Job
     way: Way
+    brief: bool = False
 
     def run(self) -> Looked:
         """Look."""
         job = of_some_frames(self.job) if self.job.is_large else self.job
         density = job.density()
         if self.way == "fitted":
-            return Looked(Starting(fitted=tuple(fitted_optima(job, density))), 0)
+            return Looked(Starting(fitted=tuple(fitted_optima(job, density, brief=self.brief))), 0)
         if self.way == "climbed":
-            found = find_optima(density, self.job.stream(Stream.SCREEN))
+            finish = roughly if self.brief else refine
+            found = find_optima(density, self.job.stream(Stream.SCREEN), finish)
             return Looked(Starting(climbed=tuple(found)), 0)
         scouts, calls = send_scouts(thinned(density), self.job.stream(Stream.SCOUTS))
         return Looked(Starting(scouts=scouts), calls)
@@ -81,7 +86,8 @@ def looking(job: Job, start: Starting, *, scouts: bool) -> tuple[LookTask, ...]:
     ways = ways_left(start, scouts=scouts)
     if len(ways) > 1 and is_short_for_scouts(job):
         ways = tuple(way for way in ways if way != "scouts")
-    return tuple(LookTask(job, way) for way in ways)
+    brief = scouts and begins_with_a_shape(job, job.density())
+    return tuple(LookTask(job, way, brief) for way in ways)
 
 
 def taken_in(start: Starting, found: Sequence[Looked]) -> tuple[Starting, int]:

@@ -10,13 +10,15 @@ from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.scouts import MOST_FRAMES, Scouts
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.stages.chunk import evaluations
-from inference.posterior.stages.ensembles import POPULATIONS
-from inference.posterior.stages.setting_out import HALFWAY_DRAWS, SCOUTED_DRAWS
+from inference.posterior.stages.setting_out import (
+    HALFWAY_DRAWS,
+    SCOUTED_DRAWS,
+    small_populations,
+)
 from inference.posterior.stages.stage import Tempering
 
 __all__ = ["from_scouts"]
 
-_HALFWAY = 0.3  # power of the likelihood at which small populations stop
 _MOST_S = 40  # seconds that rounds may take: populations that are carried all the way take longer
 
 
@@ -37,7 +39,7 @@ def from_scouts(
     cheap = _MOST_S * evaluations(job) >= draws and len(density.frames) <= MOST_FRAMES
     pending = Verdict(False, ("no steps were made",))
     if cheap and hard:
-        return Tempering(proposal, (None,) * POPULATIONS, pending, known, reach=_HALFWAY)
+        return small_populations(Tempering(proposal, (), pending, known))
     if not (cheap and len(stood.hot) > stood.hot.shape[1]):
         return None
     arrived = arrived_at(stood.z), arrived_at(stood.hot)

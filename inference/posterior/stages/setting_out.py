@@ -43,16 +43,19 @@ __all__ = [
     "SetOutTask",
     "all_the_way",
     "put_together",
+    "small_populations",
     "walking_from",
 ]
 
 Array = NDArray[np.float64]
 
+_HALFWAY = 0.3  # power of the likelihood at which small populations stop
 _SHARE = 0.5  # of what the populations took, that importance sampling behind them may take
 _MOST_DRAWS = (12_000, 40_000)  # but so many at least, and at most
 SCOUTED_DRAWS = 20_000  # that rounds from scouts may take: as many as carry one population
 HALFWAY_DRAWS = 40_000  # and those from small populations, twice: as many as carry these
 _DEAR = 500  # draws of a round until rounds tell, where one takes long
+_SHAPES = 4  # rounds of shapes, where rounds begin with one
 _FITTED = 2  # adaptations of a law that was held to weighted draws
 _LEADING = 50.0  # effective size of draws, from which on rounds may begin again at them
 _ERRING = 4  # number of the streams of rounds with errors of the model integrated out, the first
@@ -184,9 +187,10 @@ def _wanted(job: Job, stage: Tempering, members: Sequence[Population]) -> Wanted
     """Return what rounds are to come to: populations that stop on their way are held to more."""
     target = worth_wanted(job)
     if stage.early:
-        most = SCOUTED_DRAWS if stage.scouted else HALFWAY_DRAWS
-        first = _DEAR if job.scene.model_error.integrated else STEP
-        return Wanted(target, most, TOLERATED, 0.0, first)
+        far = stage.shaped or not stage.scouted
+        most = HALFWAY_DRAWS if far else SCOUTED_DRAWS
+        first = _DEAR if stage.shaped or job.scene.model_error.integrated else STEP
+        return Wanted(target, most, TOLERATED, 0.0, first, _SHAPES if stage.shaped else 0)
     most = int(np.clip(_SHARE * sum(each.calls for each in members), *_MOST_DRAWS))
     return Wanted(target, most)
 
@@ -208,6 +212,8 @@ def _set_out(
     elif _may_try_again(stage, found):
         # in a chunk of its own: a job may be out of time by now
         return dataclasses.replace(stage, weighted=found.draws, tried=True), found.calls
+    elif stage.shaped:
+        return small_populations(stage), found.calls
     else:
         # until larger populations are on their way an answer is made of what there is
         if found.dissent < TOLERATED:
@@ -222,6 +228,13 @@ def _may_try_again(stage: Tempering, found: Rounds) -> bool:
     """Tell whether rounds have come so far that they may begin again where they are."""
     first = not (stage.scouted or stage.tried)
     return first and found.dissent < TOLERATED and found.draws.ess >= _LEADING
+
+
+def small_populations(stage: Tempering) -> Tempering:
+    """Return the stage in which small populations set out from the prior, and stop on their way."""
+    proposal = dataclasses.replace(stage.proposal, transport=None)
+    populations = (None,) * POPULATIONS
+    return Tempering(proposal, populations, stage.verdict, stage.weighted, reach=_HALFWAY)
 
 
 def all_the_way(stage: Tempering) -> Tempering:

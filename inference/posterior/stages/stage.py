@@ -130,6 +130,9 @@ class Tempering(_NotBegun):
         Whether the populations are the scouts, and where these stood on their way from the prior:
         they find every branch and weigh none. Rounds of importance sampling are tried from them
         before populations are carried.
+    shaped : bool
+        Whether these rounds begin with a shape that the proposal brings, and are only held to the
+        scouts.
     reach : float
         Power of the likelihood that populations are carried to. Below 1 they are small, and rounds
         of importance sampling are tried from them before larger ones are carried all the way.
@@ -147,6 +150,7 @@ class Tempering(_NotBegun):
     verdict: Verdict
     weighted: WeightedDraws | None = None
     scouted: bool = False
+    shaped: bool = False
     reach: float = 1.0
     tried: bool = False
     rounds: RoundsSoFar | None = None

@@ -14,7 +14,7 @@ from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, dr
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.represent import represent
 from inference.posterior.sampling.scouts import Scouts
-from inference.posterior.sampling.start import Optimum, added, climb, refine
+from inference.posterior.sampling.start import Finish, Optimum, added, climb, refine, roughly
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.sampling.warm import beyond, warm_start
 from inference.posterior.stages.checkpoint import Checkpoint
@@ -37,6 +37,7 @@ from inference.posterior.stages.looking import (
 from inference.posterior.stages.optima import depend_on_errors, that_matter
 from inference.posterior.stages.scouting import from_scouts
 from inference.posterior.stages.setting_out import TOLERATED
+from inference.posterior.stages.shaping import begins_with_a_shape, from_shapes
 from inference.posterior.stages.stage import (
     Drawing,
     Settled,
@@ -165,7 +166,14 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum], scouts: Sc
         Told of none of them.
     """
     whole, calls = job.density(), 0
-    density, optima = whole, _with_scouts(some, optima, scouts)
+    density = whole
+    if begins_with_a_shape(job, whole):
+        ends = _with_scouts(some, optima, scouts, roughly)
+        begun = from_shapes(job, whole, ends, scouts) if ends else None
+        if begun is not None:
+            return begun
+        optima = [one for one in (refine(some, end.z) for end in optima) if one is not None]
+    optima = _with_scouts(some, optima, scouts)
     if optima and depend_on_errors(job, some, optima):
         return Checkpoint(Starting(), calls, None, integrated=True)
     optima = that_matter(optima)
@@ -185,10 +193,10 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum], scouts: Sc
     check_best_fit(whole, optima[0].z)
     stage, used = _first_stage(job, density, optima, scouts)
     reached = Checkpoint(stage, calls + used, None, job.representatives)
-    begun = at_once(job, density, optima, scouts) if isinstance(stage, Tempering) else None
-    if begun is None:
+    moved = at_once(job, density, optima, scouts) if isinstance(stage, Tempering) else None
+    if moved is None:
         return reached
-    erring, used = begun
+    erring, used = moved
     return dataclasses.replace(
         reached, stage=erring, calls=reached.calls + used, integrated=True, exact=stage
     )
@@ -248,11 +256,13 @@ def _at_rest(
     return Weighted(proposal.optima, drawn, Verdict(True, ())), calls
 
 
-def _with_scouts(density: CollapsedDensity, optima: list[Optimum], scouts: Scouts) -> list[Optimum]:
+def _with_scouts(
+    density: CollapsedDensity, optima: list[Optimum], scouts: Scouts, finish: Finish = refine
+) -> list[Optimum]:
     """Add optima that the best scout leads to."""
     if len(scouts.z):
-        optima = added(optima, refine(density, climb(density, scouts.z[0])[0]))
-        optima = added(optima, refine(density, scouts.z[0]))
+        optima = added(optima, finish(density, climb(density, scouts.z[0])[0]))
+        optima = added(optima, finish(density, scouts.z[0]))
     return optima
 
 

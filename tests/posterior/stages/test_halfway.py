@@ -28,10 +28,14 @@ SEED = 1
 
 @functools.cache
 def _job(method: str) -> fold.Job:
-    """Crosstalk and a wall that both are unknown: the readings tell their sum alone."""
+    """Crosstalk and a wall that both are unknown: the readings tell their sum alone.
+
+    The model is exact: rounds with its errors begin with a shape.
+    """
     data = draw_path("log-spaced", "both", "nothing", SEED)
     settings = SamplerSettings.model_validate({"seed": SEED, "method": method})
-    return fold.prepare(data.sensor, parse_scene(data.scene), data.frames, settings)
+    scene = parse_scene({**data.scene, "discrepancy": 0})
+    return fold.prepare(data.sensor, scene, data.frames, settings)
 
 
 @functools.cache

@@ -106,13 +106,6 @@ def test_where_rounds_fail_the_exact_model_is_sampled_and_looked_at() -> None:
     assert fold.tasks(_job(), left)
 
 
-def test_what_is_confounded_begins_with_the_exact_model() -> None:
-    begun = _begun(_job("crosstalk, background, R known"))
-    assert isinstance(begun.stage, Tempering)
-    assert not begun.integrated
-    assert begun.exact is None
-
-
 def test_it_is_the_law_that_rounds_behind_an_exact_model_come_to(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
