@@ -10,8 +10,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy import optimize
 
+from benchmarks.fit_turns import random_scene
 from inference.estimate import estimate
 from inference.estimates import Estimates, TechniqueResult
+from inference.fits.likelihood import multistart
+from inference.fits.likelihood.problem import FitProblem, fit_problem
 from inference.fits.likelihood.turns import windows_of
 from simulator.frames import Frames
 from simulator.scene import parse_scene
@@ -166,13 +169,83 @@ def test_an_unknown_object_beyond_the_first_turn_behind_crosstalk() -> None:
         assert (roots_off(result, BEYOND) < FALSE_ALARM).all()
 
 
-def test_windows_hold_all_ranges() -> None:
-    """None where a turn holds all; else of one turn, of two, each half a window on."""
+@pytest.mark.parametrize("turns", [1.3, 2.0, 3.2, 3.999])
+def test_windows_hold_all_ranges(turns: float) -> None:
+    """Each is as wide as its turns, none leaves out an end, and neighbours overlap by half."""
     assert windows_of((8.0, 15.0), 7.5) == []
-    assert windows_of((0.0, 2.0), 1.0) == [(0.0, 1.0), (0.5, 1.5), (1.0, 2.0)]
-    found = windows_of((0.0, 3.2), 1.0)
-    assert [round(b - a, 9) for a, b in found] == [1.0] * 5 + [0.7] + [2.0, 2.0, 1.2]
-    assert max(b for _, b in found) == 3.2
+    assert windows_of((8.0, 15.5), 7.5) == []
+    low, high = 0.3, 0.3 + 7.5 * turns
+    found = windows_of((low, high), 7.5)
+    for width in (7.5, 15.0):
+        ends = [(a, b) for a, b in found if b - a == pytest.approx(width)]
+        if width > high - low - 1e-6:
+            assert not ends
+            continue
+        assert ends[0][0] == low
+        assert ends[-1][1] == high
+        steps = [b[0] - a[0] for a, b in itertools.pairwise(ends)]
+        assert all(0.0 < step < 0.5 * width + 1e-9 for step in steps)
+    assert all(a >= low - 1e-9 for a, _ in found)
+    assert all(b - a < 15.0 + 1e-9 for a, b in found)
+
+
+def test_an_object_wholly_beyond_is_found_from_the_last_window() -> None:
+    """Its path of 8.4 to 12.5 m is in no window but one that ends where the ranges end.
+
+    The last one began half a turn behind the one before and was less than a turn: a misfit.
+    """
+    sensor, scene, simulation = random_scene("object+crosstalk", 66, True, True)
+    result = result_of(estimate(sensor, scene, simulation.frames, ["joint_fit"]))
+    at = simulation.frames.present
+    assert np.nanmax(roots_off(result, simulation.range_m)[at]) < FALSE_ALARM
+
+
+def test_frames_at_the_seam_have_one_range() -> None:
+    """Where phases begin anew a range is as any other: their neighbours tell light, not phase."""
+    r = TURN * np.array([0.3, 0.6, 0.9, 0.999, 1.0, 1.001, 1.1, 1.4, 1.7])
+    for name in ("object", "crosstalk"):
+        result = result_of(asked(*scenes(name, r), r, 3e3, 5)[0])
+        assert (result.root_count == 1).all()
+        assert (roots_off(result, r) < FALSE_ALARM).all()
+
+
+def test_ranges_that_end_within_a_turn_end_there() -> None:
+    """4 m and 11.5 m have one phase; beyond the stated 10 m nothing is looked for."""
+    r = np.array([1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 7.8, 9.0, 9.8])
+    to_10 = {"range_m": {"prior": "uniform", "low": 0.3, "high": 10.0}}
+    truth, told = scenes("crosstalk", r)
+    for snr in (1.0, 3e3):  # in the first no light tells the turn of the last frames
+        result = result_of(asked(truth, told | to_10, r, snr, 6)[0])
+        assert np.nanmax(result.roots_m) < 10.0 + 1e-9
+        off = roots_off(result, r)[result.root_count > 0]
+        assert np.nanmax(off) < FALSE_ALARM
+    assert (result.root_count == 1).all()
+
+
+@pytest.mark.parametrize(("end", "searches"), [(TURN, 1), (7.0, 1), (14.0, 4)])
+def test_ranges_within_a_turn_are_searched_once(
+    end: float, searches: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They cost nothing more: no window, and the support that they had."""
+    sensor = parse_sensor({"kind": "sine_wave", "frequency_hz": 2e7, "noise": {"read": [1e-5] * 2}})
+    scene = parse_scene(
+        {"discrepancy": 0, "range_m": {"prior": "uniform", "low": 0.3, "high": end}}
+    )
+    path = SampledTrajectory(range_m=[1.0, 1.5, 2.0, 3.0, 4.0, 5.0])
+    frames = simulate(sensor, parse_scene({"discrepancy": 0, "object": OBJECT}), path, 7).frames
+    problem = fit_problem(sensor, scene, frames)
+    assert problem.support == pytest.approx((0.3, end))
+    asked_for: list[tuple[float, float]] = []
+    screened = multistart._screened
+
+    def counted(part: FitProblem) -> Any:
+        asked_for.append(part.support)
+        return screened(part)
+
+    monkeypatch.setattr(multistart, "_screened", counted)
+    multistart.find_maxima(problem)
+    assert asked_for == [problem.support, *problem.windows]
+    assert len(asked_for) == searches
 
 
 @pytest.mark.parametrize(

@@ -89,6 +89,6 @@ def windows_of(support: Ends, turn_m: float) -> list[Ends]:
             found.append((first, last))
             first += _NEXT * width
             last = first + width
-        found.append((first, high))
+        found.append((high - width, high))
         width *= 2.0
     return found
