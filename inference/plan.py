@@ -9,14 +9,19 @@ import numpy as np
 from inference.estimates import LeftOut
 from inference.known import Known, known_of
 from inference.realtime.registry import TECHNIQUES as REALTIME
-from inference.realtime.turns import MOST_HALF_TURNS, half_turns, several_turns
+from inference.realtime.turns import (
+    MOST_HALF_TURNS,
+    half_turns,
+    often_beyond,
+    several_turns,
+)
 from inference.technique import Technique
 from inference.techniques import ALL_TECHNIQUES, ELSEWHERE
 from simulator.errors import listed
 from simulator.frames import Frames
 from simulator.joint_scene import centre
 from simulator.remembered import remembered
-from simulator.scene import Reference, Scene, Stroke
+from simulator.scene import Scene
 from simulator.sensor import PulsedSensor, Sensor, SineWaveSensor
 from simulator.sensor_unknowns import DRIFTS, GAIN
 
@@ -28,9 +33,9 @@ _OF_GAIN = (GAIN, DRIFTS[0])
 _WIDE, _SHARP = "background_intensity", "background_cancelling"
 # yields to the other where the stated ranges hold several turns of phase, which the other tells
 _PHASE, _AMOUNT = "conventional", "intensity"
+_JOINT = "joint_fit"
 _SHAPE = ("object.c0", "object.c1")
 _ONE_ROOT = -math.sqrt(32.0 / 9.0)  # of sqrt(c0), from which on light falls with range
-_ONE_IN_100 = 2.326  # standard deviations that one of a hundred is beyond
 _FEW = 1000  # frames whose estimates take no longer than their plan
 
 
@@ -119,15 +124,14 @@ def obstacle(
 
 def _turns_obstacle(technique: Technique, sensor: Sensor, scene: Scene, known: Known) -> str | None:
     """Return why a technique cannot serve ranges of several turns of phase, None if it can."""
-    if not several_turns(sensor, known, sensor.max_range_m):
-        return None
     if technique.name not in REALTIME:
-        # a fit says misfit of what few ranges of a law without an end are beyond
-        if known.support[1] == math.inf and _seldom_beyond(scene, sensor.max_range_m):
+        # of the turns of its frames a joint fit asks itself
+        joint = _JOINT in (technique.name, technique.same_as)
+        if joint or not often_beyond(sensor, scene, known):
             return None
         return (
             f"the stated range_m goes on beyond {sensor.max_range_m:.4g} m, where the phase begins "
-            "anew, and fits over many frames end there; a posterior of these frames does not"
+            "anew, and this fit takes its ranges frame by frame; take joint_fit, or a posterior"
         )
     turns = half_turns(sensor, known)
     # the amount of light has no turns, and a wall ends what it serves
@@ -137,14 +141,6 @@ def _turns_obstacle(technique: Technique, sensor: Sensor, scene: Scene, known: K
         f"the stated range_m holds {turns:.3g} half turns of phase, and a frame may have as many "
         "roots; narrow it, or take a lower frequency"
     )
-
-
-def _seldom_beyond(scene: Scene, range_m: float) -> bool:
-    """Tell whether the law of the ranges is beyond a range once in a hundred or less."""
-    law = scene.range_m
-    if law is None or isinstance(law, Reference | Stroke):
-        return False
-    return float(law.distribution().from_normal(_ONE_IN_100)) <= range_m
 
 
 def _sensor_obstacle(

@@ -34,7 +34,8 @@ ALLOWED: dict[str, str] = {
     "inference/realtime/solving/curves": "inference.realtime.solving",
     "inference/realtime/techniques": f"inference.realtime inference.frame {_TEMPLATE}",
     "inference/fits": _FITS,
-    "inference/fits/likelihood": "inference.density inference.frame inference.identifiability",
+    "inference/fits/likelihood": "inference.density inference.frame inference.identifiability "
+    "inference.known inference.realtime.turns",
     "inference/fits/answer": f"inference.fits.likelihood {_OF_FITS} inference.identifiability",
     "inference/fits/linear": f"inference.fits.likelihood inference.fits.answer {_OF_FITS}",
     "inference/fits/techniques": f"{_FITS} inference.identifiability",

@@ -4,15 +4,24 @@ import math
 
 from inference.known import Known
 from inference.technique import Task
+from simulator.scene import Reference, Scene, Stroke
 from simulator.sensor import Sensor, SineWaveSensor
 
-__all__ = ["MOST_HALF_TURNS", "contact_m", "half_turns", "several_turns", "turns_to"]
+__all__ = [
+    "MOST_HALF_TURNS",
+    "contact_m",
+    "half_turns",
+    "often_beyond",
+    "several_turns",
+    "turns_to",
+]
 
 MOST_HALF_TURNS = 1000.0
 """Half turns of phase of which a frame may have a root each."""
 
 _SLACK = 1e-9  # of a turn: what ends where phases begin anew holds no second one
 _CONTACT = 1e-6  # of a turn, in place of a range of zero
+_ONE_IN_100 = 2.326  # standard deviations that one of a hundred is beyond
 
 
 def several_turns(sensor: Sensor, known: Known, turn_m: float) -> bool:
@@ -29,6 +38,29 @@ def several_turns(sensor: Sensor, known: Known, turn_m: float) -> bool:
     """
     end = known.stated_end_m
     return isinstance(sensor, SineWaveSensor) and end is not None and end > turn_m * (1 + _SLACK)
+
+
+def often_beyond(sensor: Sensor, scene: Scene, known: Known) -> bool:
+    """Tell whether fits over many frames have to look beyond the first turn of phase.
+
+    Of the few frames that a law without an end has beyond it they say misfit.
+
+    Parameters
+    ----------
+    known : Known
+        Of the scene.
+
+    Returns
+    -------
+    bool
+        False of a law without an end that is beyond once in a hundred or less.
+    """
+    turn_m, law = sensor.max_range_m, scene.range_m
+    if not several_turns(sensor, known, turn_m):
+        return False
+    if law is None or isinstance(law, Reference | Stroke) or known.support[1] < math.inf:
+        return True
+    return float(law.distribution().from_normal(_ONE_IN_100)) > turn_m
 
 
 def turns_to(task: Task, turn_m: float) -> float:

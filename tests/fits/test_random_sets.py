@@ -131,3 +131,33 @@ def test_a_mode_merged_with_a_less_certain_one_takes_over_its_interval() -> None
         np.testing.assert_allclose(both.range_m, alone.range_m, rtol=1e-12)
         wanted = np.maximum(alone.sd_m, reached * other.sd_m)
         np.testing.assert_allclose(both.sd_m, wanted, rtol=1e-6)
+
+
+@pytest.mark.parametrize("step", [-1.5, 1.5])
+def test_a_mode_merged_with_one_far_off_reaches_it(step: float) -> None:
+    """A rival that explains less and tells less lies as far out as its deviance says.
+
+    Beyond an interval of 95 % such a one, 2.3 standard deviations from being decided against,
+    vanished in the sharp mode that it is broad enough to hold, which stayed sure.
+    """
+    one = random_set("object", "pulsed", 0)
+    problem = fit_problem(one.sensor, one.scene, one.simulation.frames)
+    top = find_maxima(problem)[0]
+    state = np.zeros(len(one.simulation.frames), dtype=np.uint8)
+    sharp, loose = 1e-6 * np.eye(len(problem)), 30.0 * np.eye(len(problem))
+    x = top.x.copy()
+    x[problem.names.index("object.c2")] += step
+    excess = 5.0
+    alone = frame_ranges("joint_fit", problem, [Answer(top.x, 0.0, sharp)], state, {}, {})
+    there = frame_ranges("joint_fit", problem, [Answer(x, 0.0, sharp)], state, {}, {})
+    answers = [Answer(top.x, 0.0, sharp), Answer(x, excess, loose)]
+    both = frame_ranges("joint_fit", problem, answers, state, {}, {})
+    # a broad one that is nearer than it is far counts as much in logarithms
+    apart = there.range_m / alone.range_m
+    away = np.fmax(apart - 1.0, -np.log(apart)) * alone.range_m
+    wanted = np.maximum(alone.sd_m, away / np.sqrt(excess))
+    told = np.isfinite(wanted) & np.isfinite(both.sd_m)
+    assert told.sum() > 5
+    assert (np.abs(away[told]) > 5.0 * alone.sd_m[told]).any()
+    np.testing.assert_allclose(both.range_m[told], alone.range_m[told], rtol=1e-12)
+    np.testing.assert_allclose(both.sd_m[told], wanted[told], rtol=1e-6)

@@ -4,11 +4,10 @@ Every frame holds two readings and one range, so that one number is left for the
 scene has no range, but shows nothing but the sum of crosstalk and background.
 """
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.fits.likelihood.turns import MOST_TURNS, turns_of
 from inference.fits.likelihood.unknowns import unknowns_of
 from inference.known import Known
 from inference.realtime.net import SATURATED, rule_out
@@ -16,7 +15,7 @@ from simulator.errors import listed
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
 from simulator.scene import Scene
-from simulator.sensor import Sensor, SineWaveSensor
+from simulator.sensor import Sensor
 
 __all__ = [
     "frames_needed",
@@ -27,7 +26,6 @@ __all__ = [
 ]
 
 _MOST_FRAMES = 20_000
-_MOST_HALF_TURNS = 1000.0
 
 
 # how the two readings of an empty scene move with what they show, at no special place: crosstalk
@@ -130,6 +128,28 @@ def _told(frames: Frames, usable: NDArray[np.bool_]) -> int:
     return known + max(moved - 1, 0)
 
 
+def _turns_obstacle(sensor: Sensor, scene: Scene) -> str | None:
+    """Return why no joint fit looks at all turns of phase of the stated ranges, None if it does."""
+    law = parameters_of(sensor, scene).range_prior
+    turns = turns_of(sensor, scene, (law.low, law.high))
+    if turns > MOST_TURNS:
+        return (
+            f"the stated range_m holds {turns:.3g} turns of phase, and a joint fit decides between "
+            f"{MOST_TURNS:g} at most; narrow it, take a lower frequency, or a posterior"
+        )
+    wall = None if scene.background is None else scene.background.distance_m
+    if not turns > 1.0 or wall is None or isinstance(wall, float | int):
+        return None
+    of_wall = wall.distribution()
+    if of_wall.high - of_wall.low <= sensor.max_range_m:
+        return None
+    return (
+        f"the stated range_m goes on beyond {sensor.max_range_m:.4g} m, where the phase begins "
+        "anew, and so does background.distance_m; state it as a number, or with a prior that ends "
+        "within as much, or use a posterior"
+    )
+
+
 def joint_obstacle(
     sensor: Sensor, scene: Scene, _known: Known, frames: Frames | None
 ) -> str | None:
@@ -155,9 +175,9 @@ def joint_obstacle(
     unknowns = unknowns_of(sensor, scene)
     if not unknowns:
         return "nothing but the ranges is unknown: a technique of single frames serves"
-    far = min(parameters_of(sensor, scene).range_prior.high, sensor.max_range_m)
-    if isinstance(sensor, SineWaveSensor) and sensor.wave_number * far > _MOST_HALF_TURNS * math.pi:
-        return "the scene's ranges hold more than a thousand half turns of phase; narrow range_m"
+    of_turns = _turns_obstacle(sensor, scene)
+    if of_turns is not None:
+        return of_turns
     if frames is None:
         return None
     if len(frames) > _MOST_FRAMES:

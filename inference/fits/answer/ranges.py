@@ -217,7 +217,8 @@ def _merged(u: Array, sd: Array, excess: Array) -> tuple[list[int], bool]:
 
     What explains the readings nearly as well as the mode that it is merged with may be far less
     certain: ``sd`` of the mode that stays is widened until its interval of 95 % holds that of the
-    other, as far as the deviance lets it reach.
+    other, as far as the deviance lets it reach, and until the other lies as far out as its deviance
+    says where that is less likely. Deviances are those above the mode that stays.
     """
     kept: list[int] = []
     merged = False
@@ -228,10 +229,13 @@ def _merged(u: Array, sd: Array, excess: Array) -> tuple[list[int], bool]:
         twins = [i for i in kept if abs(u[i] - u[k]) <= _ONE * max(width, np.nan_to_num(sd[i]))]
         if twins or any(abs(u[i] - u[k]) < 1e-9 for i in kept):
             merged = merged or any(abs(u[i] - u[k]) > 1e-6 for i in twins)
-            if excess[k] < WITHIN:
-                for i in twins:
-                    reach = abs(u[i] - u[k]) + width * math.sqrt(WITHIN - excess[k])
-                    sd[i] = max(sd[i], reach / math.sqrt(WITHIN))
+            for i in twins:
+                above, away = float(excess[k] - excess[i]), float(u[k] - u[i])
+                # of the range that stays: one that is far beyond it is as far as it is in metres
+                farther = math.exp(max(away, 0.0))
+                reach = farther * width * math.sqrt(max(WITHIN - above, 0.0))
+                reach += max(-away, math.expm1(away))
+                sd[i] = max(sd[i], reach / math.sqrt(max(WITHIN, above)))
         else:
             kept.append(int(k))
     return kept, merged

@@ -9,7 +9,14 @@ from numpy.typing import NDArray
 
 from inference.fits.likelihood.conditional_fit import conditional, unconditional
 from inference.fits.likelihood.information import residuals_and_information
-from inference.fits.likelihood.maximum import MANY, TOP, Maximum, approach, followed
+from inference.fits.likelihood.maximum import (
+    MANY,
+    TOP,
+    Maximum,
+    approach,
+    followed,
+    maximum_from,
+)
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.screen import screen
 from inference.identifiability.information import Information
@@ -198,10 +205,15 @@ def find_starts(problem: FitProblem, softer: Iterable[FitProblem]) -> tuple[Maxi
     tuple of Maximum
         Distinct ones of each problem, the best of it first.
     """
-    # points are judged so roughly that the noise does not matter
-    screened = _screened(problem)
-    found = (_distinct(one, _climbed(one, *screened), _NEAR) for one in (*softer, problem))
-    return tuple(start for near in found for start in near)
+    softer = tuple(softer)
+    found: list[Maximum] = []
+    for support in (problem.support, *problem.windows):
+        # points are judged so roughly that the noise does not matter
+        screened = _screened(dataclasses.replace(problem, support=support))
+        for one in (*softer, problem):
+            part = dataclasses.replace(one, support=support)
+            found += _distinct(part, _climbed(part, *screened), _NEAR)
+    return tuple(found)
 
 
 def find_near(problem: FitProblem) -> list[Maximum]:
@@ -240,6 +252,10 @@ def find_maxima(problem: FitProblem, waves: int = _WAVES) -> tuple[Maximum, ...]
     chosen, starts, effort = _screened(problem)
     second = _climbed(problem, chosen, starts, effort)
     last = [followed(problem, optimum) for optimum in second[: effort.polished]]
+    for support in problem.windows:
+        part = dataclasses.replace(problem, support=support)
+        there = _climbed(part, *_screened(part))[: effort.polished]
+        last += [maximum_from(problem, end.x) for end in there if np.isfinite(end.x).all()]
     last = _distinct(problem, last, _MOST)
     for _ in range(waves if last and len(problem) > EASY else 0):
         before = last[0].deviance

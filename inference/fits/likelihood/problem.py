@@ -19,6 +19,7 @@ from inference.fits.likelihood.law_mode import LawMode
 from inference.fits.likelihood.places import Places
 from inference.fits.likelihood.supports import supports_of, with_support_alone
 from inference.fits.likelihood.told import KnownRanges
+from inference.fits.likelihood.turns import ranges_of, windows_of
 from inference.frame.arguments import Instrument, Rows
 from inference.frame.blocks import own_blocks
 from inference.frame.sensitivity import Value
@@ -194,6 +195,12 @@ class FitProblem:
         return (max(low, math.log(nearest)) if nearest > 0.0 else low), high
 
     @functools.cached_property
+    def windows(self) -> list[tuple[float, float]]:
+        """Parts of the ranges, of a turn of phase and more; none where they are within one [m]."""
+        wave = self.instrument.wave
+        return [] if wave is None else windows_of(self.support, 2.0 * math.pi / wave[0])
+
+    @functools.cached_property
     def columns(self) -> list[int]:
         """Where the priors have the unknowns."""
         return [self.parameters.names.index(name) for name in self.names]
@@ -307,8 +314,8 @@ def fit_problem(sensor: Sensor, scene: Scene, frames: Frames, *, exact: bool = F
     unit = noise.read[1]
     r0, wave = instrument(sensor)
     varies = noise.shot > 0 or noise.relative > 0
-    near, far = parameters.range_prior.low, min(parameters.range_prior.high, sensor.max_range_m)
-    near = max(near, far * 1e-6)
+    law = parameters.range_prior
+    near, far = ranges_of(sensor, scene, (law.low, law.high))
     gain = frames.gains
     with np.errstate(over="ignore"):
         scaled = frames.readings / unit
