@@ -16,7 +16,7 @@ from inference.density.discrepant import DiscrepantDensity
 from inference.posterior.checks import check_best_fit, check_ranges
 from inference.posterior.job import Job
 from inference.posterior.sampling.aliases import aliases_of, with_aliases
-from inference.posterior.sampling.coordinates import Coordinates, coordinates_of
+from inference.posterior.sampling.coordinates import coordinates_of
 from inference.posterior.sampling.population import arrived_at
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.scouts import MOST_FRAMES, Scouts
@@ -89,7 +89,7 @@ def from_shapes(
     found = sorted(
         (one for one in climbed if one is not None), key=lambda one: -one.optimum.log_density
     )
-    if not found or _are_several(target, coordinates, found):
+    if not found or _are_several(target, found):
         return None
     shape, aliases = found[0], aliases_of(target)
     if aliases is not None and len(with_aliases(aliases, target, [shape.optimum])) > 1:
@@ -137,18 +137,13 @@ def _errors_lead(density: CollapsedDensity, shape: Shape) -> bool:
     return bool(np.median(np.where(np.isnan(bends), np.inf, np.abs(bends))) > _WIDENED)
 
 
-def _are_several(
-    target: CollapsedDensity, coordinates: Coordinates | None, found: Sequence[Shape]
-) -> bool:
+def _are_several(target: CollapsedDensity, found: Sequence[Shape]) -> bool:
     """Tell whether tops, the best first, lie in valleys of their own, and the others matter."""
     first = found[0].optimum
     for other in (one.optimum for one in found[1:]):
         if other.log_mass < first.log_mass - _NEGLIGIBLE or first.is_near(other.z):
             continue
-        ends = np.array([first.z, other.z])
-        ends = ends if coordinates is None else coordinates.forward(ends)
-        middle = ends.mean(axis=0)[None]
-        middle = middle if coordinates is None else coordinates.backward(middle)
-        if not target(middle)[0] > other.log_density - _APART:
+        straight, _ = found[0].transport.unbend(other.z[None])  # the first top is at zero
+        if not target(found[0].transport.bend(0.5 * straight)[0])[0] > other.log_density - _APART:
             return True
     return False

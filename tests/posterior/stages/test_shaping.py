@@ -229,9 +229,9 @@ def test_two_tops_that_matter_are_left_to_populations(monkeypatch: pytest.Monkey
     def apart(*arguments: Any) -> Shape:
         shape = shape_at(*arguments)
         assert shape is not None
-        if tops:  # the second one: as high, with nothing between
-            z = shape.optimum.z + 3.0
-            optimum = dataclasses.replace(shape.optimum, z=z)
+        if tops:  # the second one: all but as high, with nothing between
+            z, nearly = shape.optimum.z + 3.0, tops[0].optimum.log_density - 0.1
+            optimum = dataclasses.replace(shape.optimum, z=z, log_density=nearly)
             return dataclasses.replace(shape, optimum=optimum)
         tops.append(shape)
         return shape
