@@ -185,9 +185,11 @@ def _smooth_error(rng: np.random.Generator, ranges: Array, sd: float) -> Array:
     if logs.size == 0:
         return np.zeros(ranges.size)
     knots = np.linspace(logs.min() - 1e-9, logs.max() + 1e-9, 200)
-    # a smooth kernel is singular to rounding: the square root is taken from its eigenvalues
+    # a smooth kernel is singular to rounding: the square root is taken from its eigenvalues; the
+    # symmetric one, as eigenvectors have another sign on another processor
     values, vectors = scipy.linalg.eigh(matern(knots[:, None] - knots[None, :]))
-    path = sd * vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(knots.size))
+    along = vectors.T @ rng.standard_normal(knots.size)
+    path = sd * vectors @ (np.sqrt(np.maximum(values, 0.0)) * along)
     finite = np.where(np.isfinite(ranges), ranges, np.exp(knots[0]))
     return np.asarray(np.interp(np.log(finite), knots, path))
 

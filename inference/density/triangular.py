@@ -13,6 +13,21 @@ Array = NDArray[np.float64]
 
 
 @compiled
+def _dot(a: Array, b: Array, count: int) -> float:
+    """Return the inner product of the first members, in four sums that do not wait for another."""
+    first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
+    even = count - count % 4
+    for i in range(0, even, 4):
+        first += a[i] * b[i]
+        second += a[i + 1] * b[i + 1]
+        third += a[i + 2] * b[i + 2]
+        fourth += a[i + 3] * b[i + 3]
+    for i in range(even, count):
+        first += a[i] * b[i]
+    return (first + second) + (third + fourth)
+
+
+@compiled
 def update_factor(factor: Array, rows: Array, count: int) -> None:
     """Update an upper triangular R to that of R^T R + rows rows^T by Householder reflections.
 
@@ -27,19 +42,14 @@ def update_factor(factor: Array, rows: Array, count: int) -> None:
     """
     size = factor.shape[0]
     for k in range(size):
-        square = 0.0
-        for i in range(count):
-            square += rows[k, i] * rows[k, i]
+        square = _dot(rows[k], rows[k], count)
         if square == 0.0:
             continue
         norm = math.sqrt(factor[k, k] * factor[k, k] + square)
         head = factor[k, k] + math.copysign(norm, factor[k, k])
         beta = 2.0 / (head * head + square)
         for j in range(k + 1, size):
-            dot = head * factor[k, j]
-            for i in range(count):
-                dot += rows[k, i] * rows[j, i]
-            dot *= beta
+            dot = beta * (head * factor[k, j] + _dot(rows[k], rows[j], count))
             factor[k, j] -= dot * head
             for i in range(count):
                 rows[j, i] -= dot * rows[k, i]

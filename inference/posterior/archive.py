@@ -21,6 +21,7 @@ from inference.posterior.sampling.proposal import Local, Mixture, Proposal
 from inference.posterior.sampling.reparametrisation import Reparametrisation
 from inference.posterior.sampling.rounds_so_far import LastDraws, RoundsSoFar, Wanted
 from inference.posterior.sampling.scouts import Scouts
+from inference.posterior.sampling.shape import Shape
 from inference.posterior.sampling.start import Optimum
 from inference.posterior.sampling.transport import TriangularMap
 from inference.posterior.sampling.verdict import Verdict
@@ -152,6 +153,7 @@ _PARTS = {
         RoundsSoFar,
         Scouts,
         Settled,
+        Shape,
         Starting,
         Tempering,
         TriangularMap,

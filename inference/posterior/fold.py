@@ -43,7 +43,7 @@ from inference.posterior.stages import (
     walking_on,
 )
 from inference.posterior.stages.checkpoint import Checkpoint
-from inference.posterior.stages.looking import Looked, LookTask, taken_in
+from inference.posterior.stages.looking import Looked, LookTask, ShapeTask, taken_in
 from inference.posterior.stages.responding import RespondTask
 from inference.posterior.stages.selecting import AssessTask, sampled
 from inference.posterior.stages.setting_out import (
@@ -88,6 +88,7 @@ __all__ = [
 Task = (
     AssessTask
     | LookTask
+    | ShapeTask
     | StartTask
     | TemperTask
     | SetOutTask

@@ -6,6 +6,7 @@ their weights.
 """
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,9 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.effort import scouts
 from inference.posterior.sampling.ensemble import WALKERS
 from inference.posterior.sampling.population import first_population, temper
+from inference.posterior.sampling.start import Finish, Optimum, added, climb, refine
 
-__all__ = ["MOST_FRAMES", "Scouts", "send_scouts", "thinned"]
+__all__ = ["MOST_FRAMES", "Scouts", "led_to", "send_scouts", "thinned"]
 
 Array = NDArray[np.float64]
 
@@ -78,6 +80,28 @@ def send_scouts(
     kept = rng.permutation(first)[:WALKERS]
     z = found.z[kept[np.argsort(-total[kept])]]
     return Scouts(z, np.unique(np.concatenate(hot), axis=0)), found.calls
+
+
+def led_to(
+    scouts: Scouts, density: CollapsedDensity, optima: Sequence[Optimum], finish: Finish = refine
+) -> list[Optimum]:
+    """Return optima, the best first, with those that the best scout leads to.
+
+    Parameters
+    ----------
+    scouts : Scouts
+        None of them, perhaps.
+    density : CollapsedDensity
+        Of the optima.
+    optima : sequence of Optimum
+        Found before.
+    finish : callable
+        What makes an optimum of the end of a climb: `refine` or `roughly`.
+    """
+    if not len(scouts.z):
+        return list(optima)
+    found = added(optima, finish(density, climb(density, scouts.z[0])[0]))
+    return added(found, finish(density, scouts.z[0]))
 
 
 def thinned(density: CollapsedDensity) -> CollapsedDensity:

@@ -188,42 +188,60 @@ def _features(w: Array, k: int, quadratic: bool, cubic: int) -> Array:
     return np.column_stack(columns)
 
 
-def _regression(features: Array, target: Array, strength: float, copies: float) -> Array:
+def _regression(features: Array, target: Array, strength: float, times: Array) -> Array:
     """Least squares with scaled columns; terms that the sample does not show are left out.
+
+    Rows count as often as ``times`` says, shape (n,).
 
     Terms, in their order and freed of those before them, are shrunk as the non-negative garrote
     does (Breiman 1995). Without it a map of eighty terms fits the noise of five hundred draws:
     members of a population that it did not see lie in its tails, where they stay, and directions
     that the readings leave open lost a third of their variance from the prior to the posterior.
     """
-    n, k = features.shape
-    scale = np.sqrt(np.mean(features**2, axis=0))
+    k, n = features.shape[1], times.sum()
+    scale = np.sqrt(times @ features**2 / n)
     scale = np.where(scale > 0, scale, 1.0)
-    rows = np.empty((k + 1, n))
-    rows[:k], rows[k] = (features / scale).T, target
+    rows, root = np.empty((k + 1, len(times))), np.sqrt(times)
+    rows[:k], rows[k] = (features / scale).T * root, target * root
     factor = math.sqrt(strength) * np.eye(k + 1)
     factor[0, 0] = factor[k, k] = 0.0
     # not LAPACK: the threads that it starts for so small a problem cost twice what they do
-    update_factor(factor, rows, n)
+    update_factor(factor, rows, len(times))
     along = factor[1:k, k]
+    copies = times @ times / n  # equal draws say as much as one of them
     noise = _DOUBT * copies * factor[k, k] ** 2 / max(n - k, 1)
     along *= np.maximum(0.0, 1.0 - noise / np.maximum(along**2, 1e-300))
     return np.asarray(scipy.linalg.solve_triangular(factor[:k, :k], factor[:k, k]) / scale)
 
 
-def _principal_axes(draws: Array) -> tuple[Array, Array]:
+def _signed(axes: Array) -> Array:
+    """Return axes, as columns, with the largest component of each positive.
+
+    What singular vectors come with differs from processor to processor, and draws would.
+    """
+    largest = np.argmax(np.abs(axes), axis=0)
+    return axes * np.sign(np.take_along_axis(axes, largest[None], axis=0))
+
+
+def _principal_axes(draws: Array, times: Array) -> tuple[Array, Array]:
     """Return the centre of a sample and its principal axes times their standard deviations."""
-    centre = draws.mean(axis=0)
+    centre = times @ draws / times.sum()
     # singular values, not eigenvalues of the covariance: thin sheets keep their digits
-    _, singular, rows = scipy.linalg.svd(draws - centre, full_matrices=False)
-    sd = singular / math.sqrt(len(draws))
-    return centre, rows.T * np.maximum(sd, 1e-12 * sd[0] + 1e-300)
+    apart = (draws - centre) * np.sqrt(times)[:, None]
+    _, singular, rows = scipy.linalg.svd(apart, full_matrices=False)
+    sd = singular / math.sqrt(times.sum())
+    return centre, _signed(rows.T) * np.maximum(sd, 1e-12 * sd[0] + 1e-300)
+
+
+def _sd(values: Array, times: Array) -> float:
+    apart = values - times @ values / times.sum()
+    return math.sqrt(float(times @ apart**2 / times.sum()))
 
 
 def straight_map(draws: Array) -> TriangularMap:
     """Return the map that whitens a sample of shape (n, d), n > d, and bends nothing."""
     d = draws.shape[1]
-    centre, axes = _principal_axes(draws)
+    centre, axes = _principal_axes(draws, np.ones(len(draws)))
     nothing = np.zeros((d, math.comb(d + 1, 2)))
     return TriangularMap(centre, axes, np.zeros((2, d)), nothing, nothing, 0, None)
 
@@ -240,7 +258,7 @@ def unbent_map(centre: Array, factor: Array, coordinates: Coordinates | None) ->
     """
     left, singular, _ = scipy.linalg.svd(factor)
     nothing = np.zeros((centre.size, math.comb(centre.size + 1, 2)))
-    axes = left * np.maximum(singular, 1e-12 * singular[0] + 1e-300)
+    axes = _signed(left) * np.maximum(singular, 1e-12 * singular[0] + 1e-300)
     bounds = np.zeros((2, centre.size))
     return TriangularMap(centre, axes, bounds, nothing, nothing, 0, coordinates)
 
@@ -262,9 +280,11 @@ def fit_map(draws: Array, coordinates: Coordinates | None = None) -> TriangularM
     n, d = draws.shape
     if isinstance(coordinates, FluxCoordinate):
         coordinates = coordinates.fitted(draws)
+    draws, often = np.unique(draws, axis=0, return_counts=True)
+    times = often.astype(float)
     if coordinates is not None:
         draws = coordinates.forward(draws)
-    centre, axes = _principal_axes(draws)
+    centre, axes = _principal_axes(draws, times)
     whitened = (draws - centre) @ (axes / np.einsum("ij,ij->j", axes, axes))
     rest = n // _POINTS - math.comb(d + 1, 2)
     cubic = max((m for m in range(d) if math.comb(m + 2, 3) <= rest), default=0)
@@ -272,17 +292,14 @@ def fit_map(draws: Array, coordinates: Coordinates | None = None) -> TriangularM
     means = np.zeros((d, math.comb(d + 1, 2) + math.comb(cubic + 2, 3)))
     scales = np.zeros((d, math.comb(d + 1, 2)))
     strength = _RIDGE * math.sqrt(n)
-    times = np.unique(draws, axis=0, return_counts=True)[1]
-    copies = float((times**2).sum() / n)  # equal draws say as much as one of them
     for k in range(d):
         features = _features(whitened, k, True, cubic)
-        mean = _regression(features, whitened[:, k], strength, copies) if k else np.zeros(1)
+        mean = _regression(features, whitened[:, k], strength, times) if k else np.zeros(1)
         residual = whitened[:, k] - features @ mean
-        size = np.log(np.abs(residual) + 1e-3 * residual.std() + 1e-300) + _MEAN_LOG_NORMAL
+        size = np.log(np.abs(residual) + 1e-3 * _sd(residual, times) + 1e-300) + _MEAN_LOG_NORMAL
         terms = _features(whitened, k, quadratic, 0)
-        scale = _regression(terms, size, 3 * strength, copies)
-        left = residual * np.exp(-terms @ scale)
-        scale[0] += math.log(max(float(left.std()), 1e-300))
+        scale = _regression(terms, size, 3 * strength, times)
+        scale[0] += math.log(max(_sd(residual * np.exp(-terms @ scale), times), 1e-300))
         means[k, : mean.size] = mean
         scales[k, : scale.size] = scale
     bounds = _BEYOND * np.array([whitened.min(axis=0), whitened.max(axis=0)])

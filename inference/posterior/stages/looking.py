@@ -1,6 +1,7 @@
 """The search for optima, before anything is drawn: ways that know nothing of one another.
 
-Each is a task of its own: as many processes as there are ways look at once.
+Each is a task of its own: as many processes as there are ways look at once. Where sampling begins
+with a shape, that is climbed to from the optima while scouts are on their way.
 """
 
 import dataclasses
@@ -12,14 +13,14 @@ import numpy as np
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
 from inference.posterior.sampling.scouts import send_scouts, thinned
-from inference.posterior.sampling.start import find_optima, refine, roughly
+from inference.posterior.sampling.start import Optimum, find_optima, refine, roughly
 from inference.posterior.stages.chunk import is_short_for_scouts
 from inference.posterior.stages.setting_out import HALFWAY
-from inference.posterior.stages.shaping import begins_with_a_shape
+from inference.posterior.stages.shaping import CLIMBED, begins_with_a_shape, climbed_from
 from inference.posterior.stages.stage import Starting
 from inference.posterior.streams import Stream
 
-__all__ = ["LookTask", "Looked", "looking", "of_some_frames", "taken_in", "ways_left"]
+__all__ = ["LookTask", "Looked", "ShapeTask", "looking", "of_some_frames", "taken_in", "ways_left"]
 
 Way = Literal["fitted", "climbed", "scouts"]
 
@@ -78,19 +79,50 @@ class LookTask:
         return Looked(Starting(scouts=scouts), calls)
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class ShapeTask:
+    """A shape to be climbed to.
+
+    Attributes
+    ----------
+    job : Job
+        That begins with a shape.
+    optima : tuple of Optimum
+        All that were found.
+    rank : int
+        Which of them it is climbed to from: 0 from the best with the model's errors.
+    """
+
+    job: Job
+    optima: tuple[Optimum, ...]
+    rank: int
+
+    def run(self) -> Looked:
+        """Climb."""
+        shape = climbed_from(self.job, self.job.density(), self.optima, self.rank)
+        return Looked(Starting(shapes=() if shape is None else (shape,)), 0)
+
+
 def ways_left(start: Starting, *, scouts: bool) -> tuple[Way, ...]:
     """Return the ways that are left; scouts are not sent out while terms are being decided."""
     ways = _WAYS if scouts else _WAYS[1:]
     return tuple(way for way in ways if getattr(start, way) is None)
 
 
-def looking(job: Job, start: Starting, *, scouts: bool) -> tuple[LookTask, ...]:
-    """Return a task for each of the ways that are left; scouts set out last where time is short."""
+def looking(job: Job, start: Starting, *, scouts: bool) -> tuple[LookTask | ShapeTask, ...]:
+    """Return a task for each of the ways that are left; scouts set out last where time is short.
+
+    Shapes are climbed to from what the others found, and take as long as the scouts do.
+    """
     ways = ways_left(start, scouts=scouts)
-    if len(ways) > 1 and is_short_for_scouts(job):
-        ways = tuple(way for way in ways if way != "scouts")
     brief = scouts and begins_with_a_shape(job, job.density())
-    return tuple(LookTask(job, way, brief) for way in ways)
+    if len(ways) > 1 and (brief or is_short_for_scouts(job)):
+        ways = tuple(way for way in ways if way != "scouts")
+    looks = tuple(LookTask(job, way, brief) for way in ways)
+    if not brief or not start.looked or start.shapes is not None:
+        return looks
+    optima = tuple(start.optima)
+    return (*looks, *(ShapeTask(job, optima, rank) for rank in range(min(CLIMBED, len(optima)))))
 
 
 def taken_in(start: Starting, found: Sequence[Looked]) -> tuple[Starting, int]:
@@ -99,6 +131,9 @@ def taken_in(start: Starting, found: Sequence[Looked]) -> tuple[Starting, int]:
         new = {way: getattr(each.start, way) for way in _WAYS}
         changes = {way: value for way, value in new.items() if value is not None}
         start = dataclasses.replace(start, **changes)
+        if each.start.shapes is not None:
+            shapes = (*(start.shapes or ()), *each.start.shapes)
+            start = dataclasses.replace(start, shapes=shapes)
     return start, sum(each.calls for each in found)
 
 

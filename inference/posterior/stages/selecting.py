@@ -8,7 +8,14 @@ from inference.posterior.sampling.start import Optimum, refine
 from inference.posterior.selection.models import Candidate, assess, candidate_terms, reduced
 from inference.posterior.selection.selection import Selection, decide
 from inference.posterior.stages.checkpoint import Checkpoint
-from inference.posterior.stages.looking import Looked, LookTask, looking, taken_in, ways_left
+from inference.posterior.stages.looking import (
+    Looked,
+    LookTask,
+    ShapeTask,
+    looking,
+    taken_in,
+    ways_left,
+)
 from inference.posterior.stages.optima import that_matter
 from inference.posterior.stages.stage import Selecting, Starting
 from inference.posterior.streams import Stream
@@ -58,7 +65,7 @@ def _candidate(job: Job, terms: Sequence[str]) -> Job:
     return dataclasses.replace(job, scene=reduced(job.scene, terms))
 
 
-def tasks(job: Job, stage: Selecting) -> tuple[LookTask, ...] | tuple[AssessTask, ...]:
+def tasks(job: Job, stage: Selecting) -> tuple[LookTask | ShapeTask, ...] | tuple[AssessTask, ...]:
     """Return the ways to look for the optima of all candidates; then these, to be assessed.
 
     Parameters

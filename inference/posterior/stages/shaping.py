@@ -10,6 +10,7 @@ held to.
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inference.density.collapsed import CollapsedDensity
 from inference.density.discrepant import DiscrepantDensity
@@ -19,19 +20,21 @@ from inference.posterior.sampling.aliases import aliases_of, with_aliases
 from inference.posterior.sampling.coordinates import coordinates_of
 from inference.posterior.sampling.population import arrived_at
 from inference.posterior.sampling.proposal import Proposal, mixture_of
-from inference.posterior.sampling.scouts import MOST_FRAMES, Scouts
+from inference.posterior.sampling.scouts import MOST_FRAMES, led_to
 from inference.posterior.sampling.shape import Shape, shape_at
-from inference.posterior.sampling.start import Optimum
+from inference.posterior.sampling.start import Optimum, added, roughly
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.sampling.warm import MAP_SHARE
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.scouting import from_scouts
-from inference.posterior.stages.stage import Tempering
+from inference.posterior.stages.stage import Starting, Tempering
 from inference.posterior.streams import Stream
 
-__all__ = ["begins_with_a_shape", "from_shapes"]
+__all__ = ["CLIMBED", "begins_with_a_shape", "climbed_from", "from_shapes"]
 
-_CLIMBED = 2  # optima, the best with the model's errors
+Array = NDArray[np.float64]
+
+CLIMBED = 2  # optima, the best with the model's errors
 _HELD_TO = 1000  # of the places where scouts stood: one in a hundred counts
 _APART = 1.0  # nats below the lower of two tops, midway, from which on they are two
 _STEP = 0.3  # standard deviations, over which curvature is measured
@@ -55,10 +58,10 @@ def begins_with_a_shape(job: Job, density: CollapsedDensity) -> bool:
     return may and density.parameters.has_background
 
 
-def from_shapes(
-    job: Job, density: CollapsedDensity, optima: Sequence[Optimum], scouts: Scouts
-) -> Checkpoint | None:
-    """Set up such rounds, with the model's errors integrated out.
+def climbed_from(
+    job: Job, density: CollapsedDensity, optima: Sequence[Optimum], rank: int
+) -> Shape | None:
+    """Climb to a shape, with the model's errors integrated out.
 
     Parameters
     ----------
@@ -67,9 +70,31 @@ def from_shapes(
     density : CollapsedDensity
         Its own.
     optima : sequence of Optimum
-        Of this density, all that were found.
-    scouts : Scouts
-        Told of none of them.
+        Of this density.
+    rank : int
+        Which of them to climb from: 0 for the best with the errors.
+
+    Returns
+    -------
+    Shape or None
+        None where the density is not finite around the point.
+    """
+    target = _target(job, density)
+    best = np.argsort(-target(np.array([one.z for one in optima])))
+    return shape_at(target, coordinates_of(density), optima[best[rank]].z)
+
+
+def from_shapes(job: Job, density: CollapsedDensity, start: Starting) -> Checkpoint | None:
+    """Set up such rounds, with the model's errors integrated out.
+
+    Parameters
+    ----------
+    job : Job
+        That begins with a shape.
+    density : CollapsedDensity
+        Its own.
+    start : Starting
+        With all that was found, scouts among it.
 
     Returns
     -------
@@ -82,13 +107,11 @@ def from_shapes(
     RefusedError
         Where no parameters explain the frames at all.
     """
-    coordinates = coordinates_of(density)
-    target = job.with_error_integrated().density() if job.can_integrate_error else density
-    best = np.argsort(-target(np.array([one.z for one in optima])))[:_CLIMBED]
-    climbed = [shape_at(target, coordinates, optima[i].z) for i in best]
-    found = sorted(
-        (one for one in climbed if one is not None), key=lambda one: -one.optimum.log_density
-    )
+    target, scouts = _target(job, density), start.scouts
+    if scouts is None:
+        raise ValueError("scouts are what rounds are held to")
+    ends = led_to(scouts, density, (), roughly)
+    found = _the_best_first((*(start.shapes or ()), *_beside(job, density, start, ends)))
     if not found or _are_several(target, found):
         return None
     shape, aliases = found[0], aliases_of(target)
@@ -109,10 +132,40 @@ def from_shapes(
     pending = Verdict(False, ("no steps were made",))
     stage = Tempering(proposal, members, pending, scouted=True, shaped=True)
     if target is density:
-        return Checkpoint(stage, len(optima))
+        return Checkpoint(stage, len(ends))
+    optima = start.optima
+    for end in ends:
+        optima = added(optima, end)
     own = Proposal(mixture_of(optima), None, MAP_SHARE)
     exact = from_scouts(job, density, own, scouts, None)
     return Checkpoint(stage, len(optima), integrated=True, exact=exact)
+
+
+def _target(job: Job, density: CollapsedDensity) -> CollapsedDensity:
+    """Return the density with the model's errors integrated out."""
+    return job.with_error_integrated().density() if job.can_integrate_error else density
+
+
+def _the_best_first(shapes: Sequence[Shape]) -> list[Shape]:
+    return sorted(shapes, key=lambda one: -one.optimum.log_density)
+
+
+def _beside(
+    job: Job, density: CollapsedDensity, start: Starting, ends: Sequence[Optimum]
+) -> list[Shape]:
+    """Climb to a shape from the best place that scouts led to in a valley of its own, if any."""
+    target, shapes = _target(job, density), _the_best_first(start.shapes or ())
+    if shapes and ends:
+        values = target(np.array([end.z for end in ends]))
+        apart = [
+            end
+            for end, value in zip(ends, values, strict=True)
+            if _is_apart(target, shapes[0], end.z, float(value))
+        ]
+    else:
+        apart = list(ends)
+    shape = climbed_from(job, density, apart, 0) if apart else None
+    return [] if shape is None else [shape]
 
 
 def _errors_lead(density: CollapsedDensity, shape: Shape) -> bool:
@@ -143,7 +196,12 @@ def _are_several(target: CollapsedDensity, found: Sequence[Shape]) -> bool:
     for other in (one.optimum for one in found[1:]):
         if other.log_mass < first.log_mass - _NEGLIGIBLE or first.is_near(other.z):
             continue
-        straight, _ = found[0].transport.unbend(other.z[None])  # the first top is at zero
-        if not target(found[0].transport.bend(0.5 * straight)[0])[0] > other.log_density - _APART:
+        if _is_apart(target, found[0], other.z, other.log_density):
             return True
     return False
+
+
+def _is_apart(target: CollapsedDensity, shape: Shape, z: Array, value: float) -> bool:
+    """Tell whether a place of some log density, below the top of a shape, lies behind a dip."""
+    straight, _ = shape.transport.unbend(z[None])  # the top is at zero
+    return not target(shape.transport.bend(0.5 * straight)[0])[0] > value - _APART

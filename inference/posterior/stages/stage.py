@@ -28,6 +28,7 @@ from inference.posterior.sampling.population import Population
 from inference.posterior.sampling.proposal import Mixture, Proposal
 from inference.posterior.sampling.rounds_so_far import RoundsSoFar
 from inference.posterior.sampling.scouts import Scouts
+from inference.posterior.sampling.shape import Shape
 from inference.posterior.sampling.start import Optimum, added
 from inference.posterior.sampling.verdict import Chains, Verdict, chains_of
 
@@ -73,11 +74,15 @@ class Starting(_NotBegun):
         Those that climbs from the prior led to, the best first; None before these.
     scouts : Scouts or None
         Points that came from the prior alone; None before they are sent out.
+    shapes : tuple of Shape or None
+        With the model's errors integrated out, that the best of these optima led to; None before
+        these, and where sampling begins with none.
     """
 
     fitted: tuple[Optimum, ...] | None = None
     climbed: tuple[Optimum, ...] | None = None
     scouts: Scouts | None = None
+    shapes: tuple[Shape, ...] | None = None
 
     @property
     def looked(self) -> bool:

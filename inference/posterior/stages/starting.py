@@ -13,8 +13,8 @@ from inference.posterior.sampling.from_the_prior import at_rest, drawn_from_the_
 from inference.posterior.sampling.importance import MAX_K_HAT, WeightedDraws, draw_weighted
 from inference.posterior.sampling.proposal import Proposal, mixture_of
 from inference.posterior.sampling.represent import represent
-from inference.posterior.sampling.scouts import Scouts, send_scouts, thinned
-from inference.posterior.sampling.start import Finish, Optimum, added, climb, refine, roughly
+from inference.posterior.sampling.scouts import Scouts, led_to, send_scouts, thinned
+from inference.posterior.sampling.start import Optimum, refine
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.sampling.warm import beyond, warm_start
 from inference.posterior.stages.checkpoint import Checkpoint
@@ -30,6 +30,7 @@ from inference.posterior.stages.integrating import at_once
 from inference.posterior.stages.looking import (
     Looked,
     LookTask,
+    ShapeTask,
     looking,
     of_some_frames,
     taken_in,
@@ -88,10 +89,10 @@ class StartTask:
         if stage.scouts is None:
             return _settled(job)
         some = of_some_frames(job) if job.is_large else job
-        return _set_out(job, some.density(), stage.optima, stage.scouts)
+        return _set_out(job, some.density(), stage, stage.scouts)
 
 
-def tasks(job: Job, stage: Starting) -> tuple[LookTask, ...] | tuple[StartTask, ...]:
+def tasks(job: Job, stage: Starting) -> tuple[LookTask | ShapeTask, ...] | tuple[StartTask, ...]:
     """Return the ways in which optima are still looked for; then the start.
 
     Parameters
@@ -151,7 +152,7 @@ def _settled(job: Job) -> Checkpoint:
     return Checkpoint(Settled(), 1)
 
 
-def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum], scouts: Scouts) -> Checkpoint:
+def _set_out(job: Job, some: CollapsedDensity, stage: Starting, scouts: Scouts) -> Checkpoint:
     """Climb to the last optima, and set up what comes behind them.
 
     Parameters
@@ -160,22 +161,21 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum], scouts: Sc
         Without optional terms.
     some : CollapsedDensity
         Of all frames, or of so few that optima are looked for in.
-    optima : list of Optimum
-        Found so far.
+    stage : Starting
+        What was found so far.
     scouts : Scouts
-        Told of none of them.
+        Its own.
     """
-    whole, calls = job.density(), 0
+    whole, optima, calls = job.density(), stage.optima, 0
     density = whole
     if begins_with_a_shape(job, whole):
-        ends = _with_scouts(some, optima, scouts, roughly)
-        begun = from_shapes(job, whole, ends, scouts) if ends else None
+        begun = from_shapes(job, whole, stage)
         if begun is not None:
             return begun
         optima = [one for one in (refine(some, end.z) for end in optima) if one is not None]
         # they had stopped on their way
         scouts, calls = send_scouts(thinned(some), job.stream(Stream.SCOUTS))
-    optima = _with_scouts(some, optima, scouts)
+    optima = led_to(scouts, some, optima)
     if optima and depend_on_errors(job, some, optima):
         return Checkpoint(Starting(), calls, None, integrated=True)
     optima = that_matter(optima)
@@ -193,14 +193,14 @@ def _set_out(job: Job, some: CollapsedDensity, optima: list[Optimum], scouts: Sc
         optima = with_aliases(aliases, density, optima)
     check_ranges(whole, job.scene, optima[0].z)
     check_best_fit(whole, optima[0].z)
-    stage, used = _first_stage(job, density, optima, scouts)
-    reached = Checkpoint(stage, calls + used, None, job.representatives)
-    moved = at_once(job, density, optima, scouts) if isinstance(stage, Tempering) else None
+    first, used = _first_stage(job, density, optima, scouts)
+    reached = Checkpoint(first, calls + used, None, job.representatives)
+    moved = at_once(job, density, optima, scouts) if isinstance(first, Tempering) else None
     if moved is None:
         return reached
     erring, used = moved
     return dataclasses.replace(
-        reached, stage=erring, calls=reached.calls + used, integrated=True, exact=stage
+        reached, stage=erring, calls=reached.calls + used, integrated=True, exact=first
     )
 
 
@@ -256,16 +256,6 @@ def _at_rest(
     if drawn is None:
         return None, calls
     return Weighted(proposal.optima, drawn, Verdict(True, ())), calls
-
-
-def _with_scouts(
-    density: CollapsedDensity, optima: list[Optimum], scouts: Scouts, finish: Finish = refine
-) -> list[Optimum]:
-    """Add optima that the best scout leads to."""
-    if len(scouts.z):
-        optima = added(optima, finish(density, climb(density, scouts.z[0])[0]))
-        optima = added(optima, finish(density, scouts.z[0]))
-    return optima
 
 
 def _has_too_many(density: CollapsedDensity) -> bool:

@@ -93,8 +93,10 @@ def test_rounds_answer_as_soon_as_they_tell() -> None:
     assert not drawn[-1].verdict.converged
     last = fold.summarise(_job(), _steps()[-1], 1.0, 1.0)
     assert last.verdict.converged
+    # not standard deviations: the tail of c0 is so heavy that few draws hold most of its variance
     for path, row in last.parameters.items():
-        assert drawn[-1].parameters[path].sd == pytest.approx(row.sd, rel=0.3), path
+        early = drawn[-1].parameters[path]
+        assert early.q95 - early.q05 == pytest.approx(row.q95 - row.q05, rel=0.3), path
 
 
 def test_where_rounds_fail_the_exact_model_is_sampled_and_looked_at() -> None:

@@ -14,7 +14,7 @@ from inference.posterior import fold
 from inference.posterior.answer.posterior import Posterior
 from inference.posterior.sampling.rounds_so_far import Rounds, Wanted
 from inference.posterior.sampling.scouts import Scouts, send_scouts
-from inference.posterior.sampling.shape import Shape, shape_at
+from inference.posterior.sampling.shape import Shape
 from inference.posterior.sampling.start import Optimum
 from inference.posterior.sampling.transport import unbent_map
 from inference.posterior.stages import looking, shaping, starting
@@ -26,6 +26,7 @@ from inference.posterior.stages.standing import stands
 from simulator.scene import parse_scene
 from tests.posterior.stages.confounded import CONFOUNDED, confounded
 from tests.posterior.stages.planted_rounds import plant_rounds
+from tests.posterior.test_archive import same
 
 Array = NDArray[np.float64]
 
@@ -140,7 +141,7 @@ def test_what_scouts_know_is_what_rounds_are_held_to() -> None:
     density = job.density()
     start = _before_shapes(job)
     assert start.scouts is not None
-    reached = from_shapes(job, density, start.optima, start.scouts)
+    reached = from_shapes(job, density, start)
     assert reached is not None
     assert isinstance(reached.stage, Tempering)
     kept = [population for population in reached.stage.populations if population is not None]
@@ -149,7 +150,7 @@ def test_what_scouts_know_is_what_rounds_are_held_to() -> None:
     assert len(kept[1].z) == min(len(start.scouts.hot), 1000)
     assert all(row.tobytes() in known for row in kept[1].z)
     none = Scouts(start.scouts.z[:0], start.scouts.hot[:0])
-    assert from_shapes(job, density, start.optima, none) is None
+    assert from_shapes(job, density, dataclasses.replace(start, scouts=none)) is None
 
 
 @functools.cache
@@ -173,7 +174,7 @@ def test_where_noise_leads_the_exact_model_comes_first() -> None:
     job = confounded(snr=10.0)
     start = _before_shapes(job)
     assert start.scouts is not None
-    assert from_shapes(job, job.density(), start.optima, start.scouts) is None
+    assert from_shapes(job, job.density(), start) is None
 
 
 class _Bump:
@@ -220,24 +221,92 @@ def test_scouts_stop_on_their_way_and_go_on_where_noise_leads(
     assert {row.tobytes() for row in short.hot} < {row.tobytes() for row in whole.hot}
 
 
-def test_two_tops_that_matter_are_left_to_populations(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_tops_that_matter_are_left_to_populations() -> None:
     job = confounded()
     start = _before_shapes(job)
-    assert start.scouts is not None
-    tops: list[Shape] = []
+    assert start.shapes
+    (top, *_) = start.shapes
+    # all but as high, with nothing between
+    z, nearly = top.optimum.z + 3.0, top.optimum.log_density - 0.1
+    other = dataclasses.replace(top.optimum, z=z, log_density=nearly)
+    both = dataclasses.replace(start, shapes=(top, dataclasses.replace(top, optimum=other)))
+    assert from_shapes(job, job.density(), both) is None
+    assert from_shapes(job, job.density(), start) is not None
 
-    def apart(*arguments: Any) -> Shape:
-        shape = shape_at(*arguments)
-        assert shape is not None
-        if tops:  # the second one: all but as high, with nothing between
-            z, nearly = shape.optimum.z + 3.0, tops[0].optimum.log_density - 0.1
-            optimum = dataclasses.replace(shape.optimum, z=z, log_density=nearly)
-            return dataclasses.replace(shape, optimum=optimum)
-        tops.append(shape)
-        return shape
 
-    monkeypatch.setattr(shaping, "shape_at", apart)
-    assert from_shapes(job, job.density(), start.optima, start.scouts) is None
+@pytest.mark.parametrize("apart", [False, True])
+def test_where_scouts_came_to_is_climbed_on_from_behind_a_dip_alone(
+    monkeypatch: pytest.MonkeyPatch, apart: bool
+) -> None:
+    job = confounded()
+    start = _before_shapes(job)
+    climbed: list[int] = []
+
+    def noted(*arguments: Any) -> Shape | None:
+        climbed.append(len(arguments[2]))
+        return None
+
+    monkeypatch.setattr(shaping, "_is_apart", lambda *_: apart)
+    monkeypatch.setattr(shaping, "climbed_from", noted)
+    begun = from_shapes(job, job.density(), start)
+    assert begun is not None
+    assert bool(climbed) == apart
+
+
+def test_a_place_behind_a_dip_is_apart() -> None:
+    """Two bumps six standard deviations apart, and the slope of one of them."""
+
+    def bumps(z: Array) -> Array:
+        return np.logaddexp(-0.5 * (z**2).sum(axis=1), -0.5 * ((z - 6.0) ** 2).sum(axis=1))
+
+    straight = unbent_map(np.zeros(2), np.eye(2), None)
+    shape = Shape(Optimum(np.zeros(2), 0.0, np.eye(2)), straight)
+    density = cast("CollapsedDensity", bumps)
+    for z, apart in ((np.full(2, 6.0), True), (np.full(2, 2.0), False)):
+        assert shaping._is_apart(density, shape, z, float(bumps(z[None])[0])) == apart
+
+
+def test_shapes_are_climbed_to_while_scouts_are_on_their_way() -> None:
+    job = confounded()
+    first, second, third, *_ = _shaped()
+    assert all(isinstance(one.stage, Starting) and not one.stage.shapes for one in (first, second))
+    tasks = [fold.tasks(job, one) for one in (first, second, third)]
+    assert [[_name(task) for task in each] for each in tasks] == [
+        ["fitted", "climbed"],
+        ["scouts", *["shape"] * (len(tasks[1]) - 1)],
+        ["start"],
+    ]
+    stage = third.stage
+    assert isinstance(stage, Starting)
+    assert stage.shapes is not None
+    assert 1 <= len(stage.shapes) <= 2
+    stored = Checkpoint.from_bytes(third.to_bytes())
+    assert same(stored, third)
+
+
+def test_a_shape_is_climbed_to_from_each_of_the_best_with_errors(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    job = confounded()
+    start = _before_shapes(job)
+    (best, *_) = start.shapes or ()
+    low = Optimum(best.optimum.z + 0.5, np.inf, best.optimum.factor)
+    begun: list[Array] = []
+
+    def noted(*arguments: Any) -> None:
+        begun.append(arguments[2])
+
+    monkeypatch.setattr(shaping, "shape_at", noted)
+    for rank in (0, 1):
+        task = looking.ShapeTask(job, (low, best.optimum), rank)
+        assert task.run().start.shapes == ()
+    np.testing.assert_array_equal(begun, [best.optimum.z, low.z])
+
+
+def _name(task: fold.Task) -> str:
+    if isinstance(task, looking.LookTask):
+        return task.way
+    return "shape" if isinstance(task, looking.ShapeTask) else "start"
 
 
 def test_only_scenes_with_a_background_begin_so() -> None:
