@@ -1,7 +1,7 @@
 """The search for optima, before anything is drawn: ways that know nothing of one another.
 
 Each is a task of its own: as many processes as there are ways look at once. Where sampling begins
-with a shape, that is climbed to from the optima while scouts are on their way.
+with a shape, the best of what all of them found are climbed on from side by side.
 """
 
 import dataclasses
@@ -12,11 +12,16 @@ import numpy as np
 
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
-from inference.posterior.sampling.scouts import send_scouts, thinned
+from inference.posterior.sampling.scouts import led_to, send_scouts, thinned
 from inference.posterior.sampling.start import Optimum, find_optima, refine, roughly
 from inference.posterior.stages.chunk import is_short_for_scouts
 from inference.posterior.stages.setting_out import HALFWAY
-from inference.posterior.stages.shaping import CLIMBED, begins_with_a_shape, climbed_from
+from inference.posterior.stages.shaping import (
+    CLIMBED,
+    begins_with_a_shape,
+    climbed_from,
+    with_ends,
+)
 from inference.posterior.stages.stage import Starting
 from inference.posterior.streams import Stream
 
@@ -76,7 +81,8 @@ class LookTask:
             return Looked(Starting(climbed=tuple(found)), 0)
         reach = HALFWAY if self.brief else 1.0
         scouts, calls = send_scouts(thinned(density), self.job.stream(Stream.SCOUTS), reach)
-        return Looked(Starting(scouts=scouts), calls)
+        ends = led_to(scouts, density, (), roughly) if self.brief else ()
+        return Looked(Starting(scouts=scouts, ends=tuple(ends)), calls)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -112,17 +118,16 @@ def ways_left(start: Starting, *, scouts: bool) -> tuple[Way, ...]:
 def looking(job: Job, start: Starting, *, scouts: bool) -> tuple[LookTask | ShapeTask, ...]:
     """Return a task for each of the ways that are left; scouts set out last where time is short.
 
-    Shapes are climbed to from what the others found, and take as long as the scouts do.
+    Shapes are climbed to from what all of them found.
     """
     ways = ways_left(start, scouts=scouts)
     brief = scouts and begins_with_a_shape(job, job.density())
-    if len(ways) > 1 and (brief or is_short_for_scouts(job)):
+    if len(ways) > 1 and is_short_for_scouts(job):
         ways = tuple(way for way in ways if way != "scouts")
-    looks = tuple(LookTask(job, way, brief) for way in ways)
-    if not brief or not start.looked or start.shapes is not None:
-        return looks
-    optima = tuple(start.optima)
-    return (*looks, *(ShapeTask(job, optima, rank) for rank in range(min(CLIMBED, len(optima)))))
+    if ways or not brief or start.shapes is not None:
+        return tuple(LookTask(job, way, brief) for way in ways)
+    optima = tuple(with_ends(start))
+    return tuple(ShapeTask(job, optima, rank) for rank in range(min(CLIMBED, len(optima))))
 
 
 def taken_in(start: Starting, found: Sequence[Looked]) -> tuple[Starting, int]:
@@ -130,7 +135,7 @@ def taken_in(start: Starting, found: Sequence[Looked]) -> tuple[Starting, int]:
     for each in found:
         new = {way: getattr(each.start, way) for way in _WAYS}
         changes = {way: value for way, value in new.items() if value is not None}
-        start = dataclasses.replace(start, **changes)
+        start = dataclasses.replace(start, **changes, ends=start.ends + each.start.ends)
         if each.start.shapes is not None:
             shapes = (*(start.shapes or ()), *each.start.shapes)
             start = dataclasses.replace(start, shapes=shapes)

@@ -7,6 +7,7 @@ rounds begin there at once, and scouts from the prior, which know of no optimum,
 held to.
 """
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,9 +21,9 @@ from inference.posterior.sampling.aliases import aliases_of, with_aliases
 from inference.posterior.sampling.coordinates import coordinates_of
 from inference.posterior.sampling.population import arrived_at
 from inference.posterior.sampling.proposal import Proposal, mixture_of
-from inference.posterior.sampling.scouts import MOST_FRAMES, led_to
+from inference.posterior.sampling.scouts import MOST_FRAMES
 from inference.posterior.sampling.shape import Shape, shape_at
-from inference.posterior.sampling.start import Optimum, added, roughly
+from inference.posterior.sampling.start import Optimum, added
 from inference.posterior.sampling.verdict import Verdict
 from inference.posterior.sampling.warm import MAP_SHARE
 from inference.posterior.stages.checkpoint import Checkpoint
@@ -30,7 +31,7 @@ from inference.posterior.stages.scouting import from_scouts
 from inference.posterior.stages.stage import Starting, Tempering
 from inference.posterior.streams import Stream
 
-__all__ = ["CLIMBED", "begins_with_a_shape", "climbed_from", "from_shapes"]
+__all__ = ["CLIMBED", "begins_with_a_shape", "climbed_from", "from_shapes", "with_ends"]
 
 Array = NDArray[np.float64]
 
@@ -110,8 +111,7 @@ def from_shapes(job: Job, density: CollapsedDensity, start: Starting) -> Checkpo
     target, scouts = _target(job, density), start.scouts
     if scouts is None:
         raise ValueError("scouts are what rounds are held to")
-    ends = led_to(scouts, density, (), roughly)
-    found = _the_best_first((*(start.shapes or ()), *_beside(job, density, start, ends)))
+    found = sorted(start.shapes or (), key=lambda one: -one.optimum.log_density)
     if not found or _are_several(target, found):
         return None
     shape, aliases = found[0], aliases_of(target)
@@ -132,40 +132,21 @@ def from_shapes(job: Job, density: CollapsedDensity, start: Starting) -> Checkpo
     pending = Verdict(False, ("no steps were made",))
     stage = Tempering(proposal, members, pending, scouted=True, shaped=True)
     if target is density:
-        return Checkpoint(stage, len(ends))
-    optima = start.optima
-    for end in ends:
-        optima = added(optima, end)
+        return Checkpoint(stage, 0)
+    optima = with_ends(start)
     own = Proposal(mixture_of(optima), None, MAP_SHARE)
     exact = from_scouts(job, density, own, scouts, None)
     return Checkpoint(stage, len(optima), integrated=True, exact=exact)
 
 
+def with_ends(start: Starting) -> list[Optimum]:
+    """Return all optima, the best first, with those that scouts led to."""
+    return functools.reduce(added, start.ends, start.optima)
+
+
 def _target(job: Job, density: CollapsedDensity) -> CollapsedDensity:
     """Return the density with the model's errors integrated out."""
     return job.with_error_integrated().density() if job.can_integrate_error else density
-
-
-def _the_best_first(shapes: Sequence[Shape]) -> list[Shape]:
-    return sorted(shapes, key=lambda one: -one.optimum.log_density)
-
-
-def _beside(
-    job: Job, density: CollapsedDensity, start: Starting, ends: Sequence[Optimum]
-) -> list[Shape]:
-    """Climb to a shape from the best place that scouts led to in a valley of its own, if any."""
-    target, shapes = _target(job, density), _the_best_first(start.shapes or ())
-    if shapes and ends:
-        values = target(np.array([end.z for end in ends]))
-        apart = [
-            end
-            for end, value in zip(ends, values, strict=True)
-            if _is_apart(target, shapes[0], end.z, float(value))
-        ]
-    else:
-        apart = list(ends)
-    shape = climbed_from(job, density, apart, 0) if apart else None
-    return [] if shape is None else [shape]
 
 
 def _errors_lead(density: CollapsedDensity, shape: Shape) -> bool:

@@ -74,14 +74,17 @@ class Starting(_NotBegun):
         Those that climbs from the prior led to, the best first; None before these.
     scouts : Scouts or None
         Points that came from the prior alone; None before they are sent out.
+    ends : tuple of Optimum
+        Roughly where the best scout leads to; none where sampling does not begin with a shape.
     shapes : tuple of Shape or None
-        With the model's errors integrated out, that the best of these optima led to; None before
+        With the model's errors integrated out, that the best of all these led to; None before
         these, and where sampling begins with none.
     """
 
     fitted: tuple[Optimum, ...] | None = None
     climbed: tuple[Optimum, ...] | None = None
     scouts: Scouts | None = None
+    ends: tuple[Optimum, ...] = ()
     shapes: tuple[Shape, ...] | None = None
 
     @property

@@ -234,25 +234,6 @@ def test_two_tops_that_matter_are_left_to_populations() -> None:
     assert from_shapes(job, job.density(), start) is not None
 
 
-@pytest.mark.parametrize("apart", [False, True])
-def test_where_scouts_came_to_is_climbed_on_from_behind_a_dip_alone(
-    monkeypatch: pytest.MonkeyPatch, apart: bool
-) -> None:
-    job = confounded()
-    start = _before_shapes(job)
-    climbed: list[int] = []
-
-    def noted(*arguments: Any) -> Shape | None:
-        climbed.append(len(arguments[2]))
-        return None
-
-    monkeypatch.setattr(shaping, "_is_apart", lambda *_: apart)
-    monkeypatch.setattr(shaping, "climbed_from", noted)
-    begun = from_shapes(job, job.density(), start)
-    assert begun is not None
-    assert bool(climbed) == apart
-
-
 def test_a_place_behind_a_dip_is_apart() -> None:
     """Two bumps six standard deviations apart, and the slope of one of them."""
 
@@ -266,14 +247,14 @@ def test_a_place_behind_a_dip_is_apart() -> None:
         assert shaping._is_apart(density, shape, z, float(bumps(z[None])[0])) == apart
 
 
-def test_shapes_are_climbed_to_while_scouts_are_on_their_way() -> None:
+def test_shapes_are_climbed_to_side_by_side() -> None:
     job = confounded()
     first, second, third, *_ = _shaped()
     assert all(isinstance(one.stage, Starting) and not one.stage.shapes for one in (first, second))
     tasks = [fold.tasks(job, one) for one in (first, second, third)]
     assert [[_name(task) for task in each] for each in tasks] == [
-        ["fitted", "climbed"],
-        ["scouts", *["shape"] * (len(tasks[1]) - 1)],
+        ["scouts", "fitted", "climbed"],
+        ["shape"] * len(tasks[1]),
         ["start"],
     ]
     stage = third.stage
