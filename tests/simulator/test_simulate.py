@@ -7,6 +7,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+import scipy
 
 from simulator.frames import check_frames
 from simulator.object_model import distortion, log_slope, quadratic
@@ -111,6 +112,33 @@ def test_same_seed_same_frames_and_another_seed_others() -> None:
     assert np.array_equal(first.frames.readings, again.frames.readings)
     assert first.parameters == again.parameters
     assert not np.array_equal(first.frames.readings, other.frames.readings)
+
+
+def test_errors_are_the_same_whatever_signs_eigenvectors_have(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Planted fault: the same seed drew another error of the flux on another processor."""
+    sensor = parse_sensor(
+        {"kind": "pulsed", "pulse_width_s": 1e-7, "noise": {"read": [1e-9, 1e-9]}}
+    )
+    scene = parse_scene(
+        {
+            "object": {"c0": 0.08, "c1": -0.1, "c2": 0.1},
+            "discrepancy": {"flux": 0.1, "range_m": 1e-3},
+        }
+    )
+    path = RadialTrajectory(from_m=0.1, to_m=1.0, frames=12)
+    eigh = scipy.linalg.eigh
+
+    def turned(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        values, vectors = eigh(matrix)
+        return values, vectors * np.where(np.arange(len(values)) % 2, 1.0, -1.0)
+
+    here = simulate(sensor, scene, path, 5).frames.readings
+    monkeypatch.setattr(scipy.linalg, "eigh", turned)
+    there = simulate(sensor, scene, path, 5).frames.readings
+    # the rounding of the root of the smallest eigenvalues
+    np.testing.assert_allclose(there, here, rtol=1e-7)
 
 
 def test_noise_has_the_stated_covariance() -> None:

@@ -1,12 +1,20 @@
 """The triangular map: exactly invertible, its determinant right, curved samples straightened."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from inference.posterior.sampling.transport import TriangularMap, fit_map
+from inference.posterior.sampling.transport import (
+    TriangularMap,
+    fit_map,
+    straight_map,
+    unbent_map,
+)
 
 
 def _banana(rng: np.random.Generator, n: int) -> np.ndarray:
@@ -71,6 +79,46 @@ def test_a_flat_sample_has_a_map() -> None:
     z, log_det = transport.bend(rng.standard_normal((20, 3)))
     assert np.isfinite(z).all()
     assert np.isfinite(log_det).all()
+
+
+@pytest.mark.parametrize("copies", [1, 3])
+def test_draws_that_stand_there_often_count_so_often(copies: int) -> None:
+    """Against copies that differ by less than matters, which are rows of their own."""
+    rng = np.random.default_rng(6)
+    some = _banana(rng, 900)
+    often = np.where(np.arange(900) < 300, 2 * copies, copies)
+    draws = np.repeat(some, often, axis=0)
+    apart = draws + 1e-12 * rng.standard_normal(draws.shape)
+    x = rng.standard_normal((40, 4))
+    together, alone = fit_map(draws), fit_map(apart)
+    np.testing.assert_allclose(together.centre, alone.centre, atol=1e-10)
+    np.testing.assert_allclose(together.axes, alone.axes, atol=1e-10)
+    if copies == 1:  # terms are judged by how many of the draws are distinct
+        assert not np.allclose(together.means, fit_map(some).means, atol=1e-6)
+    assert np.isfinite(together.bend(x)[0]).all()
+
+
+def test_draws_of_maps_are_the_same_whatever_signs_singular_vectors_have(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Planted fault: the same seed drew other points on another processor."""
+    sample = _banana(np.random.default_rng(7), 800)
+    x = np.random.default_rng(8).standard_normal((20, 4))
+    factor = np.linalg.cholesky(np.cov(sample.T))
+    svd = scipy.linalg.svd
+
+    def turned(*arguments: Any, **how: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        left, sizes, right = svd(*arguments, **how)
+        signs = np.array([1.0, -1.0, -1.0, 1.0])
+        return left * signs, sizes, signs[:, None] * right
+
+    def drawn() -> list[np.ndarray]:
+        maps = fit_map(sample), straight_map(sample), unbent_map(np.zeros(4), factor, None)
+        return [one.bend(x)[0] for one in maps]
+
+    here = drawn()
+    monkeypatch.setattr(scipy.linalg, "svd", turned)
+    np.testing.assert_allclose(drawn(), here, rtol=1e-9, atol=1e-9)
 
 
 def test_one_dimension() -> None:
