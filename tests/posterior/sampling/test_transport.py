@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from inference.posterior.sampling import transport as transport_module
 from inference.posterior.sampling.transport import (
     TriangularMap,
     fit_map,
@@ -96,6 +97,18 @@ def test_draws_that_stand_there_often_count_so_often(copies: int) -> None:
     if copies == 1:  # terms are judged by how many of the draws are distinct
         assert not np.allclose(together.means, fit_map(some).means, atol=1e-6)
     assert np.isfinite(together.bend(x)[0]).all()
+
+
+def test_rows_of_a_regression_count_as_often_as_they_stand_there() -> None:
+    """Through a parabola: an even line, but where one side counts for more."""
+    x = np.linspace(-1.0, 1.0, 200)
+    features, times = np.column_stack([np.ones(200), x]), np.where(x > 0, 5.0, 1.0)
+    found = transport_module._regression(features, x**2, 1e-9, times)
+    root = np.sqrt(times)
+    wanted = np.linalg.lstsq(root[:, None] * features, root * x**2)[0]
+    assert wanted[1] > 0.2
+    # terms are shrunk by their noise, 1.5 % here
+    np.testing.assert_allclose(found, wanted, rtol=0.03)
 
 
 def test_draws_of_maps_are_the_same_whatever_signs_singular_vectors_have(
