@@ -27,6 +27,10 @@ _SMALL = 0.1 / math.sqrt(12.0)
 _SLOW_S = 10.0  # whole numbers in such steps are milliseconds, or nobody is in a hurry;
 _MINUTE_S = 60.0  # in whole minutes it is the latter
 _EPOCH_S = 1e11  # the year 5138
+# times come in bursts where so many of the steps between them are a small share of the mean step,
+# and so many steps at least are longer than that: frames that are missing leave no short steps,
+# and one pause is no burst
+_SHORT, _OFTEN, _PAUSES = 0.1, 1.0 / 3.0, 3
 
 
 def doubts(sensor: Sensor, frames: Frames | None = None) -> list[str]:
@@ -97,7 +101,7 @@ def _rounding(values: Array) -> float | None:
 
 
 def time_doubts(time_s: Array) -> Iterator[str]:
-    """Yield whether times look like milliseconds.
+    """Yield whether times look like milliseconds, or like those of reading and not of measuring.
 
     Parameters
     ----------
@@ -117,3 +121,14 @@ def time_doubts(time_s: Array) -> Iterator[str]:
         step = float(np.median(np.abs(np.diff(time_s))))
         if step >= _SLOW_S and step % _MINUTE_S:
             yield f"time_s holds whole numbers in steps of {step:g}: are these milliseconds?"
+    steps = np.diff(time_s)
+    if steps.size < _FEWEST or steps.min() < 0.0 or not steps.mean() > 0.0:
+        return
+    short, pauses = steps < _SHORT * steps.mean(), steps > steps.mean()
+    if short.mean() >= _OFTEN and pauses.sum() >= _PAUSES:
+        yield (
+            f"time_s comes in bursts, {short.mean():.0%} of its steps being shorter than a tenth "
+            f"of their mean, {steps.mean():.3g} s: are these the times at which frames were read, "
+            "and not those at which they were measured? A tracker then sees motion that was not, "
+            "and its ranges may be far off: give frames of one rate times in equal steps"
+        )

@@ -100,11 +100,13 @@ class Prior(NamedTuple):
     added: Added  # to the readings
     rate: Rate  # of u
     # part of the variance of u that comes from crosstalk that is not known: along it the curve
-    # counts as straight (`inference.tracking.shared_error`)
+    # counts as straight (`inference.tracking.shared_error`). 0 where u is what it errs by itself
     share: float
     # part along which nuisance parameters are taken where the frame says that they are: what is not
     # shared, as far as crosstalk is known too well to take up what they do
     told: float
+    products: float  # the same, of all that u errs
+    variance: float  # of all that u errs
 
 
 @compiled

@@ -108,9 +108,9 @@ def _noise_of(
         residual = frame.first - m1, frame.second - m2
         noise = noise_at_light((m1, m2), (gain * o1, gain * o2), residual, added.own, table.noise)
     if learns_crosstalk(of) and not prior.position.born:
-        slopes, variance = (t.slope1 / gain, t.slope2 / gain), 1.0 / prior.position.precision
+        slopes = t.slope1 / gain, t.slope2 / gain
         noise = add_products(
-            noise, noise, t.u, gain, variance, prior.told, slopes, of.X[row], table
+            noise, noise, t.u, gain, prior.variance, prior.products, slopes, of.X[row], table
         )
     return noise
 
@@ -217,7 +217,7 @@ def learn(
         beside = take_known(of, row, u, born, frame, table, scratch)
         if learns_crosstalk(of) and not born:
             # what is read is held against what the known range leaves, and the curve taken there
-            prior = own_prior(of, row, gain, 0.0, table)
+            prior = own_prior(of, row, gain, 0.0, table, True)
     position = prior.position
     # where the curve is taken: as far as the error that u shares with the crosstalk goes, at u's
     # prediction
@@ -233,7 +233,8 @@ def learn(
         told = pull1 * tangent.slope1 + pull2 * tangent.slope2
         unsure = slope_variance(at, gain, tangent.slope1, tangent.slope2, table)
         if not held:
-            bring_anchor(of, row, at, prior.share, told, unsure, table)
+            alone = (1.0 - prior.share) / position.precision
+            bring_anchor(of, row, at, alone, told, unsure, table)
         along = at, tangent.slope1, tangent.slope2
         shared = straighten(of, row, gain, along, noise, table)
     if table.by_rate:

@@ -82,7 +82,7 @@ def _density(u: float, frame: TrackedFrame, prior: Prior, table: ReadingsTable) 
         # at the mode, as in what is learnt there: where the prediction is vague, what it says of
         # their size holds nowhere else
         root = add_products(
-            root, noise, u, gain, 1.0 / position.precision, prior.told, slopes, added.spread, table
+            root, noise, u, gain, prior.variance, prior.products, slopes, added.spread, table
         )
     root = spread_at(root, at, gain, slopes, added.spread, table)
     pulls = solve(root, e1, e2)

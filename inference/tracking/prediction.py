@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.tracking.beside_crosstalk import Beside, beside_of
 from inference.tracking.borrowed import borrowed
 from inference.tracking.frame_density import Added, Position, Prior, Rate, spread_at
 from inference.tracking.hypotheses import (
@@ -108,23 +109,6 @@ def predict(
 
 
 @compiled
-def _crosstalk_given_u(of: Hypotheses, row: int, precision: float) -> tuple[float, float, Root]:
-    """Return how the crosstalk changes with u, and the root of its covariance given u."""
-    X = of.X
-    slope1, slope2 = 0.0, 0.0
-    for j in range(X.shape[1]):
-        slope1 += X[row, CROSSTALK1, j] * X[row, U, j] * precision
-        slope2 += X[row, CROSSTALK2, j] * X[row, U, j] * precision
-    root = Root(0.0, 0.0, 0.0)
-    for j in range(X.shape[1]):
-        own = X[row, U, j]
-        root = add_factor(
-            root, X[row, CROSSTALK1, j] - slope1 * own, X[row, CROSSTALK2, j] - slope2 * own
-        )
-    return slope1, slope2, root
-
-
-@compiled
 def _rate_given_u(of: Hypotheses, row: int, precision: float) -> Rate:
     """Return what a hypothesis says of du/dt given u."""
     X = of.X
@@ -140,48 +124,49 @@ def _rate_given_u(of: Hypotheses, row: int, precision: float) -> Rate:
 @borrowed
 @compiled
 def own_prior(
-    of: Hypotheses, row: int, gain: float, log_weight: float, table: ReadingsTable
+    of: Hypotheses, row: int, gain: float, log_weight: float, table: ReadingsTable, known: bool
 ) -> Prior:
     """Return what a hypothesis says of the next frame, as `prior_of`, nuisance parameters left out.
 
     A frame is learnt beside them, so that whoever learns asks for no more.
     """
-    x = of.x
-    precision = 1.0 / max(variance_of(of, row, U), 1e-300)
-    log_scale = log_weight + 0.5 * (math.log(precision) - _LOG_2PI)
-    offset1, offset2 = table.crosstalk1, table.crosstalk2
-    slope1, slope2, share, told, own = 0.0, 0.0, 0.0, 1.0, Root(0.0, 0.0, 0.0)
-    root = own
+    x, variance = of.x, max(variance_of(of, row, U), 1e-300)
+    beside, told, products = Beside(variance, 0.0, 0.0, Root(0.0, 0.0, 0.0), 0.0), 1.0, 1.0
+    offset1, offset2, root = table.crosstalk1, table.crosstalk2, beside.root
     if learns_crosstalk(of):
         offset1, offset2 = offset1 + x[row, CROSSTALK1], offset2 + x[row, CROSSTALK2]
-        slope1, slope2, own = _crosstalk_given_u(of, row, precision)
         _, _, share = shared_part(of, row)
-        _, _, d1, d2 = mean_at(x[row, ANCHOR], table)
-        slope1, slope2 = slope1 + gain * share * d1, slope2 + gain * share * d2
         u, noise = x[row, U], UNIT
         value1, value2, d1, d2 = mean_at(u, table)
         if not table.noise.plain:
             o1, o2 = object_at(u, table)
             m1, m2 = gain * value1 + offset1, gain * value2 + offset2
             noise = noise_root(m1, m2, gain * o1, gain * o2, table.noise)
-        slopes, told = (d1, d2), (1.0 - share) * known_part(of, row)
-        root = add_products(own, noise, u, gain, 1.0 / precision, told, slopes, of.X[row], table)
+        beside = beside_of(of, row, gain, noise, known, table)
+        told, products = known_part(of, row), (1.0 - share) * known_part(of, row)
+        told *= 1.0 - beside.share
+        slopes, X = (d1, d2), of.X[row]
+        root = add_products(beside.root, noise, u, gain, variance, products, slopes, X, table)
+    precision = 1.0 / beside.variance
     rate = Rate(x[row, V], 0.0, 0.0)
     if table.by_rate:
         rate = _rate_given_u(of, row, precision)
+    log_scale = log_weight + 0.5 * (math.log(precision) - _LOG_2PI)
     return Prior(
         Position(False, False, False, x[row, U], precision, log_scale),
-        Added(offset1, offset2, slope1, slope2, own, root, of.X[row]),
+        Added(offset1, offset2, beside.slope1, beside.slope2, beside.root, root, of.X[row]),
         rate,
-        share,
+        beside.share,
         told,
+        products,
+        variance,
     )
 
 
 @borrowed
 @compiled
 def prior_of(
-    of: Hypotheses, row: int, gain: float, log_weight: float, table: ReadingsTable
+    of: Hypotheses, row: int, gain: float, log_weight: float, table: ReadingsTable, known: bool
 ) -> Prior:
     """Return what a hypothesis says of the next frame, as a density of u and the rest given u.
 
@@ -195,8 +180,10 @@ def prior_of(
         Log of what the density integrates to.
     table : ReadingsTable
         The scene.
+    known : bool
+        Whether the frame's range is known beside its readings.
     """
-    prior = own_prior(of, row, gain, log_weight, table)
+    prior = own_prior(of, row, gain, log_weight, table, known)
     if of.X.shape[-1] == of.X.shape[1]:
         return prior
     u, added = prior.position.centre, prior.added
@@ -216,6 +203,8 @@ def prior_of(
         prior.rate,
         prior.share,
         prior.told,
+        prior.products,
+        prior.variance,
     )
 
 
@@ -252,4 +241,6 @@ def born_prior(of: Hypotheses, log_weight: float, rate_sd: float, table: Reading
         Rate(0.0, 0.0, rate_sd),
         0.0,
         known_part(of, 0) if learns_crosstalk(of) else 1.0,
+        known_part(of, 0) if learns_crosstalk(of) else 1.0,
+        0.0,
     )

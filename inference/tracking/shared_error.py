@@ -193,7 +193,7 @@ def bring_anchor(
     of: Hypotheses,
     row: int,
     at: float,
-    share: float,
+    own: float,
     told: float,
     unsure: float,
     table: ReadingsTable,
@@ -211,8 +211,8 @@ def bring_anchor(
         The hypothesis as predicted; its anchor and its root are changed in place.
     at : float
         log r at the frame's mode, less what that corrects of the common part.
-    share : float
-        Share of the variance of u that is common.
+    own : float
+        Variance of what u errs by itself.
     told : float
         What the frame tells of log r: one over its variance.
     unsure : float
@@ -221,7 +221,6 @@ def bring_anchor(
         Mean readings.
     """
     x, X = of.x, of.X
-    own = (1.0 - share) * variance_of(of, row, U)
     error = own / (1.0 + own * told)
     moved = at - x[row, ANCHOR]
     square = moved * moved

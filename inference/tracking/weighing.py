@@ -135,14 +135,15 @@ def _of_followed(
         old, log_weight = found, log_of(of.weight[h])
         if may_step(of, h, frame, empty.surprise, table, model.rules, room.scratch.work):
             log_weight += math.log(model.rules.outlier)
-        prior = prior_of(of, h, frame.gain, log_weight + log_usual, table)
+        known = frame.known_rate > 0.0
+        prior = prior_of(of, h, frame.gain, log_weight + log_usual, table, known)
         found = find_candidates(candidates, found, h, frame, prior, table, scan, room.scanned)
         if learns and model.rules.rate_sd > 0.0 and found > old:
             mode = candidates.mode[heaviest_of(candidates, old, found)]
             step = may_turn(of, h, mode, prior, seconds, room.scratch.work)
             if step > 0.0:
                 turned = log_weight + log_usual - math.log(step)
-                prior = prior_of(of, h, frame.gain, turned, table)
+                prior = prior_of(of, h, frame.gain, turned, table, known)
                 found = find_candidates(candidates, old, h, frame, prior, table, scan, room.scanned)
         hidden, smooth = learns and hides(of, h), followed > 1 and counted < 1.0
         if found == old or not (hidden or smooth):
@@ -188,7 +189,8 @@ def _learnt(
     if candidate.parent == NEW:
         prior = born_prior(of, 0.0, model.rules.rate_sd, model.table)
     else:
-        prior = own_prior(of, candidate.parent, frame.gain, 0.0, model.table)
+        known = frame.known_rate > 0.0
+        prior = own_prior(of, candidate.parent, frame.gain, 0.0, model.table, known)
     held = crosstalk_is_held(of)
     return learn(room.after, row, candidate, frame, prior, model.table, room.scratch, held)
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from service.commands import COMMANDS
+from service.plausibility import LOOKED, time_doubts
 from tests.service.conftest import SCENE, SENSOR
 from tests.service.said import CSV, SINE_WAVE, Said, written
 
@@ -210,6 +211,21 @@ def test_doubts(
     assert said.code == 0
     assert doubt in said.err
     assert Said(capsys, "estimate", path, "--scene", scene, "--quiet").err == ""
+
+
+def test_times_of_reading_are_told_from_times_of_measuring() -> None:
+    """Stamps of batches of two to eight; not jitter, missing frames, or one pause."""
+    number = np.arange(LOOKED)
+    for batch in (2, 3, 5, 8):
+        stamps = batch / 30.0 * (number // batch) + 1e-4 * (number % batch)
+        (said,) = time_doubts(stamps)
+        assert said.startswith("time_s comes in bursts")
+    rng = np.random.default_rng(1)
+    jitter = number / 30.0 + rng.uniform(0.0, 0.02, LOOKED)
+    missing = np.cumsum(np.where(rng.random(LOOKED) < 0.3, 10.0, 1.0)) / 30.0
+    pause = 1e-3 * number + np.where(number < 20, 0.0, 10.0)
+    for stamps in (number / 30.0, jitter, missing, pause):
+        assert not list(time_doubts(np.asarray(stamps, dtype=np.float64)))
 
 
 def test_frames_in_steps_of_minutes_are_not_doubted(
