@@ -43,7 +43,7 @@ def _conflicts(density: CollapsedDensity, z: np.ndarray, error: ModelError) -> t
     return prior_conflicts(density, draws, density.best_ranges(draws)[:, :, 0], density, error)
 
 
-@pytest.mark.parametrize("seed", [0, 2])
+@pytest.mark.parametrize("seed", [1, 4])
 def test_an_error_that_is_allowed_for_pulls_no_unknown_beyond_its_prior(seed: int) -> None:
     """The shadow's c1 stands where its prior ends, and the flux's error would have it lower."""
     density, error = _set(seed, LOGNORMAL)
