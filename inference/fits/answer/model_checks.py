@@ -24,6 +24,7 @@ from inference.fits.likelihood.erring_point import (
     point_at,
     slopes_of_priors,
 )
+from inference.fits.likelihood.model_error import share_left
 from inference.fits.likelihood.pairs import solved_by_root
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import eliminated
@@ -43,6 +44,7 @@ __all__ = [
 Array = NDArray[np.float64]
 
 _FREE = 0.05  # least share of its variance that the fit leaves of a direction that is looked at
+_SMOOTH = 0.03  # share that is left of errors of the flux by a sixth of it
 SUCCESSION = "succession"
 _APART = 1e-6  # of a column, below which the fit can make it itself
 
@@ -186,7 +188,10 @@ def model_checks(problem: FitProblem, top: Erring) -> dict[str, Check]:
     place, pull = off + turn.T @ rows.dense, off * np.sqrt((1.0 - share) / share)
     priors = Check(_check(place).statistic + _check(pull).statistic, off.size)
     readings = rows.frames.size
-    often = goes_on(target[:readings], followed[:readings], rows.frames)
+    often = 1.0
+    # what large errors leave of each frame is smooth, and no noise
+    if share_left(problem, top.positions) < _SMOOTH:
+        often = goes_on(target[:readings], followed[:readings], rows.frames)
     return {
         "crosstalk": _check(light.T @ target),
         "priors": priors,
