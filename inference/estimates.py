@@ -88,10 +88,11 @@ class TechniqueResult:
         How well a technique of many frames explains them: ``chi_square`` (less what
         errors of the model take up), ``deviance``
         (-2 log likelihood relative to no residual under read noise alone; of fits by likelihood),
-        ``degrees_of_freedom``, ``checks`` (p-value of each), ``p_value`` of all together,
-        ``misfit`` and its ``reasons``, ``by_priors`` (whether the priors of the unknowns count; of
-        fits by likelihood), ``rank``, ``widening`` (factor on all standard deviations,
-        of noise that chi-square doubts among it; of fits by likelihood) and ``optima``.
+        ``degrees_of_freedom``, ``checks`` (p-value of each), ``p_value`` of all together but
+        ``scatter``, which makes no misfit (docs/model.md, succession), ``misfit`` and its
+        ``reasons``, ``by_priors`` (whether the priors of the unknowns count; of fits by
+        likelihood), ``rank``, ``widening`` (factor on all standard deviations, of noise that
+        chi-square doubts among it; of fits by likelihood) and ``optima``.
     runtime_s : float
         Time that the technique took [s].
     """

@@ -10,6 +10,7 @@ from inference.asked import Asked, Found, Turns, asked_of
 from inference.assumptions import assumptions_of
 from inference.estimates import Estimates, LeftOut, TechniqueResult
 from inference.first_step import beyond_bounds
+from inference.fits.answer.smoothed import SMOOTHED, smoothed
 from inference.fits.techniques.registry import FITS
 from inference.plan import Plan, cheapest
 from inference.realtime.registry import TECHNIQUES
@@ -96,6 +97,8 @@ def _told(asked: Asked, supposed: tuple[str, ...], found: Found) -> Estimates:
     resting = any(asked.rests_on_prior(each.technique) for each in found.results)
     if asked.against is not None and (asked.light is None or resting):
         supposed = (asked.against.said, *supposed)
+    if any(smoothed(each.fit) for each in found.results):
+        supposed = (*supposed, SMOOTHED)
     return Estimates(found.chosen, found.results, found.left_out, supposed, found.do_first)
 
 

@@ -20,7 +20,7 @@ from inference.fits.answer.determined import (
 )
 from inference.fits.answer.erring_search import NO_LIKELIHOOD, believed, judged
 from inference.fits.answer.inflation import inflation, shift_of
-from inference.fits.answer.model_checks import model_checks
+from inference.fits.answer.model_checks import free_of, model_checks
 from inference.fits.answer.profile_scan import profile_scan
 from inference.fits.answer.ranges import (
     CONTRADICTION,
@@ -41,6 +41,8 @@ from inference.fits.answer.report import (
     spoiled,
 )
 from inference.fits.answer.rivals import rivals_of
+from inference.fits.answer.smoothed import SCATTER
+from inference.fits.answer.succession import scatters_less
 from inference.fits.likelihood.erring import Erring, contradicting, softened
 from inference.fits.likelihood.far_ends import far_ends
 from inference.fits.likelihood.held_walks import held_walks
@@ -256,6 +258,8 @@ def _erring_answer(
             report |= {name: of_end[name] for name in ("p_value", "misfit", "reasons", "checks")}
             report["reasons"] += blamed(problem, end, np.flatnonzero(state != SATURATED))
             break
+    if problem.object_errs:
+        report["checks"] = report["checks"] | {SCATTER: scatters_less(top, free_of(problem, top))}
     if contradicted:
         report["misfit"] = True
         report["reasons"].append(CONTRADICTION)

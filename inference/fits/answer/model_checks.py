@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inference.fits.answer.succession import goes_on
 from inference.fits.likelihood.arguments import CROSSTALK
 from inference.fits.likelihood.erring import Erring
 from inference.fits.likelihood.erring_point import (
@@ -23,16 +24,28 @@ from inference.fits.likelihood.erring_point import (
     point_at,
     slopes_of_priors,
 )
+from inference.fits.likelihood.model_error import share_left
 from inference.fits.likelihood.pairs import solved_by_root
 from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import eliminated
 from inference.identifiability.elimination import moving
 
-__all__ = ["REASONS", "Check", "Rows", "basis", "model_checks", "rows_of", "without_size"]
+__all__ = [
+    "REASONS",
+    "Check",
+    "Rows",
+    "basis",
+    "free_of",
+    "model_checks",
+    "rows_of",
+    "without_size",
+]
 
 Array = NDArray[np.float64]
 
 _FREE = 0.05  # least share of its variance that the fit leaves of a direction that is looked at
+_SMOOTH = 0.03  # share that is left of errors of the flux by a sixth of it
+SUCCESSION = "succession"
 _APART = 1e-6  # of a column, below which the fit can make it itself
 
 REASONS: Mapping[str, str] = {
@@ -44,6 +57,11 @@ REASONS: Mapping[str, str] = {
     "priors": (
         "the unknowns lie where their priors have next to no mass: something is not as the scene "
         "states it, or the object is unlike those of its priors"
+    ),
+    SUCCESSION: (
+        "what the fit leaves of the readings goes on from frame to frame, as noise does not: a "
+        "sensor or its driver smooths them (a low-pass, a running mean), and ranges are late, or "
+        "something else changes slowly; send readings that are not smoothed, with their own noise"
     ),
 }
 """What it means that a check fails, by its name."""
@@ -145,7 +163,8 @@ def model_checks(problem: FitProblem, top: Erring) -> dict[str, Check]:
     dict of str to Check
         ``crosstalk``: a score test (Rao 1948) of constant light that the scene says to be another,
         or none at all; ``priors``: the unknowns against their laws. Each is chi-square distributed
-        where the scene is as stated, up to what is not linear.
+        where the scene is as stated, up to what is not linear. ``succession``: whether what is left
+        goes on from frame to frame (`succession.goes_on`).
     """
     rows = rows_of(dataclasses.replace(problem, mode=top.clean.mode), top)
     followed = basis(without_size(rows.followed))
@@ -168,7 +187,23 @@ def model_checks(problem: FitProblem, top: Erring) -> dict[str, Check]:
     # latter alone says that an unknown should not be there
     place, pull = off + turn.T @ rows.dense, off * np.sqrt((1.0 - share) / share)
     priors = Check(_check(place).statistic + _check(pull).statistic, off.size)
-    return {"crosstalk": _check(light.T @ target), "priors": priors}
+    readings = rows.frames.size
+    often = 1.0
+    # what large errors leave of each frame is smooth, and no noise
+    if share_left(problem, top.positions) < _SMOOTH:
+        often = goes_on(target[:readings], followed[:readings], rows.frames)
+    return {
+        "crosstalk": _check(light.T @ target),
+        "priors": priors,
+        SUCCESSION: Check(float(scipy.special.chdtri(1, often)), 1),
+    }
+
+
+def free_of(problem: FitProblem, top: Erring) -> float:
+    """Return how much of the rows of readings a fit leaves free, of as many degrees of freedom."""
+    rows = rows_of(dataclasses.replace(problem, mode=top.clean.mode), top)
+    followed = basis(without_size(rows.followed))
+    return rows.frames.size - float(np.square(followed[: rows.frames.size]).sum())
 
 
 def _check(off: Array) -> Check:

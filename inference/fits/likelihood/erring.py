@@ -33,6 +33,7 @@ from inference.fits.likelihood.erring_point import (
     whitened_of,
 )
 from inference.fits.likelihood.known_modes import with_known
+from inference.fits.likelihood.lacking_light import moved_by_light, share_of_light
 from inference.fits.likelihood.maximum import Maximum
 from inference.fits.likelihood.other_starts import apart, larger, of_law, other_crosstalk
 from inference.fits.likelihood.pairs import solved
@@ -116,15 +117,19 @@ class Erring(Maximum):
         told = told_at(problem.known, u, self.a)
         own = _errors_known(problem, jacobian, along, told)
         of_x, of_errors = self.whole.factors
-        free = jacobian @ of_x + errors @ of_errors
         parts = np.concatenate([jacobian, along[:, :, None], errors], axis=2)
         white, d = whitened_of(problem, u, errors, parts), self.x.size
         seen = eliminated(
             problem.names, white[:, :, :d], white[:, :, d], white[:, :, d + 1 :], told
         )
         shared = np.linalg.norm(seen.response @ of_x + seen.error_response @ of_errors, axis=1)
-        of_x, of_offset = self.facts.factors
+        # no more than the light that came may err by
+        unknowns, of_light = moved_by_light(problem)
+        share = share_of_light(problem, self.x, u)[:, None, None]
+        errors = errors * np.where(of_light, share, 1.0)
+        free = (jacobian * np.where(unknowns, share, 1.0)) @ of_x + errors @ of_errors
         left = left_of_frames(problem, u, residual, along, errors, free)
+        of_x, of_offset = self.facts.factors
         if told is not None:
             off, move, more = self._beside(u)
             left = left + contradictions(told, off, move, more) + unsettled(told, off, move)

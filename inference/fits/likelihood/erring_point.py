@@ -243,7 +243,11 @@ def _root_of_covariance(problem: FitProblem, u: Array, errors: Array) -> Array:
         return _units(u.size)
     with np.errstate(over="ignore", invalid="ignore"):
         left = np.einsum("n,nik,njk->nij", own_share_left(problem, u), errors, errors)
-    left = np.where(np.isfinite(left).all(axis=(1, 2), keepdims=True), left, 0.0)
+    return _root_of(np.where(np.isfinite(left).all(axis=(1, 2), keepdims=True), left, 0.0))
+
+
+def _root_of(left: Array) -> Array:
+    """Return the Cholesky factor of the noise's 1 and of what is left besides, shape (n, 2, 2)."""
     # beside errors of 1e8 the noise's own 1 would be lost
     own = 1.0 + 1e-12 * np.trace(left, axis1=1, axis2=2)
     return cholesky(own[:, None, None] * np.eye(2) + left)
@@ -276,20 +280,24 @@ def left_of_frames(
 ) -> Array:
     """Return chi-squares of frames across their ranges, shape (n,).
 
-    What is left of errors is allowed for, and what ``more``, shape (n, 2, m), moves.
+    What is left of errors is allowed for, and what ``more``, shape (n, 2, m), moves. Where a range
+    cannot give way both readings count, each way by what moves it.
     """
     move = np.where(np.isfinite(along), along, 0.0)
     length = np.linalg.norm(move, axis=1)
     unit = move / np.where(length > 0.0, length, 1.0)[:, None]
-    normal = np.where((length > 0.0)[:, None], np.column_stack([-unit[:, 1], unit[:, 0]]), residual)
-    size = np.linalg.norm(normal, axis=1)
-    normal = normal / np.where(size > 0.0, size, 1.0)[:, None]
+    normal = np.column_stack([-unit[:, 1], unit[:, 0]])
 
     def across(part: Array) -> Array:
         return np.asarray(np.square(np.einsum("ni,nik->nk", normal, part)).sum(axis=1))
 
-    spread = 1.0 + own_share_left(problem, u) * across(errors) + across(more)
-    return np.asarray(across(residual[:, :, None]) / spread)
+    share = own_share_left(problem, u)
+    left = across(residual[:, :, None]) / (1.0 + share * across(errors) + across(more))
+    held = length == 0.0
+    moved = np.concatenate([np.sqrt(share)[:, None, None] * errors, more], axis=2)[held]
+    bare = solved_by_root(_root_of(moved @ moved.transpose(0, 2, 1)), residual[held, :, None])
+    left[held] = np.square(bare).sum(axis=(1, 2))
+    return left
 
 
 def _volume(root: Array, along: Array, white: Array) -> float:

@@ -15,6 +15,7 @@ __all__ = [
     "ErringFlux",
     "ErringLight",
     "erring_flux",
+    "errors_of_light",
     "left_at_places",
     "number_of_errors",
     "own_share_left",
@@ -155,12 +156,17 @@ def shadow_of(problem: FitProblem, values: Array, positions: Array) -> ShadowErr
 
 def number_of_errors(problem: FitProblem) -> int:
     """Return how many errors a fit has."""
+    return errors_of_light(problem).size
+
+
+def errors_of_light(problem: FitProblem) -> NDArray[np.bool_]:
+    """Return of every error whether it is one of the object's light, shape (k,)."""
     reach = problem.parameters.reach_m
     own = 2 * discrepancy_basis(*reach).size if problem.object_errs else 0
     of_shadow = 2 * shadow_basis(*reach).size if problem.shadow_errs else 0
     at_places = 0 if problem.places is None else 2 * problem.places.number
     offset = problem.known is not None and problem.known.offset_sd > 0.0
-    return own + of_shadow + at_places + int(offset)
+    return np.repeat([True, False, True, False], [own, of_shadow, at_places, int(offset)])
 
 
 def share_left(problem: FitProblem, positions: Array) -> float:

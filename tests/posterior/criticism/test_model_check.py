@@ -34,7 +34,7 @@ from simulator.discrepancy import DISCREPANCY_SD
 from simulator.scene import parse_scene
 
 SNR = 3e4
-SET = draw_path("independent", "crosstalk", TOLD, 3, SNR)
+SET = draw_path("independent", "crosstalk", TOLD, 5, SNR)
 ROUNDING = 1e-9
 
 
@@ -52,7 +52,7 @@ def fit_of(p_value: float, *checks: FitCheck) -> Fit:
 
 @pytest.fixture(scope="module")
 def refuted() -> tuple[Job, Checkpoint]:
-    return sampled(SET, 3, 30.0)
+    return sampled(SET, 5, 30.0)
 
 
 def has_room(data: PathSet, found: Posterior, without: Posterior, of: str) -> None:
