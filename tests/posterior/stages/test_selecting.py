@@ -63,7 +63,8 @@ def test_ways_that_look_at_once_know_nothing_of_one_another() -> None:
     """In whatever order, and in however many chunks, they lead to the same start."""
     job = of_scene({"crosstalk": UNKNOWN_CROSSTALK})
     tasks = looking(job, Starting(), scouts=True)
-    assert [task.way for task in tasks] == ["scouts", "fitted", "climbed"]  # the longest first
+    ways = [task.way for task in tasks if isinstance(task, LookTask)]
+    assert ways == ["scouts", "fitted", "climbed"]  # the longest first
     found = [task.run() for task in tasks]
     start, calls = taken_in(Starting(), found)
     assert start.scouts is not None
