@@ -112,6 +112,7 @@ def test_where_rounds_fail_the_exact_model_is_sampled_and_looked_at() -> None:
     assert fold.tasks(_job(), left)
 
 
+@pytest.mark.thorough
 def test_it_is_the_law_that_rounds_behind_an_exact_model_come_to(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
