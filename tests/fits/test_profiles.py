@@ -31,11 +31,12 @@ def fitted(one: RandomSet) -> tuple[FitProblem, Erring]:
     return problem, erring_maxima(problem, find_starts(problem, softened(problem)))[0]
 
 
-@pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.thorough), 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.thorough)])
 def test_far_frames_that_are_mostly_crosstalk_are_not_sure_and_wrong(seed: int) -> None:
-    """Tangents, and unknowns held one by one, leave them 7.6 and 6.9 standard deviations off.
+    """Tangents, and unknowns held one by one, leave some 7 standard deviations off.
 
-    A frame beyond 4 comes once in 15,000; these two are the worst of 40 sets.
+    A frame beyond 4 comes once in 15,000. Of the first set one range is 3.6 off, and 6.4 where
+    ranges are held on their near side alone.
     """
     one = of_seed(seed)
     (result,) = estimate(one.sensor, one.scene, one.simulation.frames, ["joint_fit"]).results
