@@ -124,6 +124,8 @@ def test_a_job_begins_anew_with_errors_integrated_and_stays_so() -> None:
     after = fold.merge(job, stored, [fold.run(task) for task in tasks])
     assert after.integrated
     assert after.calls >= stored.calls
+    last = fold.merge(job, after, [fold.run(task) for task in fold.tasks(job, after)])
+    assert last.integrated
 
 
 def test_an_answer_that_must_be_given_at_once_has_them_integrated_too(
