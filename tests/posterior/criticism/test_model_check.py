@@ -100,6 +100,7 @@ def test_noise_that_is_stated_too_small_widens_its_part_of_every_interval() -> N
     """By a quarter of what it is; an object that errs as stands by default."""
     data = understated(draw_path("constant speed", "crosstalk", "nothing", 3), 4.0)
     found, without = answers(*sampled(data, 3, 30.0))
+    # of twenty intervals of 90 % half or fewer hold the truth once in a hundred thousand
     has_room(data, found, without, NOISE, 0.5)
     said = next(why for why in found.fit.reasons if NOISE in why)
     assert 2.0 < float(said.split(NOISE)[1].split()[0]) < 6.0
