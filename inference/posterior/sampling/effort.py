@@ -70,6 +70,8 @@ class Effort:
         proposal's densities (old to new).
     unbends : bool
         Whether the maps follow a curved shape.
+    turned : int
+        Temperatures from one at which members are given an alias anew to the next such.
     """
 
     size: int
@@ -77,6 +79,7 @@ class Effort:
     sweeps: float
     moves: tuple[Move, ...]
     unbends: bool
+    turned: int = 1
 
 
 def effort_of(density: CollapsedDensity) -> Effort:
@@ -104,7 +107,11 @@ def halfway(density: CollapsedDensity) -> Effort:
 
 
 def scouts(size: int) -> Effort:
-    """Return what finds the optima that hold a share of the posterior, and no more."""
+    """Return what finds the optima that hold a share of the posterior, and no more.
+
+    An alias anew at every temperature is a third of their evaluations, and no more of them come to
+    where the posterior is than with one at every fourth.
+    """
     step = functools.partial(_evolve, spread=0.3, noise=0.02, hops=0.0)
     hop = functools.partial(_evolve, noise=0.02, hops=1.0)
-    return Effort(size, 1.0, 2.0, (step, step, step, hop), False)
+    return Effort(size, 1.0, 2.0, (step, step, step, hop), False, turned=4)

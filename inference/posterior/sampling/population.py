@@ -229,7 +229,9 @@ def temper(
         if moves > wanted:
             break
     aliases = aliases_of(density)
-    return population if aliases is None else _turned(density, aliases, population, rng)
+    if aliases is None or population.steps % effort.turned:
+        return population
+    return _turned(density, aliases, population, rng)
 
 
 def _turned(

@@ -27,6 +27,9 @@ _HOT = 0.003  # power of the likelihood, from which on places are remembered
 # temperatures: of 75 wide random sets up to a signal-to-noise ratio of 1e6 none took half as many;
 # readings that no parameters explain are a million nats apart from member to member
 _MOST = 200
+# and of those that stop on their way, who mostly need 20 to 40: who lag behind then are lost in a
+# valley far below the posterior, and what they found there counts for nothing
+_MOST_HALFWAY = 45
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -60,17 +63,18 @@ def send_scouts(
     rng : numpy.random.Generator
         Source of randomness.
     reach : float
-        Power of the likelihood from which on they need not go on.
+        Power of the likelihood from which on they need not go on; below 1 they take fewer
+        temperatures at most, too.
 
     Returns
     -------
     (Scouts, int)
         The scouts, and density evaluations.
     """
-    effort = scouts(_SCOUTS)
+    effort, most = scouts(_SCOUTS), _MOST if reach == 1.0 else _MOST_HALFWAY
     found = first_population(density, rng, effort)
     hot = [found.z[:0]]
-    while not found.ended and found.power < reach and found.steps < _MOST:
+    while not found.ended and found.power < reach and found.steps < most:
         found = temper(density, found, rng, effort)
         if found.power > _HOT:
             hot.append(found.z)

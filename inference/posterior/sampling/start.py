@@ -38,6 +38,8 @@ _ITERATIONS = 60
 _FOLLOWED = 4  # of them, the best, that are climbed on where they are not at the top
 _NEAR = 0.5  # standard deviations within which two optima are one
 _MORE_ITERATIONS = 340  # the valleys of readings a million times above their noise are long
+# of climbs whose ends are climbed on from: the best are then within some nats of their tops
+_BRIEF = (15, 25)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -277,7 +279,7 @@ def _spread_out(points: Array, values: Array, count: int) -> Array:
 
 
 def find_optima(
-    density: CollapsedDensity, rng: np.random.Generator, finish: Finish = refine
+    density: CollapsedDensity, rng: np.random.Generator, *, brief: bool = False
 ) -> list[Optimum]:
     """Find the maxima of the collapsed density that matter, the best first.
 
@@ -287,8 +289,9 @@ def find_optima(
         The density; at least one unknown.
     rng : numpy.random.Generator
         Source of the screen.
-    finish : callable
-        What makes an optimum of the end of a climb: `refine` or `roughly`.
+    brief : bool
+        Whether short climbs are enough, and rough shapes: for what climbs on from there, in
+        coordinates in which the valley is straight.
 
     Returns
     -------
@@ -297,7 +300,10 @@ def find_optima(
     """
     optima: list[Optimum] = []
     visited: list[Optimum] = []
-    ends = _climbed(density, rng)
+    finish, iterations = refine, (_ITERATIONS, _MORE_ITERATIONS)
+    if brief:
+        finish, iterations = roughly, _BRIEF
+    ends = _climbed(density, rng, *iterations)
     for z, value in ends:
         if not np.isfinite(value) or value < ends[0][1] - 60.0:
             continue
@@ -313,12 +319,14 @@ def find_optima(
     return [o for o in optima if o.log_density > optima[0].log_density - 20.0]
 
 
-def _climbed(density: CollapsedDensity, rng: np.random.Generator) -> list[tuple[Array, float]]:
+def _climbed(
+    density: CollapsedDensity, rng: np.random.Generator, iterations: int, more: int
+) -> list[tuple[Array, float]]:
     """Climb the joint density from the best points of the prior; the best ends first."""
     screen = density.parameters.sample(rng, _SCREEN)
     screen[0] = 0.0
     starts = _spread_out(screen, _profile(density, screen)[0], _CLIMBS)
-    ends = sorted((climb(density, start) for start in starts), key=lambda end: -end[1])
+    ends = sorted((climb(density, start, iterations) for start in starts), key=lambda end: -end[1])
     best, others = ends[:_FOLLOWED], ends[_FOLLOWED:]
-    best = [climb(density, z, _MORE_ITERATIONS) for z, value in best if np.isfinite(value)]
+    best = [climb(density, z, more) for z, value in best if np.isfinite(value)]
     return sorted([*best, *others], key=lambda end: -end[1])

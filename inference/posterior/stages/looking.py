@@ -13,7 +13,7 @@ import numpy as np
 from inference.posterior.fitted import fitted_optima
 from inference.posterior.job import Job
 from inference.posterior.sampling.scouts import led_to, send_scouts, thinned
-from inference.posterior.sampling.start import Optimum, find_optima, refine, roughly
+from inference.posterior.sampling.start import Optimum, find_optima, roughly
 from inference.posterior.stages.chunk import is_short_for_scouts
 from inference.posterior.stages.setting_out import HALFWAY
 from inference.posterior.stages.shaping import (
@@ -76,8 +76,7 @@ class LookTask:
         if self.way == "fitted":
             return Looked(Starting(fitted=tuple(fitted_optima(job, density, brief=self.brief))), 0)
         if self.way == "climbed":
-            finish = roughly if self.brief else refine
-            found = find_optima(density, self.job.stream(Stream.SCREEN), finish)
+            found = find_optima(density, self.job.stream(Stream.SCREEN), brief=self.brief)
             return Looked(Starting(climbed=tuple(found)), 0)
         reach = HALFWAY if self.brief else 1.0
         scouts, calls = send_scouts(thinned(density), self.job.stream(Stream.SCOUTS), reach)

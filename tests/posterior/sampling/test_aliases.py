@@ -9,6 +9,8 @@ import scipy
 from inference.density.collapsed import CollapsedDensity, collapsed_density
 from inference.posterior.infer import infer
 from inference.posterior.sampling.aliases import aliases_of, with_aliases
+from inference.posterior.sampling.effort import scouts
+from inference.posterior.sampling.population import first_population, temper
 from inference.posterior.sampling.start import refine
 from inference.posterior.settings import SamplerSettings
 from simulator.errors import RefusedError
@@ -127,6 +129,20 @@ def test_the_move_leaves_the_prior_and_finds_every_weight() -> None:
     seen = np.append(counts[:cut], counts[cut:].sum())
     foreseen = len(z) * np.append(weights[:cut], weights[cut:].sum())
     assert scipy.stats.chisquare(seen, foreseen * seen.sum() / foreseen.sum()).pvalue > 1e-6
+
+
+def test_scouts_are_given_an_alias_anew_at_every_fourth_temperature() -> None:
+    """That is one evaluation of each more than the one or two of their sweeps."""
+    density, effort = _density(SINE, distance_m=WIDE), scouts(64)
+    rng = np.random.default_rng(5)
+    population = first_population(density, rng, effort)
+    sweeps = []
+    while not population.ended:
+        before = population.calls
+        population = temper(density, population, rng, effort)
+        sweeps.append((population.calls - before) // effort.size)
+    assert len(sweeps) > 4
+    assert [count > 2 for count in sweeps] == [step % 4 == 0 for step in range(1, len(sweeps) + 1)]
 
 
 @pytest.mark.parametrize("joint", [None, JOINT], ids=["independent", "joint"])

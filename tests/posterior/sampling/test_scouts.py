@@ -128,3 +128,17 @@ def test_scouts_end_on_their_way_after_so_many_temperatures(
     assert calls <= 4 * scouts._SCOUTS + 3 * 2 * scouts._SCOUTS
     assert np.isfinite(density(found.z)).all()
     assert found.z.std(axis=0).max() > 3.0 * arrived.z.std(axis=0).max()
+
+
+def test_scouts_that_stop_on_their_way_take_fewer_temperatures(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On their way to the whole power the same limit has no say."""
+    density = collapsed_density(*example("pulsed", crosstalk=True))
+    _, before = send_scouts(density, np.random.default_rng(1), 0.9)
+    _, whole = send_scouts(density, np.random.default_rng(1))
+    monkeypatch.setattr(scouts, "_MOST_HALFWAY", 3)
+    _, calls = send_scouts(density, np.random.default_rng(1), 0.9)
+    assert calls < before
+    assert calls <= 4 * scouts._SCOUTS + 3 * 2 * scouts._SCOUTS
+    assert send_scouts(density, np.random.default_rng(1))[1] == whole

@@ -1,5 +1,7 @@
 """Starting points: climbs climb, curvature is that of the density, the screen misses nothing."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -7,8 +9,10 @@ from scipy import stats
 
 from benchmarks.optima_found import missed
 from inference.density.collapsed import CollapsedDensity, collapsed_density
+from inference.density.profile import Linearisation, linearise
 from inference.posterior.sampling.start import climb, find_optima
 from tests.posterior.scenes import KINDS, example
+from tests.posterior.stages.confounded import confounded
 
 Array = NDArray[np.float64]
 
@@ -71,3 +75,21 @@ def test_the_screen_finds_what_a_start_at_the_truth_finds(kind: str, crosstalk: 
     """
     sets = 10
     assert missed(kind, crosstalk, sets, seed=42) <= stats.binom.ppf(0.999, sets, 0.03)
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_short_climbs_come_near_the_top_of_a_long_valley(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ten of at most 15 steps and four of 25 more, and as many shapes as there are optima."""
+    density = confounded(kind=kind).density()
+    steps = []
+
+    def counted(*arguments: Any) -> Linearisation:
+        steps.append(arguments)
+        return linearise(*arguments)
+
+    monkeypatch.setattr("inference.posterior.sampling.start.linearise", counted)
+    brief = find_optima(density, np.random.default_rng(41), brief=True)
+    assert len(steps) <= 10 * 15 + 4 * 25 + 14
+    assert climb(density, brief[0].z, 400)[1] - joint(density, brief[0].z) < 5.0
