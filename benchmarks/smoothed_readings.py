@@ -7,7 +7,8 @@ way away or there and back, at signal-to-noise ratios of 100 to 1000; in most se
 crosstalk, in some after five empty frames. The driver hands on an exponential moving average of i
 and q, as of so many frames. Stated is the noise of the readings before it, or what a sensor at
 rest shows behind it. A line each: fits that say misfit, others whose `assumptions` say that frames
-scatter less than their noise, and how far the worst frame of those is off that say neither.
+scatter less than their noise, how far the worst frame of those is off that say neither, and sets
+whose readings say so by themselves, whatever is asked of them.
 """
 
 import argparse
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from inference.estimate import estimate
 from inference.fits.answer.smoothed import SMOOTHED
+from inference.smoothed_readings import smoothed_readings
 from simulator.constants import SPEED_OF_LIGHT
 from simulator.frames import Frames
 from simulator.object_arrays import object_fluxes
@@ -38,8 +40,12 @@ def smoothed(readings: Array, share: float) -> Array:
     return out
 
 
-def asked(seed: int, over: int, stated: str) -> tuple[bool, bool, float]:
-    """Return whether a set says misfit or that it scatters too little, and its worst frame [sd]."""
+def asked(seed: int, over: int, stated: str) -> tuple[bool, bool, float, bool]:
+    """Return what a set says, and its worst frame [sd].
+
+    That is whether it says misfit, or that frames scatter too little about the fit; at the end
+    whether its readings differ too little from frame to frame.
+    """
     rng = np.random.default_rng([9, seed])
     n = int(rng.integers(24, 60))
     low = float(np.exp(rng.uniform(np.log(0.15), np.log(0.5))))
@@ -68,12 +74,14 @@ def asked(seed: int, over: int, stated: str) -> tuple[bool, bool, float]:
     scene: dict[str, Any] = {"crosstalk": [wide, wide]} if behind else {}
     frames = Frames(np.vstack(parts), object_present=np.arange(empty + n) >= empty)
     found = estimate(sensor, parse_scene(scene), frames, ["joint_fit"])
+    alone = smoothed_readings(sensor, frames) is not None
     if not found.results:
-        return False, False, np.nan
+        return False, False, np.nan, alone
     (result,) = found.results
     off = np.abs(result.range_m[empty:] - ranges) / result.sd_m[empty:]
     worst = float(np.nanmax(off)) if np.isfinite(off).any() else np.nan
-    return bool(result.fit and result.fit["misfit"]), SMOOTHED in found.assumptions, worst
+    misfit = bool(result.fit and result.fit["misfit"])
+    return misfit, SMOOTHED in found.assumptions, worst, alone
 
 
 def main() -> None:
@@ -81,17 +89,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sets", type=int, default=12)
     sets = parser.parse_args().sets
-    print("| smoothed over | noise | misfit | says scatter | of the others beyond 4 sd, worst |")
-    print("|---|---|---|---|---|")
+    print(
+        "| smoothed over | noise | misfit | says scatter | of the others beyond 4 sd, worst "
+        "| readings alone |"
+    )
+    print("|---|---|---|---|---|---|")
     for over, stated in WAYS:
         found = [asked(seed, over, stated) for seed in range(sets)]
-        misfit = sum(one for one, _, _ in found)
-        said = sum(other and not one for one, other, _ in found)
-        rest = np.array([worst for one, other, worst in found if not (one or other)] or [np.nan])
+        misfit = sum(one for one, _, _, _ in found)
+        said = sum(other and not one for one, other, _, _ in found)
+        silent = [worst for one, other, worst, _ in found if not (one or other)]
+        rest, alone = np.array(silent or [np.nan]), sum(each for _, _, _, each in found)
         worst = f"{np.nanmax(rest):.1f} sd" if np.isfinite(rest).any() else "-"
         print(
             f"| {over} | {stated} | {misfit} of {sets} | {said} "
-            f"| {np.count_nonzero(rest > 4.0)} of {np.count_nonzero(np.isfinite(rest))}, {worst} |",
+            f"| {np.count_nonzero(rest > 4.0)} of {np.count_nonzero(np.isfinite(rest))}, {worst} "
+            f"| {alone} of {sets} |",
             flush=True,
         )
 

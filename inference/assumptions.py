@@ -11,6 +11,7 @@ from inference.frame.taken_for_crosstalk import TAKEN_FOR_CROSSTALK, taken_for_c
 from inference.growing_light import growing_light
 from inference.impossible_light import impossible_light
 from inference.known import known_of
+from inference.smoothed_readings import smoothed_readings
 from inference.stuck_readings import stuck_readings
 from simulator.frames import Frames
 from simulator.scene import Scene
@@ -54,7 +55,7 @@ def assumptions_of(scene: Scene, sensor: Sensor, frames: Frames) -> tuple[str, .
     doubt = impossible_light(scene, sensor, frames) or growing_light(scene, sensor, frames)
     if doubt:
         supposed = (doubt,)
-    if doubt := stuck_readings(sensor, frames):
+    if doubt := stuck_readings(sensor, frames) or smoothed_readings(sensor, frames):
         supposed = (*supposed, doubt)
     if scene.shadow_is_object:
         supposed = (*supposed, _OWN_SHADOW)

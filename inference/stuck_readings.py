@@ -10,7 +10,7 @@ from inference.realtime.net import ABSENT, SATURATED, rule_out
 from simulator.frames import Frames
 from simulator.sensor import Sensor
 
-__all__ = ["stuck_readings"]
+__all__ = ["coarsest_step", "stuck_readings"]
 
 Array = NDArray[np.float64]
 
@@ -105,11 +105,11 @@ def _equal(seen: _Seen, gain: float, at: Array) -> float:
     p = 1.0
     for k, read in enumerate(seen.read.tolist()):
         # a normal law has no more than that within a step about its middle
-        p *= math.erf(_step(of[:, k], at[k], read) / (2.0 * math.sqrt(2.0) * read))
+        p *= math.erf(coarsest_step(of[:, k], at[k], read) / (2.0 * math.sqrt(2.0) * read))
     return max(p, 1e-300)
 
 
-def _step(values: Array, at: float, read: float) -> float:
+def coarsest_step(values: Array, at: float, read: float) -> float:
     """Return the coarsest step that readings at a value may have been rounded to; inf: any.
 
     All readings differ by multiples of it, to a fifth. Of steps that grow with the reading, as of
@@ -143,7 +143,9 @@ def _still(sensor: Sensor, seen: _Seen, empty: NDArray[np.bool_]) -> str | None:
     small = np.sqrt(np.square(away).sum(axis=0) / (n - 1)) / read
     for k in np.flatnonzero(small < _WORTH):
         # rounding moves a reading by half a step at most
-        step = _step(seen.readings[:, k], float(np.median(np.abs(bare[:, k]))), float(read[k]))
+        step = coarsest_step(
+            seen.readings[:, k], float(np.median(np.abs(bare[:, k]))), float(read[k])
+        )
         most = math.sqrt(n - 1) * small[k] + math.sqrt(n) * step / (2.0 * read[k])
         import scipy  # as above
 

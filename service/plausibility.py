@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inference.assumptions import doubtful_unit
+from inference.smoothed_readings import smoothed_readings
 from simulator.frames import Frames
 from simulator.sensor import Sensor
 
@@ -52,6 +53,8 @@ def doubts(sensor: Sensor, frames: Frames | None = None) -> list[str]:
     found = [] if doubt is None else [doubt]
     if frames is not None:
         found += noise_doubts(sensor, frames.readings)
+        if doubt := smoothed_readings(sensor, frames):
+            found.append(doubt)
         if frames.time_s is not None:
             found += time_doubts(frames.time_s)
     return found

@@ -86,7 +86,7 @@ def _run(args: argparse.Namespace) -> int:
                 f"(misfit, p value {result.fit['p_value']:.2g}): "
                 f"{'; '.join(result.fit['reasons'])}",
             )
-    doubted = doubts(sensor)  # said already
+    doubted = doubts(sensor, frames)  # said already
     for supposed in estimates.assumptions:
         if supposed not in doubted:
             note(args, f"note: {supposed}")

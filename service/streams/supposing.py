@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from inference.assumptions import unused_temperature
+from inference.smoothed_readings import smoothed_readings
 from service.plausibility import LOOKED, noise_doubts, time_doubts
 from simulator.frames import Frames
 from simulator.sensor import Sensor
@@ -83,4 +84,6 @@ def _doubts(sensor: Sensor, early: Sequence[Sequence[float]]) -> Iterator[str]:
     """Yield what looks like a mistake."""
     rows = np.array(early)
     yield from noise_doubts(sensor, rows[:, :2])
+    if doubt := smoothed_readings(sensor, Frames(rows[:, :2])):
+        yield doubt
     yield from time_doubts(rows[:, 2:].ravel())

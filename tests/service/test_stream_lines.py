@@ -3,16 +3,17 @@
 import asyncio
 import itertools
 import json
-import math
 import time
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.smoothed_readings import smoothed
 from inference.tracking.tracker import Tracker, tracker
 from service.errors import MalformedError
 from service.streams import room
@@ -313,6 +314,24 @@ def test_kept_numbers_are_the_same_answers(model: Tracker) -> None:
     assert 2 * len(small.kept) < sum(map(len, small.answers))
 
 
+def _noisy(n: int) -> list[dict[str, float]]:
+    """Readings of an object at rest, with the stated noise."""
+    light = [0.02, 1.7] + 1e-6 * np.random.default_rng(1).standard_normal((n, 2))
+    return [{"w1": w1, "w2": w2} for w1, w2 in light.tolist()]
+
+
+def test_readings_that_a_driver_smooths_are_told_of_once(model: Tracker) -> None:
+    """With the 32nd frame, however the lines are cut."""
+    late = smoothed(np.array([list(row.values()) for row in _noisy(50)]), 0.25)
+    lines = [frame(n, w1=w1, w2=w2) for n, (w1, w2) in enumerate(late.tolist())]
+    whole = answered(model, [lines])
+    assert [n for n, line in enumerate(whole) if "assumptions" in line] == [31]
+    (said,) = whole[31]["assumptions"]
+    assert said.startswith("w1 and w2 differ from frame to frame by less than read noise alone")
+    cut = [lines[at : at + 7] for at in range(0, len(lines), 7)]
+    assert answered(model, cut) == whole
+
+
 def test_noise_below_the_rounding_is_told_once(model: Tracker) -> None:
     """With the 32nd frame, however the lines are cut, and none of readings that are not rounded."""
     lines = [frame(n, w1=round(0.02 + 1e-3 * (n % 7), 3)) for n in range(1, 50)]
@@ -325,13 +344,13 @@ def test_noise_below_the_rounding_is_told_once(model: Tracker) -> None:
     for size in (1, 7, 32, 33):
         cut = [lines[at : at + size] for at in range(0, len(lines), size)]
         assert answered(model, cut) == whole
-    fine = [frame(n, w1=0.02 + math.sin(n) / 1e6, w2=1.7 + math.cos(n) / 1e6) for n in range(50)]
+    fine = [frame(n, **readings) for n, readings in enumerate(_noisy(50))]
     assert not any("assumptions" in line for line in answered(model, [fine]))
 
 
 def test_times_in_milliseconds_are_told_once(model: Tracker) -> None:
     """With the 32nd frame, however the lines are cut."""
-    fine = [{"w1": 0.02 + math.sin(n) / 1e6, "w2": 1.7 + math.cos(n) / 1e6} for n in range(50)]
+    fine = _noisy(50)
     lines = [frame(n, time_s=33 * n + n // 3, **fine[n]) for n in range(1, 50)]
     whole = answered(model, [lines])
     assert [n for n, line in enumerate(whole) if "assumptions" in line] == [31]
