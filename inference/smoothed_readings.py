@@ -85,7 +85,8 @@ def _rounding(values: Array, read: float) -> float:
 @functools.lru_cache(maxsize=_BLOCK)
 def _eigenvalues(count: int) -> Array:
     """Return the variances of independent sums that differences of unit noise are made of."""
-    return np.square(np.linalg.svd(np.diff(np.eye(count), _ORDER, axis=0), compute_uv=False))
+    differences = np.diff(np.eye(count), _ORDER, axis=0)
+    return np.asarray(np.square(np.linalg.svd(differences, compute_uv=False)))
 
 
 def _log_often(square: float, of_noise: Array) -> float:

@@ -101,7 +101,7 @@ def test_a_noise_stated_half_again_too_large_is_only_cautious() -> None:
 def test_rounding_to_steps_of_the_noise_is_no_smoothness() -> None:
     """Of an object at rest: few frames read the other of two steps, many noises of it wide."""
     rng = np.random.default_rng(5)
-    step = (rng.random((60, 2)) < 0.1) * READ
+    step = np.where(rng.random((60, 2)) < 0.1, READ, 0.0)
     assert np.square(np.diff(0.5 * step, 4, axis=0) / READ).mean() < 0.25 * 70.0
     assert smoothed_readings(_sensor(), Frames(0.7 + 0.5 * step)) is None
     # as much from frame to frame, and no steps
