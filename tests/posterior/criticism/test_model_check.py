@@ -7,7 +7,9 @@ import pytest
 
 from benchmarks.coverage.paths import PathSet, draw_path
 from benchmarks.larger_errors import TOLD, answers, sampled, understated
+from inference.density.collapsed import CollapsedDensity
 from inference.density.discrepant import DiscrepantDensity
+from inference.identifiability import joint_optimum as climbs
 from inference.identifiability.experiment import Experiment
 from inference.identifiability.joint_optimum import joint_optimum
 from inference.identifiability.response_rows import ResponseRows
@@ -18,6 +20,7 @@ from inference.posterior.answer.posterior import Posterior
 from inference.posterior.answer.where_misfit import where_integrated
 from inference.posterior.answer.widened import widened
 from inference.posterior.criticism.discrepancy_check import MISFIT, LargerDiscrepancy
+from inference.posterior.criticism.fit_residuals import fit_residuals
 from inference.posterior.criticism.model_check import (
     LARGEST,
     asked_for,
@@ -33,6 +36,7 @@ from simulator.scene import parse_scene
 SNR = 3e4
 SET = draw_path("independent", "crosstalk", TOLD, 5, SNR)
 ROUNDING = 1e-9
+SMALL = 1e-3  # errors of the flux, in standard deviations: all follow them linearly
 
 
 FLUX, NOISE = "has room for errors of the object's flux", "is as wide as noise"
@@ -161,8 +165,10 @@ def test_draws_are_widened_by_a_factor_of_their_variance() -> None:
     assert np.allclose(of_log_r[4], 0.0, atol=ROUNDING)
 
 
-def best_by_least_squares(at: Experiment, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return where readings with small errors put unknowns and ranges that are zero without them.
+def best_by_least_squares(
+    at: Experiment, error: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return where readings with small errors put unknowns, ranges and errors that are zero there.
 
     A linear problem, with the ranges as unknowns as well, none eliminated.
     """
@@ -177,7 +183,32 @@ def best_by_least_squares(at: Experiment, error: np.ndarray) -> tuple[np.ndarray
     seen = np.append((rows.by_error @ error).ravel(), np.zeros(d + k))
     size = np.linalg.norm(whole, axis=0)
     found = np.linalg.lstsq(whole / size, seen, rcond=None)[0] / size
-    return found[:d], found[d + k :]
+    return found[:d], found[d + k :], found[d : d + k]
+
+
+def erring_a_little(job: Job) -> tuple[CollapsedDensity, Experiment, np.ndarray]:
+    """Return a density of readings without noise, the middle of its priors, and the flux's error.
+
+    All of them are at that middle but for this error.
+    """
+    density = job.density()
+    middle, true = np.zeros(len(density.parameters)), np.log(SET.range_m)
+    begin = Experiment(density.sensor, density.parameters, middle, true, discrepancy=DISCREPANCY_SD)
+    error = SMALL * np.random.default_rng(3).standard_normal(begin.by_error.shape[2])
+    frames = density.frames.copy()
+    frames[:, :2] = dataclasses.replace(begin, error=error).readings.mean
+    return dataclasses.replace(density, frames=frames), begin, error
+
+
+@pytest.mark.parametrize("times", [1.0, 3.0])
+def test_residuals_allow_for_errors_of_the_flux_as_large_as_readings_ask_for(times: float) -> None:
+    """Errors of three times the size are fewer standard deviations of it, by a linear fit."""
+    job = dataclasses.replace(job_of(SET), flux_times=times)
+    density, begin, error = erring_a_little(job)
+    found = fit_residuals(job, density, begin.z, 2, np.random.default_rng(1)).error[0]
+    larger = dataclasses.replace(begin, discrepancy=times * DISCREPANCY_SD)
+    *_, best = best_by_least_squares(larger, error / times)
+    assert found == pytest.approx(np.square(best).sum(), rel=5.0 * SMALL)
 
 
 @pytest.mark.parametrize("times", [1.001, 4.0])
@@ -185,25 +216,17 @@ def test_all_draws_move_to_the_best_point_and_are_as_uncertain_as_the_way_is_lon
     times: float,
 ) -> None:
     """From all around, to the point that errors of that size put there: all is small and linear."""
-    small, rng = 1e-3, np.random.default_rng(3)
-    density = job_of(SET).with_error_integrated().density()
+    rng = np.random.default_rng(3)
+    density, begin, error = erring_a_little(job_of(SET).with_error_integrated())
     assert isinstance(density, DiscrepantDensity)
-    d, true = len(density.parameters), np.log(SET.range_m)
-    begin = Experiment(
-        density.sensor, density.parameters, np.zeros(d), true, discrepancy=density.discrepancy
-    )
-    error = small * rng.standard_normal(begin.by_error.shape[2])
-    readings = dataclasses.replace(begin, error=error).readings.mean
-    frames = density.frames.copy()
-    frames[:, :2] = readings
-    density = dataclasses.replace(density, frames=frames)
-    z = small * rng.standard_normal((5, d))
+    small, readings, true = SMALL, density.frames[:, :2], begin.log_r
+    z = small * rng.standard_normal((5, begin.z.size))
     log_r = true + small * (1.0 + 0.2 * rng.standard_normal((5, true.size)))
     draws = zip(z, log_r, strict=True)
     at = [dataclasses.replace(begin, z=one, log_r=ranges) for one, ranges in draws]
     of_z, of_log_r = where_integrated(density, at, readings, (z, log_r), times)
     larger = dataclasses.replace(begin, discrepancy=times * density.discrepancy)
-    best = best_by_least_squares(larger, error / times)
+    best = best_by_least_squares(larger, error / times)[:2]
     there = np.median(z, axis=0) + of_z[:, 0], np.median(log_r, axis=0) + of_log_r[:, 0] - true
     for found, expected, moved, drawn in zip(
         there, best, (of_z, of_log_r), (z, log_r), strict=True
@@ -238,12 +261,16 @@ def test_where_frames_are_dealt_out_no_part_climbs(monkeypatch: pytest.MonkeyPat
 
 
 def test_a_climb_whose_steps_lead_out_of_all_numbers_stays_in_them() -> None:
-    """From the middle of the priors one step leads to a c0 of zero."""
+    """Towards readings a hundred times as bright one step leads to a c2 of e^80."""
     density = job_of(SET).with_error_integrated().density()
-    z = 0.1 * np.random.default_rng(2).standard_normal((8, len(density.parameters)))[2]
-    log_r = density.best_ranges(z[None])[0, :, 0]
-    larger = 4.0 * DISCREPANCY_SD
-    at = Experiment(density.sensor, density.parameters, z, log_r, discrepancy=larger)
-    end, deviance = joint_optimum(at, density.frames[:, :2])
+    d, larger = len(density.parameters), 4.0 * DISCREPANCY_SD
+    at = Experiment(
+        density.sensor, density.parameters, np.zeros(d), np.log(SET.range_m), discrepancy=larger
+    )
+    at = dataclasses.replace(at, error=np.zeros(at.by_error.shape[2]))
+    readings = 100.0 * at.readings.mean
+    one = climbs._stepped(ResponseRows(at), readings, 0.0)
+    assert np.abs(one.z).max() == climbs._FARTHEST
+    end, deviance = joint_optimum(at, readings)
     assert np.isfinite(deviance)
     assert end.finite
