@@ -51,7 +51,7 @@ def disturbed(frames: Frames, *places: int) -> Frames:
     [
         pytest.param("pulsed", (12,), marks=pytest.mark.thorough),
         ("pulsed", (9, 17)),
-        ("sine_wave", (26,)),
+        pytest.param("sine_wave", (26,), marks=pytest.mark.thorough),
     ],
 )
 def test_frames_of_something_else_are_named(kind: str, places: tuple[int, ...]) -> None:
@@ -97,7 +97,7 @@ def test_a_gain_that_nobody_measured_is_thought_of() -> None:
     assert "gain" in text
 
 
-@pytest.mark.parametrize("places", [(2,), (9, 20)])
+@pytest.mark.parametrize("places", [pytest.param((2,), marks=pytest.mark.thorough), (9, 20)])
 def test_frames_that_read_zero_are_named_where_they_bend_the_fit(places: tuple[int, ...]) -> None:
     """Of an empty frame at zero, or two that hide one another, nothing is linear any more."""
     sensor, frames = frames_of("sine_wave")
