@@ -5,8 +5,11 @@ import pytest
 from scipy import special
 
 import hybridtof
+from inference.fits.likelihood.erring_climb import FEW, begun, climbed, with_other_ranges
+from inference.fits.likelihood.problem import fit_problem
 from simulator.model_error import ModelError
-from tests.fits.random_sets import random_set
+from tests.fits.random_sets import RandomSet, random_set
+from tests.fits.scenes import values_of
 from tests.thorough import first
 
 _DEFAULT = ModelError.stated(None)
@@ -48,7 +51,36 @@ def test_intervals_by_default_hold_the_truth_behind_errors_of_the_default(
     assert np.square(medians).sum() < special.chdtri(len(medians), 1e-3)
 
 
-@pytest.mark.parametrize(("kind", "decades"), [("pulsed", 6.0), ("sine_wave", 7.0)])
+def bright_set(kind: str, decades: float) -> RandomSet:
+    errors = {"flux": _DEFAULT.flux, "range_m": _DEFAULT.range_m}
+    return random_set("crosstalk", kind, 7, "default", errors, (decades, decades))
+
+
+@pytest.mark.parametrize(
+    ("kind", "decades", "places", "farther"),
+    [("pulsed", 6.0, (5, 20), 1.8), ("sine_wave", 7.0, (12, 22), 2.0)],
+)
+def test_a_climb_comes_back_from_other_ranges_of_two_frames(
+    kind: str, decades: float, places: tuple[int, int], farther: float
+) -> None:
+    """These are six to seven times too far, and bend everything else towards themselves."""
+    one = bright_set(kind, decades)
+    problem = fit_problem(one.sensor, one.scene, one.simulation.frames)
+    true = values_of(one.sensor, one.truth)
+    x = problem.coordinates(np.array([[true[name] for name in problem.names]]))[0]
+    positions = np.log(one.simulation.range_m)
+    top, _ = climbed(problem, begun(problem, x, positions), 30)
+    positions[list(places)] += farther
+    at, _ = climbed(problem, begun(problem, x, positions), FEW)
+    assert at.deviance > 1e6 + top.deviance
+    back = with_other_ranges(problem, at, x, positions)
+    assert back.deviance == pytest.approx(top.deviance, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "decades"),
+    [("pulsed", 6.0), pytest.param("sine_wave", 7.0, marks=pytest.mark.thorough)],
+)
 def test_a_frame_that_errors_turn_into_another_range_bends_no_fit(
     kind: str, decades: float
 ) -> None:
@@ -57,8 +89,7 @@ def test_a_frame_that_errors_turn_into_another_range_bends_no_fit(
     From there no climb comes back: the best end was 42 % too far, or none was a top. A median of
     |z| of frames that share their errors is above 3.3 in 1e-3 of sets.
     """
-    errors = {"flux": _DEFAULT.flux, "range_m": _DEFAULT.range_m}
-    one = random_set("crosstalk", kind, 7, "default", errors, (decades, decades))
+    one = bright_set(kind, decades)
     answer = hybridtof.estimate(one.sensor, one.scene, one.simulation.frames, ["joint_fit"])
     (result,) = answer.results
     assert result.fit is not None
