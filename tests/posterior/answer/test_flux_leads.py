@@ -9,7 +9,7 @@ from benchmarks.coverage.paths import draw_path
 from inference.identifiability.model_response import model_response
 from inference.posterior import fold
 from inference.posterior.answer import error_budget
-from inference.posterior.answer.responses import Responses, flux_leads
+from inference.posterior.answer.responses import Responses, flux_leads, responses_at
 from inference.posterior.criticism.discrepancy_check import ADDED
 from inference.posterior.settings import SamplerSettings
 from simulator.scene import parse_scene
@@ -54,7 +54,7 @@ def test_which_of_them_leads_is_asked_where_the_response_bends(
     density = job.density()
     z = np.zeros((3, len(density.parameters)))
     log_r = density.best_ranges(z)[:, :, 0]
-    follow = error_budget.responses_at
+    follow = responses_at
 
     def bent(*arguments: object) -> Responses:
         found = follow(*arguments)  # type: ignore[arg-type]

@@ -73,7 +73,7 @@ def erring_a_little(job: Job) -> tuple[CollapsedDensity, Experiment, np.ndarray]
     density = job.density()
     middle, true = np.zeros(len(density.parameters)), np.log(SET.range_m)
     begin = Experiment(density.sensor, density.parameters, middle, true, discrepancy=DISCREPANCY_SD)
-    error = SMALL * np.random.default_rng(3).standard_normal(begin.by_error.shape[2])
+    error = SMALL * np.random.default_rng(3).standard_normal((begin.by_error.shape[2],))
     frames = density.frames.copy()
     frames[:, :2] = dataclasses.replace(begin, error=error).readings.mean
     return dataclasses.replace(density, frames=frames), begin, error
