@@ -5,6 +5,7 @@ import pytest
 from scipy import special
 
 import hybridtof
+from inference.fits.likelihood import erring_point
 from inference.fits.likelihood.erring_climb import FEW, begun, climbed, with_other_ranges
 from inference.fits.likelihood.problem import fit_problem
 from simulator.model_error import ModelError
@@ -100,8 +101,21 @@ def test_a_frame_that_errors_turn_into_another_range_bends_no_fit(
     assert np.median(misses / result.range_m) < 0.02
 
 
-def test_a_frame_without_late_light_beside_frames_of_little_noise_is_answered() -> None:
+def test_errors_a_hundred_million_times_the_noise_have_a_root() -> None:
     """The covariance of the noise, 1, is no part of a double beside squared errors of 1e16."""
+    along = np.array([[0.0, 0.0], [3.0, 4.0], [3e8, 4e8], [1e8, 1e-9]])
+    left = along[:, :, None] * along[:, None, :]
+    root = erring_point._root_of(left)
+    np.testing.assert_array_equal(root[0], np.eye(2))
+    assert np.diagonal(root, axis1=1, axis2=2).min() >= 1.0
+    for one, whole in zip(root, left, strict=True):
+        expected, size = whole + np.eye(2), 1.0 + np.trace(whole)
+        np.testing.assert_allclose(one @ one.T, expected, atol=2e-12 * size)
+
+
+@pytest.mark.thorough
+def test_a_frame_without_late_light_beside_frames_of_little_noise_is_answered() -> None:
+    """Of four frames, of which one is next to nothing: fits and techniques answer or refuse."""
     noise = {"read": [1e-6, 1e-6], "derivative": [1e-5, 1e-5]}
     sensor = hybridtof.parse_sensor({"kind": "pulsed", "pulse_width_s": 1e-7, "noise": noise})
     crosstalk = [{"prior": "normal", "mean": 0.0, "sd": 0.1}] * 2
