@@ -6,11 +6,13 @@ import pytest
 import hybridtof
 from benchmarks.random_sets.sets import random_set
 from inference.estimates import TechniqueResult
+from inference.fits.likelihood import erring_climb
 from inference.fits.likelihood.erring_climb import begun, climbed
-from inference.fits.likelihood.erring_point import linearised
+from inference.fits.likelihood.erring_point import linearised, point_at
 from inference.fits.likelihood.frame_modes import frame_modes
 from inference.fits.likelihood.model_error import number_of_errors
 from inference.fits.likelihood.other_starts import apart
+from inference.fits.likelihood.pairs import solved_by_root
 from inference.fits.likelihood.problem import FitProblem, fit_problem
 from tests.posterior.scenes import OBJECT, SIGNAL_AT_1M, UNKNOWN_CROSSTALK
 
@@ -34,7 +36,9 @@ def answered(seed: int, farthest_m: float, understated: float) -> tuple[Techniqu
     return result, float(off.max(initial=0.0))
 
 
-@pytest.mark.parametrize("seed", [0, 2, 3])
+@pytest.mark.parametrize(
+    "seed", [3, *(pytest.param(k, marks=pytest.mark.thorough) for k in (0, 2))]
+)
 def test_noise_that_is_understated_is_a_misfit_or_fits(seed: int) -> None:
     """It was refused: what ranges beyond the end would still gain was waited for."""
     result, off = answered(seed, 1.49, 2.0)
@@ -56,6 +60,7 @@ def wall_problem(number: int) -> FitProblem:
     return fit_problem(one.sensor, hybridtof.parse_scene(one.scene), one.frames)
 
 
+STEP = 1e-6  # of a coordinate
 # c0, c1 and c2, crosstalk, strength of the wall, c0' of its shadow: where climbs came to
 NEAR_A_WALL = (0.035, 0.11, 0.051, -1.5e-4, 9.6e-3, 8.1e-3, 0.035)
 
@@ -91,6 +96,49 @@ def test_slopes_of_ranges_at_an_end_are_those_beside_it() -> None:
         )
         assert np.abs(at).min(axis=0).max() > 0.0
         np.testing.assert_allclose(at, beside, rtol=1e-4)
+
+
+def test_a_range_at_the_nearest_that_a_shadow_allows_is_taken_along_with_it() -> None:
+    """What a step is computed from: differences of readings whose range is -c1' there, too."""
+    problem = wall_problem(105)
+    x = problem.coordinates(np.array([[*NEAR_A_WALL, -0.15]]))[0]
+    begin = begun(problem, x, frame_modes(problem, x)[0][:, 0])
+    low, _ = problem.log_ends(x)
+    frame = np.flatnonzero(begin.u <= low)
+    assert frame.size == 1
+    one = problem.select(frame)
+    at = point_at(one, x, np.array([low]), begin.a)
+    seen = erring_climb._eliminated(one, at)
+    for j, step in enumerate(STEP * np.eye(x.size)):
+        ends = []
+        for there in (x + step, x - step):
+            nearest, _ = one.log_ends(there)
+            end = point_at(one, there, np.array([nearest]), begin.a)
+            # in units of the noise here
+            white = solved_by_root(at.root, end.root @ end.residual[:, :, None])
+            ends.append((nearest, white[0, :, 0]))
+        (above, misses), (below, falls_short) = ends
+        slope = (falls_short - misses) / (2.0 * STEP)
+        size = float(np.abs(slope).max())
+        # central differences err as the step's square, and roundings as eps over the step
+        np.testing.assert_allclose(seen.jacobian[:, j], slope, rtol=1e-4, atol=1e-4 * size)
+        assert seen.response[0, j] == pytest.approx((above - below) / (2.0 * STEP), abs=1e-5)
+
+
+def test_what_a_range_would_gain_beyond_an_end_no_step_takes() -> None:
+    """Whichever way residuals pull it: towards the inside it is free, beyond the end it stays."""
+    problem = wall_problem(105)
+    x = problem.coordinates(np.array([[*NEAR_A_WALL, 0.01]]))[0]
+    for end, beyond in zip(problem.log_support, (-1.0, 1.0), strict=True):
+        one = problem.select(np.array([3]))
+        at = point_at(one, x, np.array([end]), np.zeros(number_of_errors(one)))
+        assert problem.log_ends(x) == problem.log_support
+        for pulled in (at, at._replace(residual=-at.residual)):
+            wanted = float((pulled.along * pulled.residual).sum())
+            seen = erring_climb._eliminated(one, pulled)
+            stays = wanted * beyond > 0
+            assert (not seen.response.any()) == stays
+            assert len(seen.jacobian) == (2 if stays else 1)  # what its range explains is left
 
 
 def test_climbs_of_one_place_are_followed_after_those_of_others() -> None:

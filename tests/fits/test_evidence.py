@@ -63,6 +63,7 @@ def test_a_narrow_maximum_is_no_answer(seed: int, number: int) -> None:
     assert off(one, fitted(one)) < 4.0
 
 
+@pytest.mark.thorough
 def test_crosstalk_reaches_to_where_a_frame_in_the_dark_is_bright() -> None:
     """Its w2 was 6.4 sd off: the darkest frame had gone to the end of the ranges, and stayed there.
 

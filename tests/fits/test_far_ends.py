@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from inference.estimate import estimate
-from inference.estimates import Status
+from inference.estimates import Status, TechniqueResult
 from inference.fits.answer import likelihood_answer
 from inference.fits.likelihood.erring import Erring, erring_maxima, softened
 from inference.fits.likelihood.erring_climb import begun, climbed
@@ -29,11 +29,27 @@ def fitted() -> tuple[FitProblem, Erring]:
     return problem, erring_maxima(problem, find_starts(problem, softened(problem)))[0]
 
 
+@functools.cache
+def answered(seed: int) -> tuple[TechniqueResult, list[tuple[FitProblem, Erring]]]:
+    """Return a fit of frames that may be dark, and what it asked for the costs of ends for."""
+    asked: list[tuple[FitProblem, Erring]] = []
+
+    def noted(problem: FitProblem, top: Erring, *rest: Any) -> Any:
+        asked.append((problem, top))
+        return far_ends(problem, top, *rest)
+
+    one = far_set("pulsed", seed)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(likelihood_answer, "far_ends", noted)
+        found = estimate(one.sensor, one.scene, one.simulation.frames, ["joint_fit"])
+    (result,) = found.results
+    return result, asked
+
+
 @pytest.mark.parametrize("seed", [100, pytest.param(139, marks=pytest.mark.thorough)])
 def test_dark_frames_behind_told_crosstalk_are_not_sure_and_wrong(seed: int) -> None:
     """They were `unique`, 17 and 40 standard deviations nearer than the truth, without a misfit."""
-    one = far_set("pulsed", seed)
-    (result,) = estimate(one.sensor, one.scene, one.simulation.frames, ["joint_fit"]).results
+    one, (result, _) = far_set("pulsed", seed), answered(seed)
     assert result.fit is not None
     assert not result.fit["misfit"]
     away = np.abs(result.range_m - one.simulation.range_m) / result.sd_m
@@ -61,18 +77,9 @@ def test_ends_cost_what_long_climbs_find() -> None:
             assert cost > 9.0
 
 
-def test_few_dark_frames_stand_for_many(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_few_dark_frames_stand_for_many() -> None:
     """Of ten that are dark five are held; between these costs follow how dark a frame is."""
-    asked: list[tuple[FitProblem, Erring, float]] = []
-
-    def noted(*given: Any) -> Any:
-        asked.append(given)
-        return far_ends(*given)
-
-    monkeypatch.setattr(likelihood_answer, "far_ends", noted)
-    one = far_set("pulsed", 100)
-    estimate(one.sensor, one.scene, one.simulation.frames, ["joint_fit"])
-    ((problem, top, _),) = asked
+    _, ((problem, top),) = answered(100)
     rises = far_ends(problem, top)
     dark = np.flatnonzero(np.isfinite(rises))
     assert dark.size >= 8

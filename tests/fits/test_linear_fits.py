@@ -92,10 +92,10 @@ def test_a_linear_fit_is_the_joint_fit_to_first_order(
 
 @pytest.mark.parametrize("noise", [{}, {"shot": 1e-9, "relative": 1e-3}])
 def test_object_fit_attains_its_stated_scatter(noise: dict[str, float]) -> None:
-    """(x - truth)^T C^-1 (x - truth) over 200 sets, of each parameter alone; false alarm 1e-5."""
+    """(x - truth)^T C^-1 (x - truth) over 100 sets, of each parameter alone; false alarm 1e-5."""
     sensor = sensor_of("pulsed", 3e3, **noise)
     truth = {"object": OBJECT}
-    sets = 200
+    sets = 100
     total = dict.fromkeys(("object.c0", "object.c1", "object.c2"), 0.0)
     chi_square = 0.0
     for seed in range(sets):

@@ -1,12 +1,20 @@
 """Frames at one place share what following errors of the model leaves of them."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import hybridtof
 from benchmarks.random_sets.sets import random_set
-from inference.fits.likelihood.places import places_of
+from inference.fits.likelihood.erring_point import linearised
+from inference.fits.likelihood.model_error import own_share_left, share_left
+from inference.fits.likelihood.places import Places, places_of
+from inference.fits.likelihood.problem import fit_problem
 from inference.frame.arguments import Instrument
+from simulator.discrepancy import NEGLECTED
+from tests.fits.random_sets import random_set as drawn
+from tests.fits.scenes import values_of
 
 
 def _places(shot: float | None, gain: float, relative: float = 0.0) -> list[int]:
@@ -48,6 +56,32 @@ def test_frames_along_a_path_are_at_no_place() -> None:
     assert places_of(apart, np.ones(len(apart), dtype=bool), at) is None
 
 
+def test_what_errors_leave_of_frames_at_one_place_is_one_error_of_all_of_them() -> None:
+    """As large as that of a frame that is alone, which is its own."""
+    errors = {"flux": 0.07, "range_m": 1e-3}
+    one = drawn("crosstalk", "pulsed", 3, errors, errors)
+    alone = fit_problem(one.sensor, one.scene, one.simulation.frames)
+    known, u = values_of(one.sensor, one.truth), np.log(one.simulation.range_m)
+    x = alone.coordinates(np.array([[known[name] for name in alone.names]]))[0]
+    of_frame = np.full(u.size, -1)
+    for place, there in enumerate(([0, 4, 7], [2, 5])):
+        of_frame[there], u[there] = place, u[there[0]]
+    together = dataclasses.replace(alone, places=Places(of_frame, 2))
+    own, both = (linearised(problem, x, u)[3] for problem in (alone, together))
+    np.testing.assert_array_equal(both[:, :, : own.shape[2]], own)
+    share, shared = share_left(alone, u), both[:, :, own.shape[2] :]
+    np.testing.assert_allclose(own_share_left(together, u), np.where(of_frame < 0, share, 0.0))
+    found = np.einsum("nik,mjk->nmij", shared, shared)
+    single = share * np.einsum("nik,njk->nij", own, own)
+    same = (of_frame[:, None] == of_frame) & (of_frame >= 0)
+    assert not found[~same].any()
+    for n, m in zip(*np.nonzero(same), strict=True):
+        # functions of log r leave that much of the variance out
+        size = float(np.abs(single[n]).max())
+        np.testing.assert_allclose(found[n, m], single[n], atol=2.0 * NEGLECTED * size)
+
+
+@pytest.mark.thorough
 @pytest.mark.parametrize("number", [22, 80])
 def test_another_optimum_behind_less_crosstalk_is_found(number: int) -> None:
     """Two random sets, whose crosstalk was `identified` 11 and 7,389 standard deviations off.

@@ -31,14 +31,14 @@ def test_no_frame_that_nearly_drowns_is_sure_and_wrong(
 ) -> None:
     """Of 96 frames one is beyond four of the noise's in 1 of 160 runs; tangents alone err by 5.
 
-    `make test` takes half of them.
+    `make test` takes two of them, of the first of which these are 5.7 to 5.8 off.
     """
     noise = {"read": [5e-4, 5e-4]}
     sensor = parse_sensor({**timing, "noise": noise})
     terms = parameters_of(sensor, parse_scene({"object": PLATE})).terms(np.zeros((1, 0)))
     readings = mean_readings(sensor, terms, RANGES)
     beyond = []
-    for seed in first(6, range(12)):
+    for seed in first(2, range(12)):
         seen = readings + 5e-4 * np.random.default_rng(seed).standard_normal(readings.shape)
         (result,) = estimate(sensor, parse_scene(stated), Frames(seen), ["joint_fit"]).results
         away = np.abs(result.roots_m - RANGES[:, None]) / result.roots_sd_m

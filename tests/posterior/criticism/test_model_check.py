@@ -7,15 +7,9 @@ import pytest
 
 from benchmarks.coverage.paths import PathSet, draw_path
 from benchmarks.larger_errors import TOLD, answers, sampled, understated
-from inference.density.discrepant import DiscrepantDensity
-from inference.identifiability.experiment import Experiment
-from inference.identifiability.joint_optimum import joint_optimum
 from inference.posterior import fold
-from inference.posterior.answer.error_budget import error_budget
 from inference.posterior.answer.fit import Fit, FitCheck
 from inference.posterior.answer.posterior import Posterior
-from inference.posterior.answer.where_misfit import where_integrated, where_misfit
-from inference.posterior.answer.widened import widened
 from inference.posterior.criticism.discrepancy_check import MISFIT, LargerDiscrepancy
 from inference.posterior.criticism.model_check import (
     LARGEST,
@@ -25,19 +19,13 @@ from inference.posterior.criticism.model_check import (
 )
 from inference.posterior.criticism.predictive_check import FLUX_ERROR, MISFIT_P, TOTAL
 from inference.posterior.job import Job
-from inference.posterior.sample import sample_of
 from inference.posterior.settings import SamplerSettings
-from inference.posterior.stages.checkpoint import Checkpoint
-from inference.posterior.stages.stage import Selecting, Starting
-from inference.posterior.stages.standing import standing
 from simulator.discrepancy import DISCREPANCY_SD
 from simulator.scene import parse_scene
 
 SNR = 3e4
 SET = draw_path("independent", "crosstalk", TOLD, 5, SNR)
 ROUNDING = 1e-9
-
-
 FLUX, NOISE = "has room for errors of the object's flux", "is as wide as noise"
 
 
@@ -50,33 +38,24 @@ def fit_of(p_value: float, *checks: FitCheck) -> Fit:
     return Fit(p_value, p_value < MISFIT_P, (), 50.0, 15.0, checks, ())
 
 
-@pytest.fixture(scope="module")
-def refuted() -> tuple[Job, Checkpoint]:
-    return sampled(SET, 5, 30.0)
-
-
-def has_room(
-    data: PathSet, found: Posterior, without: Posterior, of: str, most: float = 0.2
-) -> None:
+def has_room(data: PathSet, found: Posterior, without: Posterior, of: str) -> None:
     assert found.fit.misfit
     assert any(of in why for why in found.fit.reasons)
     assert not any(of in why for why in without.fit.reasons)
-    held, before = (
-        np.mean((of.range_m.q05 <= data.range_m) & (data.range_m <= of.range_m.q95))
-        for of in (found, without)
-    )
-    assert held == 1.0
-    assert before < most
+    ranges = found.range_m
+    assert np.all((ranges.q05 <= data.range_m) & (data.range_m <= ranges.q95))
     assert np.array_equal(found.draws.log_density, without.draws.log_density)
 
 
-def test_readings_that_refute_the_model_have_room_for_larger_errors(
-    refuted: tuple[Job, Checkpoint],
-) -> None:
+@pytest.mark.thorough
+def test_readings_that_refute_the_model_have_room_for_larger_errors() -> None:
     """Errors are five times what stands; draws are the same, and without room next to none held."""
-    found, without = answers(*refuted)
+    job, checkpoint = sampled(SET, 5, 30.0)
+    found, without = answers(job, checkpoint)
     has_room(SET, found, without, FLUX)
-    part, draws = fold.draw(*refuted)
+    off = np.abs(without.range_m.mean - SET.range_m) / without.range_m.sd
+    assert np.mean(off > 1.645) > 0.8
+    part, draws = fold.draw(job, checkpoint)
     assert part.flux_times > 1
     assert np.array_equal(draws.range_m, found.draws.range_m)
 
@@ -99,17 +78,24 @@ def test_readings_of_another_sensor_have_room_too() -> None:
 def test_noise_that_is_stated_too_small_widens_its_part_of_every_interval() -> None:
     """By a quarter of what it is; an object that errs as stands by default."""
     data = understated(draw_path("constant speed", "crosstalk", "nothing", 3), 4.0)
-    found, without = answers(*sampled(data, 3, 30.0))
-    # of twenty intervals of 90 % half or fewer hold the truth once in a hundred thousand
-    has_room(data, found, without, NOISE, 0.5)
-    said = next(why for why in found.fit.reasons if NOISE in why)
-    assert 2.0 < float(said.split(NOISE)[1].split()[0]) < 6.0
+    job, checkpoint = sampled(data, 3, 30.0)
+    found, without = answers(job, checkpoint)
+    has_room(data, found, without, NOISE)
+    part, draws = fold.draw(job, checkpoint)
+    assert part.flux_times == 1.0
+    assert np.array_equal(draws.range_m, found.draws.range_m)
+    # what ranges, unknowns and the flux's error leave is a chi-square of a dozen numbers
+    times = np.sqrt(part.noise_times)
+    assert 2.0 < times < 6.0
+    assert any(f"{NOISE} {times:.2g} times" in why for why in found.fit.reasons)
     parts, before = found.range_m.sd_parts, without.range_m.sd_parts
     whole = np.sqrt(parts.noise**2 + parts.scene**2 + parts.model**2)
     assert np.allclose(whole, found.range_m.sd, rtol=ROUNDING)
-    # the model's part is the same, what noise leaves is not
-    assert np.all(parts.scene > 2.0 * before.scene)
-    assert np.allclose(parts.model, before.model, rtol=0.3)
+    # what noise leaves grows by as much, the model's part is the same; all are parts of the spread
+    # of some thousand draws, few of which decide far out
+    assert np.allclose(parts.noise, times * before.noise, rtol=0.15)
+    assert np.allclose(parts.scene, times * before.scene, rtol=0.15)
+    assert np.allclose(parts.model, before.model, rtol=0.15)
 
 
 def test_noise_is_asked_for_where_no_error_of_the_flux_is() -> None:
@@ -153,74 +139,3 @@ def test_a_range_that_is_known_has_its_own_room() -> None:
     assert asked_for(job, job.density(), fit, demands) == (1.0, 1.0)
     little = LargerDiscrepancy(1.0, none, none)
     assert asked_for(job, job.density(), fit, little) == pytest.approx((1.0, 9.0))
-
-
-def test_draws_are_widened_by_a_factor_of_their_variance() -> None:
-    rng = np.random.default_rng(1)
-    z = rng.standard_normal((50, 3)) @ rng.standard_normal((3, 3))
-    log_r = np.concatenate([z @ rng.standard_normal((3, 4)), np.full((50, 1), np.nan)], axis=1)
-    of_z, of_log_r = widened(z, log_r, 5.0)
-    assert np.allclose(of_z @ of_z.T, 4.0 * np.cov(z.T, bias=True), rtol=ROUNDING)
-    expected = 4.0 * np.cov(log_r[:, :4].T, bias=True)
-    assert np.allclose(of_log_r[:4] @ of_log_r[:4].T, expected, rtol=ROUNDING)
-    assert np.allclose(of_log_r[4], 0.0, atol=ROUNDING)
-
-
-def test_all_draws_move_to_the_best_point_and_are_as_uncertain_as_the_way_is_long(
-    refuted: tuple[Job, Checkpoint],
-) -> None:
-    given, checkpoint = refuted
-    stage = checkpoint.answering.stage
-    assert not isinstance(stage, Selecting | Starting)
-    z = sample_of(given.density(), standing(stage), np.random.default_rng(2)).flat[:3]
-    job = given.with_error_integrated()
-    density = job.density()
-    assert isinstance(density, DiscrepantDensity)
-    log_r = density.best_ranges(z)[:, :, 0]
-    draws = zip(z, log_r, strict=True)
-    at = [Experiment(density.sensor, density.parameters, *draw) for draw in draws]
-    readings = density.frames[:, :2]
-    of_z, of_log_r = where_integrated(density, at, readings, (z, log_r), 4.0)
-    larger = [dataclasses.replace(each, discrepancy=4.0 * density.discrepancy) for each in at]
-    ways = where_misfit(larger, readings, z, log_r)
-    for found, way, drawn in ((of_z, ways[0], z), (of_log_r, ways[1], log_r)):
-        assert np.array_equal(found[:, 0], found[:, 1])
-        assert np.array_equal(way[:, 0], way[:, 1])
-        more = found[:, 2:] @ found[:, 2:].T
-        assert np.allclose(more, 15.0 * np.cov(drawn.T, bias=True), rtol=1e-6, atol=ROUNDING)
-    # nearer to the truth than draws of a model that the readings refute
-    off = np.median(log_r, axis=0) - np.log(SET.range_m)
-    assert np.abs(off + of_log_r[:, 0]).mean() < 0.95 * np.abs(off).mean()
-
-
-def test_where_frames_are_dealt_out_no_part_climbs(
-    refuted: tuple[Job, Checkpoint], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Each would take seconds, and there may be fifty; errors are larger there, too."""
-    job, climbs = dataclasses.replace(refuted[0], flux_times=3.0), []
-    density = job.density()
-    z = np.zeros((3, len(density.parameters)))
-    log_r = density.best_ranges(z)[:, :, 0]
-
-    def climbed(*_: object) -> tuple[np.ndarray, np.ndarray]:
-        climbs.append(1)
-        return np.zeros((z.shape[1], 2)), np.zeros((log_r.shape[1], 2))
-
-    monkeypatch.setattr("inference.posterior.answer.error_budget.where_misfit", climbed)
-    for each, expected in ((job.part(np.arange(len(SET.frames))), 0), (job, 1)):
-        rng = np.random.default_rng(1)
-        budget = error_budget(each, density, z, log_r, None, None, None, rng)
-        assert len(climbs) == expected
-        assert np.isfinite(budget.by_z).all()
-
-
-def test_a_climb_whose_steps_lead_out_of_all_numbers_stays_in_them() -> None:
-    """From the middle of the priors one step leads to a c0 of zero."""
-    density = job_of(SET).with_error_integrated().density()
-    z = 0.1 * np.random.default_rng(2).standard_normal((8, len(density.parameters)))[2]
-    log_r = density.best_ranges(z[None])[0, :, 0]
-    larger = 4.0 * DISCREPANCY_SD
-    at = Experiment(density.sensor, density.parameters, z, log_r, discrepancy=larger)
-    end, deviance = joint_optimum(at, density.frames[:, :2])
-    assert np.isfinite(deviance)
-    assert end.finite

@@ -261,6 +261,7 @@ def test_errors_of_a_shadow_are_no_reason(monkeypatch: pytest.MonkeyPatch) -> No
     assert _status(answer)["object.c2"] == "weak"
 
 
+@pytest.mark.thorough
 def test_a_thin_sheet_is_answered_right() -> None:
     data, job, last = _set(SHEET), _job(SHEET), _steps(SHEET)[-1]
     assert last.integrated

@@ -56,7 +56,14 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any], str, int, int, tuple[type
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+# every stage of what is weighted alone is one of what is curved
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.thorough) if name == "weighted" else name
+        for name in CASES
+    ],
+)
 def test_in_every_stage(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # small chunks: many places to stop at
     monkeypatch.setattr(chunk, "_CHUNK_S", 0.1 if name == "curved" else 0.02)

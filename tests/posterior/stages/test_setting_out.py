@@ -57,11 +57,11 @@ def _chunks(stored: bool) -> list[Checkpoint]:
 
 @functools.cache
 def _steps() -> tuple[Checkpoint, ...]:
-    """The same with a step a chunk."""
+    """The same with a step a chunk, each stored and read again."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tempering, "draws_of_rounds", lambda _: 1)
         patch.setattr(tempering, "parts_of_a_step", lambda _: 1)  # whichever test asks first
-        return tuple(_chunks(stored=False))
+        return tuple(_chunks(stored=True))
 
 
 def test_in_one_chunk_or_in_many_that_are_stored_rounds_come_to_the_same(
@@ -69,8 +69,7 @@ def test_in_one_chunk_or_in_many_that_are_stored_rounds_come_to_the_same(
 ) -> None:
     monkeypatch.setattr(tempering, "draws_of_rounds", lambda _: 1_000_000)
     _, whole = _chunks(stored=False)
-    monkeypatch.setattr(tempering, "draws_of_rounds", lambda _: 1)
-    chunks = _chunks(stored=True)
+    chunks = _steps()
     assert len(chunks) > 8  # a step each
     assert isinstance(whole.stage, Weighted)
     assert same(chunks[-1], whole)
