@@ -389,14 +389,14 @@ def test_light_beyond_any_error_is_not_excused_by_it() -> None:
     The share grows no more than up to an error of 3.29: between A^2 / (1 + 3.29^2 share) and A^2,
     however bright the light is. Within its law an error is excused, and leaves up to its share.
     """
-    share, bright = 0.0053, np.array([[1e3], [2e3], [1e4]])
+    share, bright, none = 0.0053, np.array([[1e3], [2e3], [1e4]]), np.zeros(3)
     for far in (20.0, 1e3):
-        left = unexplained(bright[:, 0] * far, bright, share)
+        left = unexplained(bright[:, 0] * far, bright, share, none)
         assert far**2 * 0.9 < left < far**2 * 1.001
-    assert unexplained(bright[:, 0], bright, share) == pytest.approx(1.0, rel=1e-2)
+    assert unexplained(bright[:, 0], bright, share, none) == pytest.approx(1.0, rel=1e-2)
     # what following leaves: three rows, each a standard deviation of that
     rest = np.sqrt(share) * bright[:, 0] * [1.0, -1.0, 1.0]
-    assert unexplained(rest, bright, share) < special.chdtri(3, 0.05)
+    assert unexplained(rest, bright, share, none) < special.chdtri(3, 0.05)
 
 
 def test_outliers_beside_a_square_law_are_a_misfit() -> None:

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 _FARTHEST = 3.29  # standard deviations of an error, beyond which it is one in a thousand
 
 
-def unexplained(residual: Array, errors: Array, share: float) -> float:
+def unexplained(residual: Array, errors: Array, share: float, light: Array) -> float:
     """Return the sum of squares that errors of the model do not take up.
 
     What following an error leaves grows with that error, and is noise of the row that it moves
@@ -43,6 +43,9 @@ def unexplained(residual: Array, errors: Array, share: float) -> float:
         Its derivatives along independent standard normal errors.
     share : float
         From `share_left`.
+    light : ndarray, shape (m,)
+        The object's light in each row. An error leaves its own square of it, which the fit may
+        follow less than the error.
 
     Returns
     -------
@@ -52,7 +55,7 @@ def unexplained(residual: Array, errors: Array, share: float) -> float:
     size = np.square(errors).sum(axis=1)
     a = _followed(residual, errors)[0]
     left = share * np.clip(np.square(errors @ a), size, _FARTHEST**2 * size)
-    root = np.sqrt(1.0 + left)
+    root = np.sqrt(1.0 + left + np.square(share * light))
     return _followed(residual / root, errors / root[:, None])[1]
 
 
