@@ -397,6 +397,11 @@ def test_light_beyond_any_error_is_not_excused_by_it() -> None:
     # what following leaves: three rows, each a standard deviation of that
     rest = np.sqrt(share) * bright[:, 0] * [1.0, -1.0, 1.0]
     assert unexplained(rest, bright, share, none) < special.chdtri(3, 0.05)
+    # the square of an error, where the fit follows the error itself, and so much more than that
+    light = np.array([1e4, 1e5, 1e6])
+    for times, excused in ((1.0, True), (5.0, False)):
+        left = unexplained(times * share * light, np.zeros((3, 1)), share, light)
+        assert bool(left < special.chdtri(3, 1e-3)) is excused
 
 
 def test_outliers_beside_a_square_law_are_a_misfit() -> None:
