@@ -9,12 +9,15 @@ import pytest
 from numpy.typing import NDArray
 from scipy import special
 
+from benchmarks.random_sets.spoiled import spoiled_set
 from inference.estimate import estimate
 from inference.estimates import Status, TechniqueResult
 from inference.fits.answer.ranges import MISFIT
+from inference.fits.likelihood.model_error import unexplained
 from inference.fits.techniques.crosstalk_fit import noisier
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
+from simulator.scene import parse_scene
 from simulator.sensor import Sensor, parse_sensor
 from simulator.simulate import mean_readings
 from simulator.trajectories import SampledTrajectory
@@ -378,3 +381,34 @@ def test_a_misfit_is_said_at_its_false_alarm_rate(
     if misfit:
         assert found.parameters is not None
         assert {one["status"] for one in found.parameters.values()} == {"not_identified"}
+
+
+def test_light_beyond_any_error_is_not_excused_by_it() -> None:
+    """A residual of A standard deviations of one error costs A squared, but for a share of that.
+
+    The share grows no more than up to an error of 3.29: between A^2 / (1 + 3.29^2 share) and A^2,
+    however bright the light is. Within its law an error is excused, and leaves up to its share.
+    """
+    share, bright, none = 0.0053, np.array([[1e3], [2e3], [1e4]]), np.zeros(3)
+    for far in (20.0, 1e3):
+        left = unexplained(bright[:, 0] * far, bright, share, none)
+        assert far**2 * 0.9 < left < far**2 * 1.001
+    assert unexplained(bright[:, 0], bright, share, none) == pytest.approx(1.0, rel=1e-2)
+    # what following leaves: three rows, each a standard deviation of that
+    rest = np.sqrt(share) * bright[:, 0] * [1.0, -1.0, 1.0]
+    assert unexplained(rest, bright, share, none) < special.chdtri(3, 0.05)
+    # the square of an error, where the fit follows the error itself, and so much more than that
+    light = np.array([1e4, 1e5, 1e6])
+    for times, excused in ((1.0, True), (5.0, False)):
+        left = unexplained(times * share * light, np.zeros((3, 1)), share, light)
+        assert bool(left < special.chdtri(3, 1e-3)) is excused
+
+
+def test_outliers_beside_a_square_law_are_a_misfit() -> None:
+    """Four of 32 frames show something else; c2 was identified, 7.6 standard deviations off."""
+    case = spoiled_set(903311776, 7)
+    found = estimate(case.sensor, parse_scene(case.scene), case.frames, ["object_fit"]).results[0]
+    assert found.fit is not None
+    assert found.fit["misfit"]
+    assert found.parameters is not None
+    assert {one["status"] for one in found.parameters.values()} == {"not_identified"}

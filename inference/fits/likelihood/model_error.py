@@ -26,9 +26,14 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+_FARTHEST = 3.29  # standard deviations of an error, beyond which it is one in a thousand
 
-def unexplained(residual: Array, errors: Array, moved: Array, share: float) -> float:
+
+def unexplained(residual: Array, errors: Array, share: float, light: Array) -> float:
     """Return the sum of squares that errors of the model do not take up.
+
+    What following an error leaves grows with that error, and is noise of the row that it moves
+    (docs/model.md, linear-misfit). An error farther off than its law lets it be excuses no more.
 
     Parameters
     ----------
@@ -36,20 +41,32 @@ def unexplained(residual: Array, errors: Array, moved: Array, share: float) -> f
         Of unit variance.
     errors : ndarray, shape (m, k)
         Its derivatives along independent standard normal errors.
-    moved : ndarray, shape (m, d)
-        Along all that the fit is free to follow with.
     share : float
         From `share_left`.
+    light : ndarray, shape (m,)
+        The object's light in each row. An error leaves its own square of it, which the fit may
+        follow less than the error.
+
+    Returns
+    -------
+    float
+        With what errors have to be for it.
     """
-    m, count = errors.shape
-    moved = moved / np.maximum(np.linalg.norm(moved, axis=0), np.finfo(float).tiny)
-    prior = np.eye(count, count + moved.shape[1])
-    rows = np.concatenate([np.concatenate([errors, moved], axis=1), prior])
+    size = np.square(errors).sum(axis=1)
+    a = _followed(residual, errors)[0]
+    left = share * np.clip(np.square(errors @ a), size, _FARTHEST**2 * size)
+    root = np.sqrt(1.0 + left + np.square(share * light))
+    return _followed(residual / root, errors / root[:, None])[1]
+
+
+def _followed(residual: Array, errors: Array) -> tuple[Array, float]:
+    """Return the best errors, and the sum of their squares and of what they leave."""
+    count = errors.shape[1]
+    rows = np.concatenate([errors, np.eye(count)])
     target = np.append(residual, np.zeros(count))
-    left = target - rows @ scipy.linalg.lstsq(rows, target)[0]
-    rest = float(left @ left)
-    taken = max(float(residual @ residual) - rest, 0.0) / max(m, 1)
-    return float(rest / (1.0 + share * taken))
+    a = np.asarray(scipy.linalg.lstsq(rows, target)[0])
+    left = target - rows @ a
+    return a, float(left @ left)
 
 
 class ErringFlux(NamedTuple):

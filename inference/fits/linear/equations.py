@@ -165,8 +165,9 @@ def _fit_from(equations: Equations, roots: Array, ranges: Array) -> LinearFit:
     """Fit from a first choice of roots; choose and weigh anew until nothing changes."""
     frames, p = equations.task.frames, len(equations.unknowns)
     n = len(frames)
+    none = np.empty(0)
     fit = LinearFit(
-        np.full(p, np.nan), np.full((p, p), np.nan), 0, np.empty(0), np.zeros(n, bool), ranges
+        np.full(p, np.nan), np.full((p, p), np.nan), 0, none, np.zeros(n, bool), ranges, none
     )
     response = equations.response(ranges)
     for turn in range(_PASSES):
@@ -182,7 +183,19 @@ def _fit_from(equations: Equations, roots: Array, ranges: Array) -> LinearFit:
         matrix = observed.matrix[used] * weights[used, None]
         target = observed.target[used] * weights[used]
         x, factor, rank = solve_weighted(matrix, target)
-        last, fit = fit, LinearFit(x, factor, rank, matrix @ x - target, used, ranges)
+        last, fit = (
+            fit,
+            LinearFit(
+                # equations of light are of one, known parts and all
+                x,
+                factor,
+                rank,
+                matrix @ x - target,
+                used,
+                ranges,
+                weights[used],
+            ),
+        )
         if rank < p:
             return fit
         chosen = _best_roots(equations, roots, x)

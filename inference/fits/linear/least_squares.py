@@ -32,6 +32,8 @@ class LinearFit:
         Frames that took part.
     ranges : ndarray, shape (n,)
         The root of each frame that the fit chose [m], nan where there is none.
+    light : ndarray, shape (m,)
+        How far the object's whole light moves each weighted row.
     """
 
     x: Array
@@ -40,6 +42,7 @@ class LinearFit:
     residuals: Array
     used: NDArray[np.bool_]
     ranges: Array
+    light: Array
 
     @property
     def chi_square(self) -> float:

@@ -83,7 +83,7 @@ def linear_answer(
     freedom = fit.residuals.size - fit.x.size
     chi_square = fit.chi_square
     if of_residuals.size:
-        chi_square = unexplained(fit.residuals, of_residuals, of_residuals[:, :0], share)
+        chi_square = unexplained(fit.residuals, of_residuals, share, fit.light)
     p_value = float(scipy.special.chdtrc(freedom, chi_square))
     report = {
         "chi_square": chi_square,

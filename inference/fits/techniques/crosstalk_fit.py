@@ -84,7 +84,8 @@ def _fit(
     paths = _paths(task)
     free = np.array([path in unknown for path in paths])
     x = np.where(free, 0.0, [_known(task, path) for path in paths])
-    fit = LinearFit(np.empty(0), np.empty((0, 0)), 0, np.empty(0), usable, np.full(n, np.nan))
+    none = np.empty(0)
+    fit = LinearFit(none, np.empty((0, 0)), 0, none, usable, np.full(n, np.nan), none)
     rows, index = np.arange(n), chosen
     shift = np.zeros(n)  # log r of the fit less that of the derivatives
     for _ in range(_PASSES):
@@ -112,7 +113,9 @@ def _fit(
         residuals = flat @ solution - target.ravel()
         last, last_shift = x.copy(), shift
         x[free] = solution
-        fit = LinearFit(solution, factor, rank, residuals, used, np.where(used & ~empty, r, np.nan))
+        light = np.abs(x[2] * matrix[:, :, 2]).ravel()
+        at = np.where(used & ~empty, r, np.nan)
+        fit = LinearFit(solution, factor, rank, residuals, used, at, light)
         if rank < solution.size:
             break
         *crosstalk, size = x
