@@ -5,10 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from inference.empty_scatter import scatter_of_empty
 from inference.estimate import estimate
 from simulator.frames import Frames
 from simulator.scene import parse_scene
-from simulator.sensor import parse_sensor
+from simulator.sensor import Sensor, parse_sensor
 
 READ = (2e-5, 1e-3)
 SHOT = 1e-6
@@ -19,18 +20,23 @@ KINDS: dict[str, dict[str, Any]] = {
 }
 
 
+def sensor_of(kind: str, stated: float = 1.0) -> Sensor:
+    noise = {"read": [stated * sd for sd in READ], "shot": stated**2 * SHOT}
+    return parse_sensor({**KINDS[kind], "noise": noise})
+
+
+def after(bare: np.ndarray[Any, Any], **more: Any) -> Frames:
+    """Empty frames, and one with the object behind them."""
+    present = np.array([False] * len(bare) + [True])
+    return Frames(np.vstack([bare, [[0.1, 2.0]]]), object_present=present, **more)
+
+
 def said(kind: str, bare: np.ndarray[Any, Any], stated: float = 1.0, **more: Any) -> list[str]:
     """What is said of the noise after empty frames and one with the object."""
-    noise = {"read": [stated * sd for sd in READ], "shot": stated**2 * SHOT}
-    frames = Frames(
-        np.vstack([bare, [[0.1, 2.0]]]),
-        object_present=np.array([False] * len(bare) + [True]),
-        **more,
-    )
     # nothing else is asked of the empty frames: their light is unknown
     unknown = {"prior": "normal", "mean": 0.0, "sd": 1.0}
     scene = parse_scene({"crosstalk": [unknown, unknown]})
-    told = estimate(parse_sensor({**KINDS[kind], "noise": noise}), scene, frames).assumptions
+    told = estimate(sensor_of(kind, stated), scene, after(bare, **more)).assumptions
     return [text for text in told if "scatter" in text]
 
 
@@ -62,10 +68,10 @@ def test_noise_that_is_stated_too_small(kind: str) -> None:
 
 def test_few_healthy_frames_say_nothing() -> None:
     """2,000 sets: false alarm 2e-3."""
-    rng = np.random.default_rng(4)
+    rng, sensor = np.random.default_rng(4), sensor_of("pulsed")
     for n in (1, 2, 3, 5):
         for _ in range(500):
-            assert said("pulsed", drawn("pulsed", rng, n)) == []
+            assert scatter_of_empty(sensor, after(drawn("pulsed", rng, n))) is None
 
 
 def test_crosstalk_that_changed_between_first_and_last() -> None:
