@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
+from inference.estimate import estimate
+from inference.estimates import TechniqueResult
 from simulator.frames import Frames
 from simulator.parameters import parameters_of
 from simulator.scene import Scene, parse_scene
@@ -93,3 +95,12 @@ def reference_fit(
 def relative(a: float, b: float) -> float:
     """Return the distance of two positive numbers in the logarithm."""
     return abs(math.log(a / b))
+
+
+def served(
+    sensor: Sensor, scene: dict[str, Any], frames: Frames, names: list[str]
+) -> list[TechniqueResult]:
+    """Ask for techniques that all answer."""
+    found = estimate(sensor, exact_scene(scene), frames, names)
+    assert [r.technique for r in found.results] == names, found.left_out
+    return list(found.results)

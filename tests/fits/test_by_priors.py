@@ -34,8 +34,6 @@ from inference.frame.range_prior import LEAST_INFORMATION
 from inference.known import known_of
 from inference.technique import Task
 from simulator.errors import RefusedError
-from simulator.priors.distribution import Distribution
-from simulator.priors.normal import NormalDistribution
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
 from simulator.simulate import simulate
@@ -399,16 +397,3 @@ def test_unknowns_of_many_points_are_those_of_each(name: str) -> None:
     points = problem.coordinates(problem.parameters.natural(z)[:, problem.columns])
     wanted = np.array([problem.natural(x) for x in points])
     np.testing.assert_allclose(problem.naturals(points), wanted, rtol=1e-12)
-
-
-@pytest.mark.parametrize("log", [False, True])
-def test_a_whole_normal_law_needs_no_tails(log: bool) -> None:
-    law = NormalDistribution(
-        log=log, loc=0.3, scale=1.7, low=0.0 if log else -math.inf, high=math.inf
-    )
-    z = np.linspace(-6.0, 6.0, 25)
-    x = law.from_normal(z)
-    np.testing.assert_allclose(law.to_normal(x), z, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(law.to_normal(x), Distribution.to_normal(law, x), atol=1e-9)
-    if log:
-        assert law.to_normal(0.0) == -math.inf

@@ -15,6 +15,8 @@ from simulator.priors import (
     TruncatedNormal,
     Uniform,
 )
+from simulator.priors.distribution import Distribution
+from simulator.priors.normal import NormalDistribution
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
 
@@ -153,3 +155,16 @@ def test_the_law_of_a_range_integrates_to_one(prior: dict[str, object], cut: boo
     low, high = math.log(max(a[6], 1e-9)), math.log(min(a[7], 1e3))
     total = integrate.quad(density, low, high, limit=500, epsabs=1e-11)[0]
     assert total == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_a_whole_normal_law_needs_no_tails(log: bool) -> None:
+    law = NormalDistribution(
+        log=log, loc=0.3, scale=1.7, low=0.0 if log else -math.inf, high=math.inf
+    )
+    z = np.linspace(-6.0, 6.0, 25)
+    x = law.from_normal(z)
+    np.testing.assert_allclose(law.to_normal(x), z, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(law.to_normal(x), Distribution.to_normal(law, x), atol=1e-9)
+    if log:
+        assert law.to_normal(0.0) == -math.inf
