@@ -10,12 +10,9 @@ from inference.stuck_readings import coarsest_step
 from simulator.frames import Frames
 from simulator.sensor import Sensor
 
-__all__ = ["FEWEST", "smoothed_readings"]
+__all__ = ["smoothed_readings"]
 
 Array = NDArray[np.float64]
-
-FEWEST = 12
-"""Frames of which fewer do not tell how smooth their noise is."""
 
 # how often readings with the stated noise are doubted; of either column, and of both together
 _FALSE_ALARM = 1e-6 / 3
@@ -23,6 +20,7 @@ _WORTH = 0.25  # of the stated variance: noise that is stated twice too large is
 _ORDER = 4  # of differences: motion that is smooth is hardly any part of them
 _FARTHEST = 8.0  # steps by which rounding to steps moves such a difference at most: 2^4 / 2
 _SAME = 1e-6  # of read noise, by which readings of one step differ where they were computed
+_FEWEST = 12  # frames, of which fewer do not tell how smooth their noise is
 _BLOCK = 64  # frames of which differences are taken
 _TILTS = np.geomspace(1e-2, 1e3, 101)  # over the mean eigenvalue: of the exponential bound
 
@@ -45,7 +43,7 @@ def smoothed_readings(sensor: Sensor, frames: Frames) -> str | None:
         For a person. None where they differ as the stated noise lets them (false alarm at most
         1e-6), or where rounding or motion hides it.
     """
-    if len(frames) < FEWEST:
+    if len(frames) < _FEWEST:
         return None
     readings, read = frames.readings, np.asarray(sensor.noise.read)
     if sensor.full_scale is not None:
