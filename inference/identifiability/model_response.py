@@ -24,7 +24,12 @@ from numpy.typing import NDArray
 
 from inference.frame.sensitivity import whiteners
 from inference.identifiability.experiment import Experiment
-from inference.identifiability.response_rows import FluxStep, ResponseRows, flux_step
+from inference.identifiability.response_rows import (
+    FluxStep,
+    ResponseRows,
+    error_triangle,
+    flux_step,
+)
 
 __all__ = ["FluxTold", "ModelResponse", "common_pull", "curvature_of_response", "model_response"]
 
@@ -235,8 +240,8 @@ def _settled(
     return (start, first) if point is none else (point, step)
 
 
-def curvature_of_response(experiment: Experiment, response: ModelResponse, normal: Array) -> float:
-    """Return how far the response misses where one error of the flux leads.
+def curvature_of_response(experiment: Experiment, response: ModelResponse, normal: Array) -> Array:
+    """Return how far the response misses where errors of the flux lead.
 
     Parameters
     ----------
@@ -244,34 +249,56 @@ def curvature_of_response(experiment: Experiment, response: ModelResponse, norma
         As for `model_response`.
     response : ModelResponse
         What that found.
-    normal : ndarray, shape (k,)
-        The error: standard normal variates beside the mean of what is known of it.
+    normal : ndarray, shape (t, k)
+        The errors: standard normal variates beside the mean of what is known of them.
 
     Returns
     -------
-    float
+    ndarray, shape (t,)
         Root mean square over the frames of what the next Gauss-Newton step would still move log r
         by; inf where it leads beyond what numbers hold.
     """
     e, rows = experiment, ResponseRows(experiment)
-    present = np.isfinite(e.log_r)
+    present, missed = np.isfinite(e.log_r), np.zeros(len(normal))
     if not e.by_error.shape[2] or not present.any():
-        return 0.0
-    of = response
-    by = _Point(
-        of.shift[0] + of.parameters @ normal,
-        np.where(present, of.shift[1] + of.log_r @ normal, 0.0),
-        of.error.mean + of.error.spread @ normal,
-    )
-    with np.errstate(all="ignore"):
-        off = rows.residual(2.0 * _means(e) - _means(_moved(e, by)))
-    # to first order the readings stay where they are, but for what across leaves of the error
-    linear = rows.by_error @ by.error + rows.jacobian @ by.z + rows.along * by.log_r[:, None]
-    off += linear
-    off[:, 2] = 0.0
-    if not np.isfinite(off).all():
-        return math.inf
-    step = flux_step(rows, off, np.zeros(e.z.size))
-    again = step.by_readings[1] + step.by_error[1] @ step.coefficients(np.zeros(by.error.size))
+        return missed
+    off = _beyond_linear(rows, response, normal)
+    finite = np.isfinite(off).all(axis=(0, 1))
+    missed[~finite] = math.inf
+    again = _next_step(rows, off[:, :, finite])[present]
     with np.errstate(over="ignore"):
-        return float(np.sqrt(np.mean(np.square(again[present]))))
+        missed[finite] = np.sqrt(np.mean(np.square(again), axis=0))
+    return missed
+
+
+def _beyond_linear(rows: ResponseRows, of: ModelResponse, normal: Array) -> Array:
+    """Return what readings are off where errors lead, and not to first order, shape (n, m, t)."""
+    e = rows.experiment
+    z = of.shift[0] + normal @ of.parameters.T
+    log_r = np.where(np.isfinite(e.log_r), of.shift[1] + normal @ of.log_r.T, 0.0)
+    error = of.error.mean + normal @ of.error.spread.T
+    with np.errstate(all="ignore"):
+        ways = (_Point(*way) for way in zip(z, log_r, error, strict=True))
+        seen = _means(e)[:, :, None] - np.stack([_means(_moved(e, by)) for by in ways], axis=2)
+        off = np.zeros((*rows.along.shape, len(normal)))
+        off[:, :2] = whiteners(e.sensor, e.readings) @ seen[:, :2]
+        if e.rates is not None:
+            off[:, 3:] = e.rates[:, :, None] * seen[:, 2:]
+    # to first order the readings stay where they are, but for what across leaves of the error
+    by_range = rows.along[:, :, None] * log_r.T[:, None]
+    off += rows.by_error @ error.T + rows.jacobian @ z.T + by_range
+    off[:, 2] = 0.0
+    return off
+
+
+def _next_step(rows: ResponseRows, off: Array) -> Array:
+    """Return the change of log r, shape (n, t), with readings that are off, shape (n, m, t).
+
+    The error follows them as well: all is one linear step, its orthogonal decomposition shared.
+    """
+    k = rows.by_error.shape[2]
+    _, moved, left = rows.follow(np.concatenate([rows.by_error, off], axis=2))
+    across, triangle = left[:, :k], error_triangle(left[:, :k])
+    told = scipy.linalg.solve_triangular(triangle, across.T @ left[:, k:], trans="T")
+    by_error = scipy.linalg.solve_triangular(triangle, told)
+    return np.asarray(moved[:, k:] - moved[:, :k] @ by_error)

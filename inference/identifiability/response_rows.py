@@ -14,7 +14,7 @@ from inference.identifiability.clock import by_clock
 from inference.identifiability.expected_posterior import eliminated, told_rows
 from inference.identifiability.experiment import Experiment
 
-__all__ = ["FluxStep", "ResponseRows", "flux_step"]
+__all__ = ["FluxStep", "ResponseRows", "error_triangle", "flux_step"]
 
 Array = NDArray[np.float64]
 
@@ -196,6 +196,22 @@ class FluxStep:
         return np.asarray(scipy.linalg.solve_triangular(self.triangle, told))
 
 
+def error_triangle(across: Array) -> Array:
+    """Return R with R^T R = I + across^T across, the precision of the error's coefficients.
+
+    Parameters
+    ----------
+    across : ndarray, shape (rows, k)
+        What nothing but the error can follow.
+
+    Returns
+    -------
+    ndarray, shape (k, k)
+    """
+    k = across.shape[1]
+    return np.asarray(scipy.linalg.qr(np.concatenate([across, np.eye(k)]), mode="r")[0][:k])
+
+
 def flux_step(rows: ResponseRows, off: Array, of_prior: Array) -> FluxStep:
     """Return the step from what readings, shape (n, m), and priors of z, shape (d,), are off."""
     k = rows.by_error.shape[2]
@@ -203,7 +219,7 @@ def flux_step(rows: ResponseRows, off: Array, of_prior: Array) -> FluxStep:
     prior[:, k] = of_prior
     both = np.concatenate([rows.by_error, off[:, :, None]], axis=2)
     change, moved, left = rows.follow(both, prior)
-    triangle = scipy.linalg.qr(np.concatenate([left[:, :k], np.eye(k)]), mode="r")[0][:k]
+    triangle = error_triangle(left[:, :k])
     whole = np.zeros(len(left))
     whole[: off.size] = off.ravel()
     whole[off.size : off.size + of_prior.size] = of_prior

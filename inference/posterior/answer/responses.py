@@ -241,16 +241,18 @@ def _curvature(
     rng: np.random.Generator,
 ) -> float:
     """Return the share of the response that the next order would add, by so many random errors."""
+    chosen = np.linspace(0, len(experiments) - 1, tried).astype(int)
+    normal = rng.standard_normal((tried, responses[0].log_r.shape[1]))
     missed, size = 0.0, 0.0
-    for i in np.linspace(0, len(experiments) - 1, tried).astype(int):
-        of = responses[i]
-        normal = rng.standard_normal(of.log_r.shape[1])
+    for i in np.unique(chosen):
+        of, each = responses[i], normal[chosen == i]
         present = np.isfinite(experiments[i].log_r)
         if not present.any():
             return 0.0
+        way = (each @ of.log_r.T + of.shift[1])[:, present]
+        moved = np.mean(np.square(way), axis=1)
+        off = curvature_of_response(experiments[i], of, each)
         # what is wildly off counts as wholly off, and no more
-        moved = float(np.mean(np.square((of.log_r @ normal + of.shift[1])[present])))
-        off = curvature_of_response(experiments[i], of, normal)
-        missed += min(off**2, moved)
-        size += moved
+        missed += float(np.minimum(np.square(off), moved).sum())
+        size += float(moved.sum())
     return float(np.sqrt(missed / size)) if size > 0 else 0.0
