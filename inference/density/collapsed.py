@@ -181,7 +181,7 @@ class CollapsedDensity:
     ) -> tuple[Rows, Array | None]:
         """Draw what multiplies the object's flux given each z: here nothing.
 
-        Beside it shares of the log likelihood, shape (n, frames), where they are found on the way.
+        Beside it shares of the log likelihood, shape (n, frames), where ranges are drawn given it.
         """
         return rows, None
 
@@ -204,8 +204,8 @@ class CollapsedDensity:
 
     def draw_with_likelihoods(self, z: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """Draw ranges as `draw_log_ranges`; beside them `frame_log_likelihoods` of z."""
-        log_r, _, known = self._draw_blocks(z, rng)
-        return self.common(log_r), self.frame_log_likelihoods(z) if known is None else known
+        log_r, _, values = self._draw_blocks(z, rng)
+        return self.common(log_r), values
 
     def unfinished_integrals(self, z: Array, rng: np.random.Generator) -> int:
         """Count the integrals over ranges that did not settle: density and draws are wrong there.
@@ -224,18 +224,19 @@ class CollapsedDensity:
         """
         return int(np.count_nonzero(self._draw_blocks(z, rng)[1]))
 
-    def _draw_blocks(self, z: Array, rng: np.random.Generator) -> tuple[Array, Array, Array | None]:
+    def _draw_blocks(self, z: Array, rng: np.random.Generator) -> tuple[Array, Array, Array]:
         """Draw log r of every block, and count what did not settle, each of shape (n, blocks).
 
-        Beside them shares of the log likelihood as `_with_flux_errors`.
+        Beside them `frame_log_likelihoods` of z.
         """
         terms = self.parameters.terms(z)
         rows, known = self._with_flux_errors(self.integral_rows(terms), z, rng)
-        out, unfinished = np.empty((2, len(z), self.data.blocks))
+        out, likelihoods, unfinished = np.empty((3, len(z), self.data.blocks))
         uniforms = rng.random((*out.shape, 2))
         for k, each, data in pieces(self, terms, rows):
-            fill_range_draws(out[k], unfinished[k], uniforms[k], each, data, self.instrument)
-        return out, unfinished, known
+            filled = out[k], likelihoods[k], unfinished[k]
+            fill_range_draws(*filled, uniforms[k], each, data, self.instrument)
+        return out, unfinished, self.shared(likelihoods) if known is None else known
 
     def best_ranges(self, z: Array) -> Array:
         """Find each frame's best range for given parameters.

@@ -83,8 +83,9 @@ class DiscrepantDensity(CollapsedDensity):
     def _with_flux_errors(
         self, rows: Rows, z: Array, rng: np.random.Generator
     ) -> tuple[Rows, Array | None]:
-        """Draw the error's curve given each z."""
-        centres, factors, values = self.expansions(z)
+        """Draw the error's curve given each z; of equal ones what is known of it is found once."""
+        each, which = np.unique(z, axis=0, return_inverse=True)
+        centres, factors, values = (found[which] for found in self.expansions(each))
         noise = rng.standard_normal(centres.shape)
         coefficients = centres + np.linalg.solve(factors, noise[:, :, None])[:, :, 0]
         erring = rows._replace(

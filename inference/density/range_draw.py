@@ -9,7 +9,7 @@ from inference.density.range_integral import falls_off, integrate_range
 from inference.frame.arguments import FrameScene, Instrument, Rows, scene_of
 from inference.frame.blocks import Block, Data, block_of, is_empty
 from inference.frame.dark_mass import with_dark_mass
-from inference.frame.log_density import log_density
+from inference.frame.log_density import empty_log_likelihood, log_density
 from inference.frame.modes import (
     LEFT,
     LOG_MASS,
@@ -142,6 +142,7 @@ def _draw(
 @compiled
 def fill_range_draws(
     out: Array,
+    likelihoods: Array,
     unfinished: Array,
     uniforms: Array,
     rows: Rows,
@@ -154,6 +155,8 @@ def fill_range_draws(
     ----------
     out : ndarray, shape (n, blocks)
         Filled with log r; nan for frames without object.
+    likelihoods : ndarray, shape (n, blocks)
+        Filled with log p(block | vector), which the draw needs anyway.
     unfinished : ndarray, shape (n, blocks)
         Filled with how many panels of the integral over the range were taken as they are.
     uniforms : ndarray, shape (n, blocks, 2)
@@ -170,11 +173,12 @@ def fill_range_draws(
         modes = room_for_modes(table)
         for b in range(out.shape[1]):
             out[i, b], unfinished[i, b] = math.nan, 0.0
-            if is_empty(data, b):
-                continue
             block = block_of(data, b)
+            if is_empty(data, b):
+                likelihoods[i, b] = empty_log_likelihood(block, scene)
+                continue
             count = find_modes(modes, values, table, block, scene)
-            integrate_range(modes, count, block, scene)
+            likelihoods[i, b] = integrate_range(modes, count, block, scene)
             for k in range(count):
                 unfinished[i, b] += modes[k, UNFINISHED]
             out[i, b] = _draw(modes, count, uniforms[i, b], block, scene, grid)

@@ -92,7 +92,8 @@ def larger_discrepancy(
         Where the larger size would put the parameters beyond the draws, its figures are too small.
     """
     larger = dataclasses.replace(density, discrepancy=_FACTOR * density.discrepancy)
-    gain = larger.log_likelihood(z) - stated
+    each, which = np.unique(z, axis=0, return_inverse=True)  # draws by weight come repeatedly
+    gain = larger.log_likelihood(each)[which] - stated
     gain = np.where(np.isfinite(gain), gain, -np.inf)
     factor = float(np.exp(min(scipy.special.logsumexp(gain) - np.log(len(z)), 700.0)))
     if not np.isfinite(gain).any():
