@@ -78,11 +78,16 @@ class DiscrepancyBasis:
         """Number of functions."""
         return int(self.knots.shape[2])
 
-    def _cell(self, log_r: Array) -> tuple[Array, Array, Array]:
-        """Place in the cell, in 0 to 1, and the knots left and right of it."""
+    def _place(self, log_r: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Place in the cell, in 0 to 1, and the knot left of it."""
         x = np.clip((log_r - self.first) / self.spacing, 0.0, self.knots.shape[0] - 1.0)
         i = np.minimum(x.astype(int), self.knots.shape[0] - 2)
-        return (x - i)[..., None], self.knots[i], self.knots[i + 1]
+        return (x - i)[..., None], i
+
+    def _cell(self, log_r: Array) -> tuple[Array, Array, Array]:
+        """Place in the cell, in 0 to 1, and the knots left and right of it."""
+        t, i = self._place(log_r)
+        return t, self.knots[i], self.knots[i + 1]
 
     def slopes(self, log_r: Array) -> Array:
         """Return the derivatives of all functions, shape (*log_r.shape, functions)."""
@@ -98,11 +103,35 @@ class DiscrepancyBasis:
     def values(self, log_r: Array) -> Array:
         """Return all functions at given log ranges, shape (*log_r.shape, functions)."""
         t, left, right = self._cell(log_r)
-        rest = 1.0 - t
-        return np.asarray(
-            rest * rest * ((1.0 + 2.0 * t) * left[..., 0, :] + t * left[..., 1, :])
-            + t * t * ((3.0 - 2.0 * t) * right[..., 0, :] - rest * right[..., 1, :])
-        )
+        return _cubic(t, left, right)
+
+    def sums(self, log_r: Array, coefficients: Array) -> Array:
+        """Return a sum of the functions in every row, at log ranges of its own.
+
+        Parameters
+        ----------
+        log_r : ndarray, shape (n, m)
+            Log ranges.
+        coefficients : ndarray, shape (n, functions)
+            Of the functions.
+
+        Returns
+        -------
+        ndarray, shape (n, m)
+        """
+        curves = np.tensordot(coefficients, self.knots, axes=(1, 2))
+        t, i = self._place(log_r)
+        row = np.arange(len(log_r))[:, None]
+        return _cubic(t, curves[row, i, :, None], curves[row, i + 1, :, None])[..., 0]
+
+
+def _cubic(t: Array, left: Array, right: Array) -> Array:
+    """Return Hermite's cubic at a place in a cell, of values and slopes at its ends."""
+    rest = 1.0 - t
+    return np.asarray(
+        rest * rest * ((1.0 + 2.0 * t) * left[..., 0, :] + t * left[..., 1, :])
+        + t * t * ((3.0 - 2.0 * t) * right[..., 0, :] - rest * right[..., 1, :])
+    )
 
 
 @functools.lru_cache(maxsize=16)

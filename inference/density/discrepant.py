@@ -97,11 +97,9 @@ class DiscrepantDensity(CollapsedDensity):
     def flux_errors(self, log_r: Array, rng: np.random.Generator) -> Array:
         """Draw errors of the log flux at given log ranges from their prior; nan at nan."""
         coefficients = self.discrepancy * rng.standard_normal((len(log_r), self.basis.size))
-        rows = [
-            self.basis.values(np.where(np.isfinite(u), u, self.basis.first)) @ a
-            for u, a in zip(log_r, coefficients, strict=True)
-        ]
-        return np.where(np.isfinite(log_r), np.reshape(rows, log_r.shape), np.nan)
+        present = np.isfinite(log_r)
+        values = self.basis.sums(np.where(present, log_r, self.basis.first), coefficients)
+        return np.where(present, values, np.nan)
 
     def flux_basis(self, z: Array, log_r: Array) -> FluxBasis:
         """Return what the error is made of at given ranges (`FluxBasis`)."""

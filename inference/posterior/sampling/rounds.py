@@ -17,7 +17,6 @@ from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.importance import (
     MAX_SMOOTHED_K_HAT,
     log_ratio,
-    pareto_k_hat,
     weighted_by,
 )
 from inference.posterior.sampling.next_laws import fitted, next_laws, next_shape
@@ -178,11 +177,10 @@ def taken_in(so_far: RoundsSoFar, values: Array) -> RoundsSoFar | Rounds:
 def _judged(so_far: RoundsSoFar) -> RoundsSoFar:
     """Have the draws that count made next, where the laws seem to hold all or no round is left."""
     pool, wanted, calls = so_far.pool, so_far.wanted, so_far.calls
-    log_weights = pool.log_ratios[so_far.members :]
     # no room for another round, or nothing that it could follow
-    over = calls + STEP + _LEAST > wanted.most or not np.isfinite(log_weights).any()
+    over = calls + STEP + _LEAST > wanted.most or not np.isfinite(so_far.log_weights).any()
     settled = so_far.telling and worst(so_far.beyond, so_far.ends) < wanted.tolerated
-    settled = settled and pareto_k_hat(log_weights) < MAX_SMOOTHED_K_HAT
+    settled = settled and so_far.k_hat < MAX_SMOOTHED_K_HAT
     if not (over or settled):
         return so_far
     shares, share = shares_that_suit(pool, so_far.members)

@@ -1,6 +1,7 @@
 """Where rounds of importance sampling stand, and what they come to."""
 
 import dataclasses
+import functools
 import math
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy import special
 from inference.posterior.sampling.importance import (
     MAX_SMOOTHED_K_HAT,
     WeightedDraws,
+    pareto_k_hat,
     weighted_by,
 )
 from inference.posterior.sampling.next_laws import LAWS
@@ -21,6 +23,8 @@ __all__ = ["LastDraws", "Rounds", "RoundsSoFar", "Wanted", "heaviest_of", "worst
 Array = NDArray[np.float64]
 
 _FEWEST = 6  # rounds: before, even weights are those of draws that all leave out the same
+_FEWEST_NEAR = 3  # where members are draws of nearly the target, and weights are very even
+_VERY_EVEN = 0.2  # Pareto k-hat of these
 _TAILS = 3  # rounds of maps behind shapes, from which on tails are in the draws
 _TAIL = 0.01  # of the draws' mass, in the heaviest of them: there may be
 _MOST_DISSENT = 0.03  # so many of a population's members
@@ -47,6 +51,8 @@ class Wanted:
     shapes : int
         Rounds, the first ones, whose only law is a shape that bends nothing and follows the draws:
         the one to begin with is brought by the proposal. 0 where a map is fitted to the members.
+    near : bool
+        Whether members are draws of nearly the target: then very even weights tell sooner.
     """
 
     target_ess: int
@@ -55,6 +61,7 @@ class Wanted:
     tail: float = _TAIL
     first: int = 1000
     shapes: int = 0
+    near: bool = False
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -168,9 +175,21 @@ class RoundsSoFar:
         return np.asarray(self.pool.log_ratios[: self.members] > heaviest)
 
     @property
+    def log_weights(self) -> Array:
+        """Of all draws but the members."""
+        return self.pool.log_ratios[self.members :]
+
+    @functools.cached_property
+    def k_hat(self) -> float:
+        """Pareto shape of these weights."""
+        return pareto_k_hat(self.log_weights)
+
+    @property
     def telling(self) -> bool:
         """Whether rounds are so many that the weights tell what was left out."""
-        return len(self.pool.laws) > _FEWEST * LAWS
+        laws = len(self.pool.laws)
+        soon = self.wanted.near and laws > _FEWEST_NEAR * LAWS and self.k_hat < _VERY_EVEN
+        return soon or laws > _FEWEST * LAWS
 
     @property
     def draws(self) -> WeightedDraws | None:

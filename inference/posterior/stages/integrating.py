@@ -4,9 +4,10 @@ Draws of an exact model are moved by its errors along straight lines. Where the 
 change that by much, and it is most of what the answer does not know, the error of the flux is
 integrated out in full: rounds of importance draws begin at the moved draws.
 
-An exact model whose posterior its Laplace shapes do not fit is not sampled first: draws of these
-shapes tell as well whether its errors bend, and with errors integrated out the posterior is wider
-and nearer to its own shape. The exact model follows where rounds there fail.
+An exact model is not sampled to the end first. The draws of a warm start, or those of Laplace
+shapes where these do not fit it, tell as well whether its errors bend; with errors integrated out
+the posterior is wider, and nearer to its own shape. The exact model follows where rounds there
+fail.
 """
 
 import math
@@ -20,6 +21,7 @@ from inference.posterior.answer.moves import Moves
 from inference.posterior.answer.responses import (
     MEASURED,
     Responses,
+    chosen_draws,
     first_responses,
     flux_leads,
     repeated,
@@ -27,8 +29,9 @@ from inference.posterior.answer.responses import (
 from inference.posterior.criticism.discrepancy_check import is_bent, may_be_bent, misses
 from inference.posterior.criticism.prior_conflict import are_far_out
 from inference.posterior.job import Job
+from inference.posterior.sampling.importance import WeightedDraws
 from inference.posterior.sampling.population import arrived_at
-from inference.posterior.sampling.proposal import Proposal, mixture_of
+from inference.posterior.sampling.proposal import Mixture, Proposal, mixture_of
 from inference.posterior.sampling.reparametrisation import reparametrisation_of
 from inference.posterior.sampling.scouts import Scouts
 from inference.posterior.sampling.start import Optimum, added, climb, refine
@@ -43,7 +46,8 @@ __all__ = ["MEMBERS", "at_once", "bending", "from_moved", "moved_by"]
 Array = NDArray[np.float64]
 
 MEMBERS = 400  # draws that are moved
-_CLIMBS = 2  # from the best of them
+_CLIMBS = 2  # from the best of these
+_RANKED = 100
 # draws of Laplace shapes that are followed, and errors that are beyond the first order: both tell
 # whether the response bends, not by how much
 _FOLLOWED, _TRIED = 20, 50
@@ -107,7 +111,7 @@ def moved_by(found: Responses, z: Array, rng: np.random.Generator) -> Array:
 
 
 def from_moved(
-    density: CollapsedDensity, z: Array, others: Sequence[Array] = ()
+    density: CollapsedDensity, z: Array, others: Sequence[Array] = (), *, near: bool = True
 ) -> Tempering | None:
     """Set up rounds of importance draws from points; None where the density leaves too few.
 
@@ -119,10 +123,12 @@ def from_moved(
         The points.
     others : sequence of ndarray
         Points that know nothing of them, and are to contradict what the draws leave out.
+    near : bool
+        Whether the points are draws of the exact model, that were moved by its errors.
     """
-    value = density(z)
-    z, value = z[np.isfinite(value)], value[np.isfinite(value)]
-    if len(z) <= 2 * z.shape[1]:
+    z = z[np.isfinite(density.parameters.log_prior(z))]
+    value = density(z[:_RANKED])  # rounds evaluate all
+    if np.isfinite(value).sum() <= 2 * z.shape[1]:
         return None
     optima: list[Optimum] = []
     for i in np.argsort(-value)[:_CLIMBS]:
@@ -132,13 +138,13 @@ def from_moved(
     proposal = Proposal(mixture_of(that_matter(optima)), None, MAP_SHARE)
     pending = Verdict(False, ("no steps were made",))
     members = tuple(arrived_at(one) for one in (z, *others) if len(one))
-    return Tempering(proposal, members, pending, scouted=True)
+    return Tempering(proposal, members, pending, scouted=True, near=near)
 
 
 def at_once(
-    job: Job, density: CollapsedDensity, optima: Sequence[Optimum], scouts: Scouts
-) -> tuple[Tempering, int] | None:
-    """Begin with errors integrated out, where they are to be; with the evaluations it took.
+    job: Job, density: CollapsedDensity, known: Mixture | WeightedDraws, scouts: Scouts
+) -> tuple[bool | None, Tempering | None]:
+    """Begin with errors integrated out, where they are to be.
 
     Not where crosstalk and a background are confounded: so few points are no beginning there, and
     what rounds that fail have taken is lost.
@@ -146,22 +152,33 @@ def at_once(
     Parameters
     ----------
     density : CollapsedDensity
-        Of an exact model, whose posterior Laplace shapes do not fit.
-    optima : sequence of Optimum
-        Of this density.
+        Of an exact model.
+    known : Mixture or WeightedDraws
+        Its Laplace shapes, where these do not fit it; or draws of it, which tell all that more of
+        them would.
     scouts : Scouts
         Told of none of them.
+
+    Returns
+    -------
+    (bool or None, Tempering or None)
+        Whether the response bends, None where draws do not tell; and where rounds begin then.
     """
     if not job.can_integrate_error or reparametrisation_of(density) is not None:
-        return None
-    rng = job.stream(Stream.RESPONSE, 1)
-    z = mixture_of(optima).draw(rng, MEMBERS)
-    z = z[np.isfinite(density(z))]
+        return None, None
+    rng, near = job.stream(Stream.RESPONSE, 1), isinstance(known, WeightedDraws)
+    if isinstance(known, WeightedDraws):
+        z = known.z[rng.choice(len(known.z), size=MEMBERS, p=known.weights)]
+        followed, tried = z[chosen_draws(len(z), len(density.frames))], MEASURED
+    else:
+        z = known.draw(rng, MEMBERS)
+        z = z[np.isfinite(density(z))]
+        followed, tried = z[:_FOLLOWED], _TRIED
     if len(z) < _FOLLOWED:
-        return None
-    found = bending(job, density, z, z[:_FOLLOWED], rng, _TRIED)
+        return None, None
+    found = bending(job, density, z, followed, rng, tried)
     if found is None:
-        return None
+        return (False if near else None), None
     erring = job.with_error_integrated().density()
-    stage = from_moved(erring, moved_by(found, z, rng), (scouts.z, scouts.hot))
-    return None if stage is None else (stage, 2 * MEMBERS)
+    others = scouts.z, scouts.hot
+    return True, from_moved(erring, moved_by(found, z, rng), others, near=near)

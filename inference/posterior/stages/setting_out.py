@@ -191,7 +191,8 @@ def _wanted(job: Job, stage: Tempering, members: Sequence[Population]) -> Wanted
         far = stage.shaped or not stage.scouted
         most = HALFWAY_DRAWS if far else SCOUTED_DRAWS
         first = _DEAR if stage.shaped or job.scene.model_error.integrated else STEP
-        return Wanted(target, most, TOLERATED, 0.0, first, _SHAPES if stage.shaped else 0)
+        shapes = _SHAPES if stage.shaped else 0
+        return Wanted(target, most, TOLERATED, 0.0, first, shapes, stage.near)
     most = int(np.clip(_SHARE * sum(each.calls for each in members), *_MOST_DRAWS))
     return Wanted(target, most)
 

@@ -149,6 +149,8 @@ class Tempering(_NotBegun):
     rounds : RoundsSoFar or None
         Rounds of importance sampling that the populations that arrived began; None before, and
         behind them.
+    near : bool
+        Whether they are draws of a model without errors, moved by these: near where they are to be.
     """
 
     phase: ClassVar[Phase] = "tempering"
@@ -162,6 +164,7 @@ class Tempering(_NotBegun):
     reach: float = 1.0
     tried: bool = False
     rounds: RoundsSoFar | None = None
+    near: bool = False
 
     @property
     def early(self) -> bool:

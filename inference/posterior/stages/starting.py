@@ -16,7 +16,7 @@ from inference.posterior.sampling.represent import represent
 from inference.posterior.sampling.scouts import Scouts, led_to, send_scouts, thinned
 from inference.posterior.sampling.start import Optimum, refine
 from inference.posterior.sampling.verdict import Verdict
-from inference.posterior.sampling.warm import beyond, warm_start
+from inference.posterior.sampling.warm import Warm, beyond, warm_start
 from inference.posterior.stages.checkpoint import Checkpoint
 from inference.posterior.stages.chunk import evaluations
 from inference.posterior.stages.ensembles import (
@@ -26,7 +26,7 @@ from inference.posterior.stages.ensembles import (
     from_weighted,
     worth_wanted,
 )
-from inference.posterior.stages.integrating import at_once
+from inference.posterior.stages.integrating import MEMBERS, at_once
 from inference.posterior.stages.looking import (
     Looked,
     LookTask,
@@ -40,7 +40,6 @@ from inference.posterior.stages.scouting import from_scouts
 from inference.posterior.stages.setting_out import TOLERATED
 from inference.posterior.stages.shaping import begins_with_a_shape, from_shapes
 from inference.posterior.stages.stage import (
-    Drawing,
     Settled,
     Starting,
     Tempering,
@@ -193,53 +192,63 @@ def _set_out(job: Job, some: CollapsedDensity, stage: Starting, scouts: Scouts) 
         optima = with_aliases(aliases, density, optima)
     check_ranges(whole, job.scene, optima[0].z)
     check_best_fit(whole, optima[0].z)
-    first, used = _first_stage(job, density, optima, scouts)
-    reached = Checkpoint(first, calls + used, None, job.representatives)
-    moved = at_once(job, density, optima, scouts) if isinstance(first, Tempering) else None
-    if moved is None:
-        return reached
-    erring, used = moved
-    return dataclasses.replace(
-        reached, stage=erring, calls=reached.calls + used, integrated=True, exact=first
-    )
+    first = _first_stage(job, density, optima, scouts)
+    calls += first.calls
+    return dataclasses.replace(first, calls=calls, representatives=job.representatives)
 
 
 def _first_stage(
     job: Job, density: CollapsedDensity, optima: list[Optimum], scouts: Scouts
-) -> tuple[Drawing, int]:
-    """Set up ensembles or draw weighted samples, from optima; with the evaluations it took."""
+) -> Checkpoint:
+    """Set up ensembles, rounds or populations, or draw weighted samples, from optima."""
     proposal = Proposal(mixture_of(optima), None, _SHARE)
     if job.settings.method == "importance":
-        return _importance(density, proposal, job)
+        return Checkpoint(*_importance(density, proposal, job))
     answer, before = _at_rest(job, density, proposal)
     if answer is not None:
-        return answer, before
+        return Checkpoint(answer, before)
     draws = int(np.clip(evaluations(job) // 4, *_WARM_DRAWS))
     warm = warm_start(density, proposal, scouts.z, job.stream(Stream.WARM), draws)
     calls = before + warm.calls
+    by = warm.proposal if warm.fits else proposal
+    drawn = None if warm.contradicted else warm.draws
+    known = warm.draws if warm.fits else by.optima
+    bent, begun = at_once(job, density, known, scouts)
+    if begun is not None or not warm.fits:
+        exact = from_scouts(job, density, by, scouts, drawn) or _from_the_prior(by, drawn)
+        if begun is None:
+            return Checkpoint(exact, calls)
+        return Checkpoint(begun, calls + 2 * MEMBERS, integrated=True, exact=exact)
+    reached = _from_warm(job, density, warm, scouts)
+    linear = bent is False and isinstance(reached.stage, Weighted)
+    return dataclasses.replace(reached, calls=calls + reached.calls, linear=linear)
+
+
+def _from_the_prior(proposal: Proposal, known: WeightedDraws | None) -> Tempering:
     pending = Verdict(False, ("no steps were made",))
-    if not warm.fits:
-        known = None if warm.contradicted else warm.draws
-        stage = from_scouts(job, density, proposal, scouts, known)
-        return stage or Tempering(proposal, (None,) * POPULATIONS, pending, known), calls
-    drawn, may_answer = warm.draws, not _has_too_many(density)
+    return Tempering(proposal, (None,) * POPULATIONS, pending, known)
+
+
+def _from_warm(job: Job, density: CollapsedDensity, warm: Warm, scouts: Scouts) -> Checkpoint:
+    """Draw weighted samples behind a warm start that fits, or go on from it."""
+    drawn, may_answer, calls = warm.draws, not _has_too_many(density), 0
     if may_answer:
-        drawn, used = _weighted_draws(density, warm.proposal, job)
-        calls += used
+        drawn, calls = _weighted_draws(density, warm.proposal, job)
     # walkers are held to the fewer draws: they are to find what more of these weigh too coarsely
     held_to = drawn if job.settings.method == "auto" else warm.draws
     contradicted = beyond(density, warm.proposal, held_to, scouts.hot) >= TOLERATED
     enough = may_answer and _enough(drawn, job)
     if enough and not contradicted and are_told(job, drawn):
-        return answer_of(job, warm.proposal, drawn.that_count, scouts.z, 0), calls
+        return Checkpoint(answer_of(job, warm.proposal, drawn.that_count, scouts.z, 0), calls)
     # walkers, too, would hardly ever jump to where no weight leads, or leave where weights are few
     if contradicted or (may_answer and not enough):
         stage = from_scouts(job, density, warm.proposal, scouts, warm.draws)
         if stage is not None:
-            return stage, calls
+            return Checkpoint(stage, calls)
     ensembles = from_weighted(job, density, warm.proposal, warm.draws, scouts.z)
+    pending = Verdict(False, ("no steps were made",))
     walking = Walking(warm.proposal, ensembles, pending, adaptations=0, weighted=warm.draws)
-    return walking, calls + ensembles[0].walkers * len(ensembles)
+    return Checkpoint(walking, calls + ensembles[0].walkers * len(ensembles))
 
 
 def _at_rest(
