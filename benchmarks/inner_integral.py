@@ -40,7 +40,7 @@ def adaptive(case: Case) -> float:
 
 def unfinished(case: Case) -> int:
     density = collapsed_density(case.sensor, case.scene, case.frames)
-    return density.unfinished_integrals(np.zeros((1, 0)), np.random.default_rng(0))
+    return density.draw_with_likelihoods(np.zeros((1, 0)), np.random.default_rng(0)).unfinished
 
 
 def precise_case(rng: np.random.Generator) -> Case:

@@ -21,7 +21,7 @@ from simulator.parameters import Parameters, Terms, parameters_of
 from simulator.scene import Reference, Scene
 from simulator.sensor import Sensor
 
-__all__ = ["KERNELS", "CollapsedDensity", "FluxBasis", "collapsed_density"]
+__all__ = ["KERNELS", "CollapsedDensity", "FluxBasis", "RangeDraws", "collapsed_density"]
 
 Array = NDArray[np.float64]
 
@@ -43,6 +43,25 @@ class FluxBasis(NamedTuple):
     coefficients: Array
     values: Array
     slopes: Array
+
+
+class RangeDraws(NamedTuple):
+    """Ranges drawn given draws of the parameters.
+
+    Attributes
+    ----------
+    log_r : ndarray, shape (n, frames)
+        nan for a frame without object.
+    likelihoods : ndarray, shape (n, frames)
+        `CollapsedDensity.frame_log_likelihoods` of the parameters.
+    unfinished : int
+        How many integrals over ranges, of n times the blocks, did not settle: density and draws are
+        wrong there.
+    """
+
+    log_r: Array
+    likelihoods: Array
+    unfinished: int
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -202,27 +221,10 @@ class CollapsedDensity:
         """
         return self.common(self._draw_blocks(z, rng)[0])
 
-    def draw_with_likelihoods(self, z: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Draw ranges as `draw_log_ranges`; beside them `frame_log_likelihoods` of z."""
-        log_r, _, values = self._draw_blocks(z, rng)
-        return self.common(log_r), values
-
-    def unfinished_integrals(self, z: Array, rng: np.random.Generator) -> int:
-        """Count the integrals over ranges that did not settle: density and draws are wrong there.
-
-        Parameters
-        ----------
-        z : ndarray, shape (n, d)
-            Draws of the parameters, of positive density.
-        rng : numpy.random.Generator
-            For an error of the flux.
-
-        Returns
-        -------
-        int
-            Of n times the frames.
-        """
-        return int(np.count_nonzero(self._draw_blocks(z, rng)[1]))
+    def draw_with_likelihoods(self, z: Array, rng: np.random.Generator) -> RangeDraws:
+        """Draw ranges as `draw_log_ranges`, with what is found on the way."""
+        log_r, unfinished, values = self._draw_blocks(z, rng)
+        return RangeDraws(self.common(log_r), values, int(np.count_nonzero(unfinished)))
 
     def _draw_blocks(self, z: Array, rng: np.random.Generator) -> tuple[Array, Array, Array]:
         """Draw log r of every block, and count what did not settle, each of shape (n, blocks).

@@ -30,8 +30,6 @@ class Stream(enum.IntEnum):
     """Populations, each by its number and that of the temperature."""
     MEMBERS = 10
     """Which members of a population the ensembles start from."""
-    INTEGRALS = 11
-    """Draws at which the integrals over ranges are looked at."""
     MODEL_ERROR = 12
     """Errors of the model that draws are moved by."""
     REPRESENTATIVES = 13

@@ -67,8 +67,6 @@ __all__ = ["draw", "summarise"]
 
 Array = NDArray[np.float64]
 
-_INTEGRALS = 100  # draws at which the integrals over ranges are looked at
-
 
 def _parameters(
     density: CollapsedDensity, sample: Sample, whole: Whole
@@ -224,13 +222,9 @@ def _out_of_time(job: Job, checkpoint: Checkpoint, cpu_s: float) -> tuple[str, .
     return (f"stopped at the time limit of {limit:g} s",)
 
 
-def _unfinished(density: CollapsedDensity, z: Array, rng: np.random.Generator) -> tuple[str, ...]:
-    """Find integrals over ranges that did not settle: what was drawn is then not the posterior."""
-    chosen = z[np.linspace(0, len(z) - 1, min(len(z), _INTEGRALS)).astype(int)]
-    lost = density.unfinished_integrals(chosen, rng)
-    if not lost:
+def _unfinished(share: float) -> tuple[str, ...]:
+    if not share:
         return ()
-    share = lost / (len(chosen) * density.data.blocks)
     return (
         f"{share:.2%} of the integrals over ranges ran out of panels before they settled: the "
         "density is not known well enough there",
@@ -303,7 +297,7 @@ def _ranges(drawn: _Drawn, whole: Whole) -> RangeSummary:
 def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
     """Say what draws say: of every unknown and range, of themselves, and of the model."""
     job, stage, density, sample = drawn.parts[0], drawn.stage, drawn.density, drawn.sample
-    chosen, log_r = whole.chosen, whole.log_r
+    log_r = whole.log_r
     reasons, k_hat = stage.verdict.reasons, None
     if isinstance(stage, Weighted):
         k_hat = stage.draws.k_hat
@@ -326,7 +320,7 @@ def _of_draws(drawn: _Drawn, whole: Whole) -> Findings:
         judged = weak_at_best(judged, "by readings that no larger noise or smooth error explains")
     found = prior_conflicts(drawn.own, sample.flat, log_r, density, job.model_error)
     fit, judged = contradicted(fit, judged, found)
-    reasons = (*reasons, *_unfinished(drawn.own, chosen, job.stream(Stream.INTEGRALS)))
+    reasons = (*reasons, *_unfinished(drawn.draws.unfinished))
     return Findings(
         reasons,
         k_hat,

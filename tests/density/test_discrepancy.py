@@ -68,7 +68,7 @@ def test_likelihoods_found_while_drawing_are_those_of_the_density(kind: str) -> 
     plain = collapsed_density(sensor_of(kind, 100.0), scene, frames)
     z = np.random.default_rng(1).standard_normal((20, len(plain.parameters)))
     for density in (plain, with_discrepancy(plain, 0.05)):
-        log_r, values = density.draw_with_likelihoods(z, np.random.default_rng(2))
+        log_r, values, _ = density.draw_with_likelihoods(z, np.random.default_rng(2))
         np.testing.assert_array_equal(values, density.frame_log_likelihoods(z))
         again = density.draw_log_ranges(z, np.random.default_rng(2))
         np.testing.assert_array_equal(log_r, again)

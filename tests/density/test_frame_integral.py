@@ -281,4 +281,4 @@ def test_readings_whose_rounding_exceeds_what_panels_agree_to(
         check(case)
         density = collapsed_density(case.sensor, case.scene, case.frames)
         rng = np.random.default_rng(0)
-        assert density.unfinished_integrals(np.empty((1, 0)), rng) == 0
+        assert density.draw_with_likelihoods(np.empty((1, 0)), rng).unfinished == 0

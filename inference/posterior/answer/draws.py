@@ -56,6 +56,9 @@ class Draws:
         Whether parameters and ranges are moved by a random part of what the law of the ranges or
         the number of frames would move them, or mixed with those of a glossy object: they are then
         not those of the posterior whose `log_density` this is.
+    unfinished : float
+        Share of the integrals over ranges that did not settle: what was drawn is then not the
+        posterior.
     """
 
     names: tuple[str, ...]
@@ -69,6 +72,7 @@ class Draws:
     readings: Array
     log_likelihood: Array
     widened: bool = False
+    unfinished: float = 0.0
 
 
 def _count(sample: Sample, frames: int) -> int:
@@ -105,7 +109,7 @@ def draws_of(
     each = min(max(math.ceil(count / (ensembles * walkers)), 1), steps)
     thinned = np.linspace(0, steps - 1, each).astype(np.intp)
     z = sample.z[:, :, thinned].reshape(ensembles * walkers * each, d)
-    log_r, likelihood = density.draw_with_likelihoods(z, rng)
+    log_r, likelihood, lost = density.draw_with_likelihoods(z, rng)
     readings = replicate(density, z, log_r, rng)
     usable = job.usable
 
@@ -125,4 +129,5 @@ def draws_of(
         of_all_frames(np.exp(log_r)),
         of_all_frames(readings),
         of_all_frames(likelihood),
+        unfinished=lost / max(len(z) * density.data.blocks, 1),
     )

@@ -55,7 +55,9 @@ _SHARE = 0.5  # of what the populations took, that importance sampling behind th
 _MOST_DRAWS = (12_000, 40_000)  # but so many at least, and at most
 SCOUTED_DRAWS = 20_000  # that rounds from scouts may take: as many as carry one population
 HALFWAY_DRAWS = 40_000  # and those from small populations, twice: as many as carry these
-_DEAR = 500  # draws of a round until rounds tell, where one takes long
+# draws of a round until rounds tell, where that is dear or what begins it lies near: a fifth less
+# in all than with twice as many
+_FIRST = 500
 _SHAPES = 4  # rounds of shapes, where rounds begin with one
 _FITTED = 2  # adaptations of a law that was held to weighted draws
 _LEADING = 50.0  # effective size of draws, from which on rounds may begin again at them
@@ -190,7 +192,8 @@ def _wanted(job: Job, stage: Tempering, members: Sequence[Population]) -> Wanted
     if stage.early:
         far = stage.shaped or not stage.scouted
         most = HALFWAY_DRAWS if far else SCOUTED_DRAWS
-        first = _DEAR if stage.shaped or job.scene.model_error.integrated else STEP
+        few = stage.shaped or stage.scouted or job.scene.model_error.integrated
+        first = _FIRST if few else STEP
         shapes = _SHAPES if stage.shaped else 0
         return Wanted(target, most, TOLERATED, 0.0, first, shapes, stage.near)
     most = int(np.clip(_SHARE * sum(each.calls for each in members), *_MOST_DRAWS))

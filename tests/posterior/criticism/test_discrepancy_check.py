@@ -58,7 +58,7 @@ def draws_of(density: DiscrepantDensity, seed: int) -> np.ndarray[Any, np.dtype[
 def larger_of(
     density: DiscrepantDensity, z: np.ndarray[Any, np.dtype[np.float64]]
 ) -> LargerDiscrepancy:
-    log_r, stated = density.draw_with_likelihoods(z, np.random.default_rng(1))
+    log_r, stated, _ = density.draw_with_likelihoods(z, np.random.default_rng(1))
     return larger_discrepancy(density, z, log_r, density.total(stated))
 
 

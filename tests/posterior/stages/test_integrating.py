@@ -116,7 +116,7 @@ def test_where_rounds_fail_the_exact_model_is_sampled_and_looked_at() -> None:
 def test_it_is_the_law_that_rounds_behind_an_exact_model_come_to(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(starting, "at_once", lambda *_: None)
+    monkeypatch.setattr(starting, "at_once", lambda *_: (None, None))
     job = _job(seed=1)
     checkpoint = _begun(job)
     assert not checkpoint.integrated
