@@ -1,5 +1,6 @@
 """A smooth error of the flux in the posterior: likelihood, draws and linearisation."""
 
+import dataclasses
 import math
 from typing import Any
 
@@ -62,11 +63,13 @@ def test_likelihood_and_ranges_agree_with_a_sum_over_paths(kind: str, snr: float
 
 
 def test_likelihoods_found_while_drawing_are_those_of_the_density(kind: str) -> None:
-    """To the last bit; and the draws are the same as without them."""
+    """To the last bit, an empty frame among them; and the draws are the same as without them."""
     frames = data(sensor_of(kind, 100.0), {"discrepancy": 0.05}, 5, seed=1).frames
+    frames = dataclasses.replace(frames, object_present=np.arange(5) != 2)
     scene = parse_scene({"object": {**OBJECT, "c2": {"prior": "normal", "mean": 1e4, "sd": 1e3}}})
     plain = collapsed_density(sensor_of(kind, 100.0), scene, frames)
     z = np.random.default_rng(1).standard_normal((20, len(plain.parameters)))
+    z[3] = z[17]  # equal ones share what is found of the error
     for density in (plain, with_discrepancy(plain, 0.05)):
         log_r, values, _ = density.draw_with_likelihoods(z, np.random.default_rng(2))
         np.testing.assert_array_equal(values, density.frame_log_likelihoods(z))

@@ -18,6 +18,7 @@ from inference.identifiability.model_response import (
     curvature_of_response,
     model_response,
 )
+from inference.identifiability.response_rows import ResponseRows, flux_step
 from simulator.parameters import parameters_of
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
@@ -93,6 +94,27 @@ def test_a_small_error_is_followed_to_second_order() -> None:
     coefficients = rng.standard_normal(still.size)
     missed = curvature_of_response(at, found, np.outer([0.04, 0.02], coefficients))
     assert missed[1] / missed[0] == pytest.approx(0.25, abs=0.05)
+
+
+@pytest.mark.parametrize("kind", ["pulsed", "sine_wave"])
+def test_errors_tried_together_are_each_followed_alone(kind: str) -> None:
+    """By the readings where an error leads, and one Gauss-Newton step back, error and all."""
+    at = experiment(kind, 100.0, empty=2)
+    of = model_response(at, at.readings.mean)
+    normal = np.random.default_rng(6).standard_normal((3, of.log_r.shape[1]))
+    wanted = []
+    for one in normal:
+        z, log_r = of.shift[0] + of.parameters @ one, of.shift[1] + of.log_r @ one
+        error = of.error.mean + of.error.spread @ one
+        there = dataclasses.replace(at, z=at.z + z, log_r=at.log_r + log_r, error=error)
+        rows = ResponseRows(at)
+        off = rows.residual(2.0 * at.readings.mean - there.readings.mean)
+        off += rows.by_error @ error + rows.jacobian @ z + rows.along * log_r[:, None]
+        off[:, 2] = 0.0
+        step = flux_step(rows, off, np.zeros(z.size))
+        again = step.by_readings[1] + step.by_error[1] @ step.coefficients(np.zeros(error.size))
+        wanted.append(np.sqrt(np.mean(np.square(again[np.isfinite(at.log_r)]))))
+    np.testing.assert_allclose(curvature_of_response(at, of, normal), wanted, rtol=1e-6)
 
 
 def _by_coefficients(found: ModelResponse) -> dict[str, Array]:

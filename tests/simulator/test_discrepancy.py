@@ -44,6 +44,15 @@ def test_slopes_are_derivatives_and_the_functions_constant_outside() -> None:
     assert not basis.slopes(outside).any()
 
 
+def test_sums_of_the_functions_are_those_of_their_values() -> None:
+    """Also outside, where they are constant; sums of 10 to 30 terms are rounded a few times."""
+    basis, rng = discrepancy_basis(0.1, 2.0), np.random.default_rng(4)
+    u = rng.uniform(math.log(0.05), math.log(3.0), (7, 20))
+    coefficients = rng.standard_normal((7, basis.size))
+    wanted = np.einsum("nmk,nk->nm", basis.values(u), coefficients)
+    np.testing.assert_allclose(basis.sums(u, coefficients), wanted, rtol=0, atol=1e-13)
+
+
 def test_the_slope_has_the_stated_size() -> None:
     """-C''(0), by a difference of a series whose next term is 25 h^2 / 24 of the whole."""
     h = 1e-4

@@ -1,6 +1,7 @@
 """Rounds of importance draws that are put aside between two steps are the same to the last bit."""
 
 import dataclasses
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -172,3 +173,20 @@ def test_draws_that_members_contradict_are_none() -> None:
         target[300 : 300 + count] += 60.0
         contradicted = dataclasses.replace(told, pool=dataclasses.replace(pool, target=target))
         assert (contradicted.draws is not None) == stands
+
+
+def test_very_even_weights_tell_sooner_where_members_are_near() -> None:
+    """A round has three laws, and the first step one."""
+    told = {}
+    for near in (False, True):
+        for rounds in (3, 4, 7):
+            for k_hat in (0.1, 0.3):
+                pool: Any = SimpleNamespace(laws=(START,) * (1 + 3 * (rounds - 1)))
+                wanted = dataclasses.replace(WANTED, near=near)
+                so_far = RoundsSoFar(wanted, START, pool, (0,), 0)
+                so_far.__dict__["k_hat"] = k_hat  # of weights that are not made
+                told[near, rounds, k_hat] = so_far.telling
+    assert {key for key, tells in told.items() if tells} == {
+        *((near, 7, k_hat) for near in (False, True) for k_hat in (0.1, 0.3)),
+        (True, 4, 0.1),
+    }

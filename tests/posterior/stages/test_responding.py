@@ -1,7 +1,7 @@
 """Whether linear response to the model's errors stands, and what follows where it does not.
 
-Three sets of the random study. 34 is an unknown object before unknown crosstalk: quick, and bent. Of
-82 the exact model's draws are a thin sheet: by linear response around them object.c2 was 6.5
+Three sets of the random study. 34 is an unknown object before unknown crosstalk: quick, and bent.
+Of 82 the exact model's draws are a thin sheet: by linear response around them object.c2 was 6.5
 standard deviations off and `identified`, and none of 21 ranges was held. 11 is an object alone,
 whose warm start fits.
 """
@@ -231,6 +231,11 @@ def test_where_a_warm_start_bends_no_more_is_drawn_of_the_exact_model(
     answer = fold.summarise(_job(WARM), reached, 1.0, 1.0)
     assert answer.drawn
     assert not answer.verdict.converged
+    job = _job(WARM)
+    stage = fold.merge(job, reached, [fold.run(t) for t in fold.tasks(job, reached)]).stage
+    assert isinstance(stage, Tempering)
+    assert stage.rounds is not None
+    assert stage.rounds.wanted.near
 
 
 @pytest.mark.parametrize("off", [1.0, 1.6, 1 / 1.6])
