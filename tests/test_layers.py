@@ -39,7 +39,7 @@ ALLOWED: dict[str, str] = {
     "inference/fits/answer": f"inference.fits.likelihood {_OF_FITS} inference.identifiability",
     "inference/fits/linear": f"inference.fits.likelihood inference.fits.answer {_OF_FITS}",
     "inference/fits/techniques": f"{_FITS} inference.identifiability",
-    "inference/posterior": f"{_POSTERIOR} inference.fits",
+    "inference/posterior": f"{_POSTERIOR} inference.fits inference.assumptions",
     "inference/posterior/answer": _POSTERIOR,
     "inference/posterior/criticism": _POSTERIOR,
     "inference/posterior/sampling": "inference.density inference.frame",

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from inference.assumptions import assumptions_of
 from inference.density.collapsed import CollapsedDensity
 from inference.frame.known_range import rates_of
 from inference.frame.warmth import gains_of
@@ -272,6 +273,7 @@ def summarise(job: Job, checkpoint: Checkpoint, wall_s: float, cpu_s: float) -> 
         Runtime(wall_s, cpu_s, drawn.calls, found.k_hat),
         drawn.draws,
         selection_summary(job.scene, checkpoint.selection),
+        assumptions_of(job.scene, job.sensor, job.frames),
     )
 
 

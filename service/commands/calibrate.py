@@ -49,6 +49,7 @@ def _run(args: argparse.Namespace) -> int:
     from inference.posterior.calibrated import refuse_known_object
     from service.commands.files import check_folder
     from service.commands.frames import checked_whole
+    from service.plausibility import doubts
     from service.whole_files import write_whole
     from simulator.parameters import parameters_of
 
@@ -70,7 +71,7 @@ def _run(args: argparse.Namespace) -> int:
             note(args, line)
     elif record.result is not None:
         note(args, f"{args.output} is not written: nothing was drawn")
-    return exit_code_of(args, record)
+    return exit_code_of(args, record, doubts(system[0], system[2]))
 
 
 def _learnt(document: bytes) -> list[str]:

@@ -4,7 +4,7 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,6 +80,7 @@ def _run(args: argparse.Namespace) -> int:
     from service.answers.posteriors import full
     from service.commands.frames import checked_whole
     from service.commands.output import write_result
+    from service.plausibility import doubts
 
     form = None if args.draws is None else _format_of(args.draws)
     settings = settings_of(args)
@@ -91,11 +92,17 @@ def _run(args: argparse.Namespace) -> int:
     elif form is not None and record.result is not None:
         note(args, f"{args.draws} is not written: nothing was drawn")
     write_result(json.dumps(full(record), allow_nan=False).encode())
-    return exit_code_of(args, record)
+    return exit_code_of(args, record, doubts(system[0], system[2]))
 
 
-def exit_code_of(args: argparse.Namespace, record: "JobRecord") -> int:
-    """Return the exit code of a posterior that has ended, having said on standard error why."""
+def exit_code_of(args: argparse.Namespace, record: "JobRecord", said: Collection[str] = ()) -> int:
+    """Return the exit code of a posterior that has ended, having said on standard error why.
+
+    Parameters
+    ----------
+    said : collection of str
+        Doubts that were told before.
+    """
     if record.problem is not None:
         for error in record.problem["errors"]:
             at = f"{args.scene}#{error['pointer']}: {error['detail']}"
@@ -112,6 +119,9 @@ def exit_code_of(args: argparse.Namespace, record: "JobRecord") -> int:
         sys.stderr.write(f"hybridtof: not converged: {reasons}\n")
     for line in _warnings(result):
         note(args, line)
+    for supposed in result.get("assumptions") or ():
+        if supposed not in said:
+            note(args, f"note: {supposed}")
     return 0 if converged else 3
 
 

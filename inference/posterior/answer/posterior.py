@@ -239,6 +239,9 @@ class Posterior:
         All optima that were found, numbered as in the verdict.
     selection : SelectionSummary, optional
         With optional terms in the scene: the models that were compared, and what was decided.
+    assumptions : tuple of str
+        What the answer supposes without a check, and what looks like a mistake
+        (`inference.assumptions`).
     """
 
     method: str
@@ -254,6 +257,7 @@ class Posterior:
     runtime: Runtime
     draws: Draws
     selection: SelectionSummary | None = None
+    assumptions: tuple[str, ...] = ()
 
     def to_arviz(self) -> Any:
         """Return the draws for ArviZ: ``InferenceData``, from ArviZ 1 on an xarray ``DataTree``.
@@ -292,6 +296,7 @@ class Posterior:
             "fit": dataclasses.asdict(self.fit),
             "left_out": [dataclasses.asdict(row) for row in self.left_out],
             "selection": None if self.selection is None else dataclasses.asdict(self.selection),
+            "assumptions": self.assumptions,
             "runtime": dataclasses.asdict(self.runtime),
         }
         document["range_m"]["sd_parts"] = dataclasses.asdict(self.range_m.sd_parts)
