@@ -29,13 +29,13 @@ SCENE = parse_scene(
 
 def test_readings_of_a_stuck_reader_are_told_of() -> None:
     """Frames that repeat were silent: sure, and as wrong as the reader was stuck."""
-    path = RadialTrajectory(from_m=0.2, to_m=1.0, frames=12, spacing="log")
+    path = RadialTrajectory(from_m=0.2, to_m=1.0, frames=30, spacing="log")
     frames = simulate(SENSOR, SCENE, path, 3).frames
     answer = infer(SENSOR, SCENE, frames)
     assert answer.assumptions == ()
     assert answer.to_json()["assumptions"] == []
     readings = frames.readings.copy()
-    readings[5:8] = readings[4]
+    readings[21:24] = readings[20]
     stuck = dataclasses.replace(frames, readings=readings)
     told = stuck_readings(SENSOR, stuck)
     assert told is not None
