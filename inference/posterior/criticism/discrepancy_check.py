@@ -44,7 +44,6 @@ __all__ = [
 Array = NDArray[np.float64]
 
 _FACTOR = 2.0
-_WEIGHED = 500  # draws, at most: a sixth of a standard deviation of what they move is chance
 MISFIT = 1e3  # Bayes factor: a false-alarm rate of at most 1e-3
 _BENT = 0.3  # share of a linear response that the next order adds, above which it is no guide
 ADDED = 0.2  # of the whole uncertainty that the next order adds, above which it is none either
@@ -92,8 +91,6 @@ def larger_discrepancy(
     LargerDiscrepancy
         Where the larger size would put the parameters beyond the draws, its figures are too small.
     """
-    some = np.linspace(0, len(z) - 1, min(len(z), _WEIGHED)).astype(np.intp)
-    z, log_r, stated = z[some], log_r[some], stated[some]
     larger = dataclasses.replace(density, discrepancy=_FACTOR * density.discrepancy)
     each, which = np.unique(z, axis=0, return_inverse=True)  # draws by weight come repeatedly
     gain = larger.log_likelihood(each)[which] - stated
