@@ -119,14 +119,14 @@ def _drawn(wanted: _Wanted, rng: np.random.Generator) -> PathSet:
     ruler: list[float | None] | None = None
     if wanted.worse:
         ruled = rng.choice(ranges.size, _RULED, replace=False)
-        of_frames = np.isin(np.arange(ranges.size), ruled).tolist()
+        of_frames = np.isin(np.arange(-wanted.empty, ranges.size), ruled).tolist()
         ruler = [_RULER_M * wanted.worse if one else None for one in of_frames]
     read = light / wanted.snr
     sensor = parse_sensor({**kind, "noise": {"read": [read, read * between((0.5, 2.0), rng)]}})
     path = SampledTrajectory(
         range_m=[1.0] * wanted.empty + ranges.tolist(),
         object_present=[False] * wanted.empty + [True] * ranges.size,
-        known_range_sd_m=ruler and [None] * wanted.empty + ruler,
+        known_range_sd_m=ruler,
     )
     seen = simulate(sensor, parse_scene(made), path, rng)
     name = f"{kind['kind']}, SNR {wanted.snr:.0f}, {ranges.min():.2f}-{ranges.max():.2f} m"

@@ -95,6 +95,7 @@ def test_what_is_told_is_held_against_its_own_errors() -> None:
     target = seen.errors[:, 0]
     weights = weights_of_told(along, beside).ravel()
     weights = np.concatenate([np.zeros(target.size - weights.size), weights])
-    found = off_their_own(target - followed @ (followed.T @ target), followed, weights)
-    assert found == (pytest.approx(wanted, rel=1e-9), int(free.sum()))
-    assert 0 < free.sum() < left.size
+    square, number = off_their_own(target - followed @ (followed.T @ target), followed, weights)
+    assert square == pytest.approx(wanted, rel=1e-9)
+    assert number == free.sum()
+    assert 0 < number < left.size
