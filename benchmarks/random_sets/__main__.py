@@ -29,7 +29,8 @@ def main() -> None:
         choices=[*SETS],
         default="random",
         help="wide: sensors and scenes of all kinds; uneven: those, with readings that differ in "
-        "noise by up to 100; spoiled: readings as no scene states them",
+        "noise by up to 100; spoiled: readings as no scene states them; others: of one kind alone, "
+        "the last four with a fact that is stated wrongly",
     )
     given = parser.parse_args()
     seed = secrets.randbits(31) if given.seed is None else given.seed

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from benchmarks.coverage.path_rows import posterior_of
 from benchmarks.coverage.paths import PathSet
+from benchmarks.random_sets.one_kind import KINDS, kind_of_set
 from benchmarks.random_sets.sets import random_set
 from benchmarks.random_sets.spoiled import spoiled_set
 from benchmarks.random_sets.wide import uneven_set, wide_set
@@ -182,6 +183,7 @@ SETS: Mapping[str, Callable[[int, int], PathSet]] = {
     "wide": wide_set,
     "uneven": uneven_set,
     "spoiled": spoiled_set,
+    **{kind: functools.partial(kind_of_set, kind) for kind in KINDS},
 }
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from benchmarks.random_sets import wide
 from benchmarks.random_sets.answers import COLUMNS, answer_row
+from benchmarks.random_sets.one_kind import KINDS, kind_of_set
 from benchmarks.random_sets.report import summary, wrong
 from benchmarks.random_sets.sets import random_set
 from benchmarks.random_sets.spoiled import SPOILED, spoiled_set
@@ -143,3 +144,17 @@ def test_a_valley_that_falls_slowly_holds_mass() -> None:
     row = answer_row("fits", 4242, 1.0, 88, "v", of="wide")
     assert row["answered"] == row["held"] == 69
     assert float(row["worst"]) < 2.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_sets_of_one_kind_are_what_they_say(kind: str) -> None:
+    sensors = set()
+    for number in range(12):
+        data = kind_of_set(kind, SEED, number)
+        check_scene(data.sensor, parse_scene(data.scene))
+        assert len(data.frames) == data.range_m.size
+        assert np.isfinite(data.range_m[data.frames.present]).all()
+        sensors.add(data.sensor.kind)
+    assert len(sensors) == 2
+    again = kind_of_set(kind, SEED, 3).frames.readings
+    np.testing.assert_array_equal(kind_of_set(kind, SEED, 3).frames.readings, again)

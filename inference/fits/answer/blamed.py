@@ -7,8 +7,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inference.fits.answer.model_checks import Rows, basis, rows_of, without_size
-from inference.fits.answer.report import p_value_of
+from inference.fits.answer.model_checks import Rows, basis, model_checks, rows_of, without_size
+from inference.fits.answer.report import fit_report
 from inference.fits.likelihood.erring import Erring, erring_maxima
 from inference.fits.likelihood.erring_point import deviations_of
 from inference.fits.likelihood.places import places_of
@@ -131,9 +131,15 @@ def _fitted_without(problem: FitProblem, top: Erring) -> Sequence[int]:
         climb = prior_maxima if problem.priors else erring_maxima
         start = dataclasses.replace(top, positions=np.delete(top.positions, out))
         ends = climb(rest, [start])
-        if any(p_value_of(rest, end.chi_square) >= _FALSE_ALARM for end in ends):
+        if any(_fits(rest, end) for end in ends):
             return [int(frame) for frame in out]
     return ()
+
+
+def _fits(problem: FitProblem, end: Erring) -> bool:
+    """Return whether a fit passes all checks: of one that fails another, no frame is to blame."""
+    checks = model_checks(problem, end)
+    return not fit_report(problem, [end], end.chi_square, 0, 1.0, checks)["misfit"]
 
 
 def _without(problem: FitProblem, top: Erring, out: NDArray[np.intp]) -> FitProblem:

@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inference.fits.answer.stated_facts import along_brightness, off_their_own, weights_of_told
 from inference.fits.answer.succession import goes_on
 from inference.fits.likelihood.arguments import CROSSTALK
 from inference.fits.likelihood.erring import Erring
@@ -46,6 +47,7 @@ Array = NDArray[np.float64]
 _FREE = 0.05  # least share of its variance that the fit leaves of a direction that is looked at
 _SMOOTH = 0.03  # share that is left of errors of the flux by a sixth of it
 SUCCESSION = "succession"
+BRIGHTNESS, TOLD = "brightness", "known_ranges"
 _APART = 1e-6  # of a column, below which the fit can make it itself
 
 REASONS: Mapping[str, str] = {
@@ -62,6 +64,15 @@ REASONS: Mapping[str, str] = {
         "what the fit leaves of the readings goes on from frame to frame, as noise does not: a "
         "sensor or its driver smooths them (a low-pass, a running mean), and ranges are late, or "
         "something else changes slowly; send readings that are not smoothed, with their own noise"
+    ),
+    BRIGHTNESS: (
+        "an object that is brighter or darker than the number c2 makes it would explain the "
+        "readings better: the numbers of `object` are of another one, or its light has changed; "
+        "state what is not sure as a prior, or leave it out"
+    ),
+    TOLD: (
+        "what is told of ranges beside the readings lies farther off than its standard deviations "
+        "allow: state what it is right to in known_range_sd_m or displacement_sd_m"
     ),
 }
 """What it means that a check fails, by its name."""
@@ -90,6 +101,10 @@ class Rows(NamedTuple):
         Derivatives along all that was fitted.
     crosstalk : ndarray, shape (m, c)
         Along the crosstalk that is no unknown.
+    brightness : ndarray, shape (m, 0 or 1)
+        Along the light of an object whose c2 is no unknown.
+    told : ndarray, shape (m - k - d,)
+        How much of the first rows is what is told of ranges; none where nothing is.
     dense : ndarray, shape (d,)
         How much nearer than in the target unknowns are to where their priors are densest.
     frames : ndarray of int, shape (m - k - d,)
@@ -99,6 +114,8 @@ class Rows(NamedTuple):
     target: Array
     followed: Array
     crosstalk: Array
+    brightness: Array
+    told: Array
     dense: Array
     frames: NDArray[np.intp]
 
@@ -109,20 +126,27 @@ def rows_of(problem: FitProblem, top: Erring) -> Rows:
     whitener = linearised(problem, top.x, top.positions)[-1]
     # crosstalk moves the readings themselves
     known = [i for i, slot in enumerate(CROSSTALK) if slot not in problem.slots]
-    columns = [at.errors, at.residual[:, :, None], solved_by_root(at.root, whitener)[:, :, known]]
+    bright = along_brightness(problem, at.x, at.u)
+    facts = np.concatenate([whitener[:, :, known], bright], axis=2)
+    columns = [at.errors, at.residual[:, :, None], solved_by_root(at.root, facts)]
     told, (k, d, c) = at.told, (at.a.size, at.x.size, len(known))
+    weights = np.empty((0, 2))
     if told is not None:
-        none = np.zeros((at.u.size, 2, c))
+        weights = weights_of_told(at.along, told)
+        none = np.zeros((at.u.size, 2, facts.shape[2]))
         told = told._replace(
             errors=np.concatenate([told.errors, told.residual[:, :, None], none], axis=2)
         )
     seen = eliminated(problem.names, at.jacobian, at.along, np.concatenate(columns, axis=2), told)
-    errors, residual, crosstalk = np.split(seen.errors, [k, k + 1], axis=1)
+    errors, residual, crosstalk, bright = np.split(seen.errors, [k, k + 1, k + 1 + c], axis=1)
     slopes = slopes_of_priors(problem, at.x)
+    before = np.zeros(len(errors) - weights.size if weights.size else 0)
     return Rows(
         np.concatenate([residual[:, 0], -at.a, -at.z]),
         np.block([[errors, seen.jacobian], [np.eye(k, k + d)], [np.zeros((d, k)), slopes]]),
         np.vstack([crosstalk, np.zeros((k + d, c))]),
+        np.vstack([bright, np.zeros((k + d, bright.shape[1]))]),
+        np.concatenate([before, weights.ravel()]),
         at.z - deviations_of(problem, at.x),
         _frames_of_rows(at.along, told is not None),
     )
@@ -164,7 +188,9 @@ def model_checks(problem: FitProblem, top: Erring) -> dict[str, Check]:
         ``crosstalk``: a score test (Rao 1948) of constant light that the scene says to be another,
         or none at all; ``priors``: the unknowns against their laws. Each is chi-square distributed
         where the scene is as stated, up to what is not linear. ``succession``: whether what is left
-        goes on from frame to frame (`succession.goes_on`).
+        goes on from frame to frame (`succession.goes_on`). Only where a scene states such:
+        ``brightness``, a score test of another light of an object whose c2 is a number; and
+        ``known_ranges``, what is told of ranges against their own standard deviations.
     """
     rows = rows_of(dataclasses.replace(problem, mode=top.clean.mode), top)
     followed = basis(without_size(rows.followed))
@@ -192,11 +218,17 @@ def model_checks(problem: FitProblem, top: Erring) -> dict[str, Check]:
     # what large errors leave of each frame is smooth, and no noise
     if share_left(problem, top.positions) < _SMOOTH:
         often = goes_on(target[:readings], followed[:readings], rows.frames)
-    return {
+    checks = {
         "crosstalk": _check(light.T @ target),
         "priors": priors,
         SUCCESSION: Check(float(scipy.special.chdtri(1, often)), 1),
     }
+    if rows.brightness.size:
+        bright = basis(left(without_size(rows.brightness)))
+        checks[BRIGHTNESS] = _check(bright.T @ target)
+    if rows.told.size:
+        checks[TOLD] = Check(*off_their_own(target[:readings], followed[:readings], rows.told))
+    return checks
 
 
 def free_of(problem: FitProblem, top: Erring) -> float:
