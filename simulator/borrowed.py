@@ -19,6 +19,7 @@ _Lower: Any = lowering.Lower
 _NativeLowering: Any = typed_passes.NativeLowering
 _Compiler: Any = compiler.Compiler
 _Context: Any = NRTContext
+_registered: Any = register_pass
 _ir: Any = ir
 _types: Any = types
 
@@ -99,7 +100,7 @@ class _Lowering(_Lower):  # type: ignore[misc]
         )
 
 
-@register_pass(mutates_CFG=True, analysis_only=False)
+@_registered(mutates_CFG=True, analysis_only=False)
 class _BorrowedLowering(_NativeLowering):  # type: ignore[misc]
     _name = "borrowed_lowering"
 

@@ -7,14 +7,14 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 import pytest
-from numba.core.runtime import _nrt_python, rtsys
+from numba.core import runtime
 
 from simulator import borrowed
 
 # numba's classes carry no types, and its stubs know a part of its options
 _njit: Any = numba.njit
-_runtime: Any = rtsys
-_counting: Any = _nrt_python
+_numbas: Any = runtime
+_runtime, _counting = _numbas.rtsys, _numbas._nrt_python
 _Lowering: Any = borrowed._Lowering
 ORDER = np.array([2, 0])
 
