@@ -11,13 +11,14 @@ from typing import Any
 import numba
 from numba.core import codegen, compiler, runtime
 
+from simulator.borrowed import Compiler
+
 __all__ = ["ClosedCompiler", "InnerCompiler", "rebuilt"]
 
 # numba's classes carry no types, and its stubs know a part of its names
 _numba: Any = numba
 _runtime: Any = runtime
 _Library: Any = codegen.JITCodeLibrary
-_Compiler: Any = compiler.Compiler
 _CompileResult: Any = compiler.CompileResult
 _make_function: Any = _numba._dynfunc.make_function
 _codegen: Any = codegen
@@ -46,7 +47,7 @@ class _InnerLibrary(_Library):  # type: ignore[misc]
         return self.name, "inner", self._get_module_for_linking().as_bitcode()
 
 
-class InnerCompiler(_Compiler):  # type: ignore[misc]
+class InnerCompiler(Compiler):
     """numba's compiler, up to where code would be made runnable."""
 
     def __init__(self, typing: Any, target: Any, library: Any, *more: Any) -> None:
@@ -71,7 +72,7 @@ class _ClosedLibrary(_Library):  # type: ignore[misc]
         super()._optimize_final_module()
 
 
-class ClosedCompiler(_Compiler):  # type: ignore[misc]
+class ClosedCompiler(Compiler):
     """numba's compiler, of a kernel that Python alone calls."""
 
     def compile_extra(self, function: Callable[..., Any]) -> Any:

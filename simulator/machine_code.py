@@ -7,6 +7,7 @@ import numba
 from numba import extending, types
 from numba.core import sigutils
 
+from simulator.borrowed import Compiler
 from simulator.closed import CLOSED
 from simulator.compile_lock import turn
 from simulator.inner_code import ClosedCompiler, InnerCompiler
@@ -58,7 +59,9 @@ def dispatcher(
     because error-free transformations and tests for nan must survive.
     """
     hidden = {name: value for name, value in options.items() if name.startswith("_")}
-    pipeline: dict[str, Any] = {"pipeline_class": ClosedCompiler} if hidden.pop(CLOSED, 0) else {}
+    pipeline: dict[str, Any] = {
+        "pipeline_class": ClosedCompiler if hidden.pop(CLOSED, 0) else Compiler
+    }
     if inner:
         pipeline = {"no_cpython_wrapper": True, "pipeline_class": InnerCompiler}
     made = _njit(

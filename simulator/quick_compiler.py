@@ -3,16 +3,18 @@
 Most of the time of compiling is spent in numba's own Python. What is replaced here takes a quarter
 of it, and comes to the same: lists of variables by a chain of `isinstance` for every operand,
 settings compared member by member for every call, a lock that tells listeners of each of 80,000
-steps, lifetimes that no later step asks for, and runnable copies of functions that nobody runs.
+steps, lifetimes that no later step asks for, runnable copies of functions that nobody runs, what a
+sum of two numbers may be, and hashes of types of tuples.
 """
 
 import contextlib
 import gc
+import os
 import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from numba.core import codegen, ir, postproc, targetconfig, transforms
+from numba.core import codegen, ir, postproc, targetconfig, transforms, types
 from numba.core.typing import templates
 
 from simulator.inner_code import InnerCompiler
@@ -36,6 +38,14 @@ _Lifetime: Any = postproc.VariableLifetime
 _canonical: Any = transforms.canonicalize_cfg
 _run_all: Any = _Post.run
 _codegen: Any = codegen
+_types: Any = types
+_Function: Any = _types.functions.BaseFunction
+_call_type: Any = _Function.get_call_type
+_NUMBERS: Any = (_types.Number, _types.Boolean)
+# hashes hold in one process
+_PROCESS = os.urandom(8)
+# signatures of calls of numbers, by function and arguments
+_signatures: dict[Any, Any] = {}
 _lock_of_llvm: Any = _codegen.ll.ffi.lib._lock
 # hashes of settings by their class
 _hashes: dict[type, int] = {}
@@ -132,12 +142,36 @@ def _jit_of_inner_code(self: Any) -> Callable[..., Any]:
     return inner
 
 
+def _get_call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
+    """Return the signature of a call; of numbers it is found once.
+
+    numba asks every template of an operator anew, those for strings, lists and arrays first.
+    """
+    if kws or not all(isinstance(kind, _NUMBERS) for kind in args):
+        return _call_type(self, context, args, kws)
+    found = _signatures.get((self, args))
+    if found is None:
+        found = _signatures[self, args] = _call_type(self, context, args, kws)
+    return found
+
+
+def _hash_of_tuple(self: Any) -> int:
+    """Return the hash of a type of tuples, which numba makes of all its members' every time."""
+    whose, found = self.__dict__.get("_hash", (None, 0))
+    if whose != _PROCESS:  # also one that the disk has kept
+        found = hash(self.key)
+        self._hash = _PROCESS, found
+    return int(found)
+
+
 def quicken() -> None:
     """Put all of it in the places of numba's own."""
     _ir.Inst._rec_list_vars = _list_variables
     _Config.__eq__, _Config.__hash__ = _equal, _hash
     _Post.run = _run
     _Overload._get_jit_decorator = _jit_of_inner_code
+    _Function.get_call_type = _get_call_type
+    _types.BaseTuple.__hash__ = _hash_of_tuple
     # they count how long the lock is held, for a number that nobody reads
     _lock_of_llvm._cblist[:] = [
         pair for pair in _lock_of_llvm._cblist if pair[0].__module__ != "numba.core.base"

@@ -129,3 +129,10 @@ def test_bad_files(tmp_path: Path) -> None:
         hybridtof.read_frames(sensor, tmp_path / "frames.txt")
     with pytest.raises(FileNotFoundError):
         hybridtof.read_frames(sensor, tmp_path / "none.csv")
+
+
+def test_an_application_brings_nothing_that_it_may_never_need() -> None:
+    """A posterior brings scipy's statistics, and a database that is opened its migrations."""
+    late = {"scipy.stats", "scipy.optimize", "scipy.interpolate", "alembic", "emcee", "numba"}
+    code = f"import sys, service.app; assert not {late} & sys.modules.keys(), sys.modules.keys()"
+    assert "service" in loaded(code)

@@ -16,6 +16,7 @@ from inference.frame.blocks import Block, frame_count
 from inference.frame.gaussian import log_top
 from inference.frame.log_density import log_density, rounding, slope_and_curvature
 from inference.frame.modes import LEFT, LOG_MASS, POSITION, RIGHT, SD, TOP, UNFINISHED
+from inference.frame.noise import has_shot
 from simulator.compiled import compiled
 
 __all__ = ["best_mode", "falls_off", "integrate_range"]
@@ -94,7 +95,7 @@ def _narrow(mode: Array, block: Block, scene: FrameScene) -> float:
                 odd += value
     # the error of the whole rule is about the fourth power of this, but not across the kinks
     # that shot noise has where a mean reading changes sign
-    allowed = 2e-3 if scene.instrument.shot is None else 1e-5
+    allowed = 1e-5 if has_shot(scene.instrument.shot) else 2e-3
     if not abs(even - odd) <= allowed * (even + odd):
         return -1.0
     return float(_STEP * sd * (even + odd))
@@ -109,7 +110,7 @@ def _leaning(mode: Array, block: Block, scene: FrameScene) -> float:
     step, so that less than b^2/a is left of its error.
     """
     top, sd = mode[TOP], mode[SD]
-    if not (sd < 1.0 and scene.instrument.shot is None):
+    if not sd < 1.0 or has_shot(scene.instrument.shot):
         return -1.0
     for end in (mode[LEFT], mode[RIGHT]):
         if not log_density(end, block, scene) < top - _GONE:
@@ -191,7 +192,7 @@ def _march(
         of halves still contradicted them.
     """
     # halves of a smooth panel are 2^-16 of its error off
-    smooth = 1e-4 if scene.instrument.shot is None else 1e-8
+    smooth = 1e-8 if has_shot(scene.instrument.shot) else 1e-4
     total, unfinished = -math.inf, 0.0
     for sign in (-1.0, 1.0):
         end = mode[LEFT] if sign < 0.0 else mode[RIGHT]

@@ -203,10 +203,15 @@ class Rows(NamedTuple):
 
 
 def instrument_of(sensor: Sensor) -> Instrument:
-    """Return a sensor as the kernels take it; noise of size zero is none."""
+    """Return a sensor as the kernels take it.
+
+    Shot and relative noise of size zero are none where both are: one machine code does for one of
+    them and for both.
+    """
     r0, wave = instrument(sensor)
     noise = sensor.noise
-    shot, relative = noise.shot or None, noise.relative or None
+    varies = noise.shot > 0.0 or noise.relative > 0.0
+    shot, relative = (noise.shot, noise.relative) if varies else (None, None)
     return Instrument(r0, wave, noise.read, shot, relative, noise.flickers)
 
 

@@ -23,6 +23,7 @@ __all__ = [
     "covariance",
     "covariances",
     "determinant",
+    "has_shot",
     "in_units",
     "noise_of",
     "root",
@@ -59,6 +60,15 @@ class Triangle(NamedTuple):
     e11: float
     e21: float
     e22: float
+
+
+@compiled
+def has_shot(shot: float | None) -> bool:
+    """Tell whether the variance grows with the light: there are kinks where a mean vanishes."""
+    if shot is not None:
+        return shot > 0.0
+    else:  # noqa: RET505  # a branch, so that it is pruned at compile time
+        return False
 
 
 @compiled

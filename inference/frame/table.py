@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from inference.frame.arguments import FrameScene, Instrument, Pair
 from inference.frame.gaussian import precision_product
 from inference.frame.mean_readings import light_along, light_at, with_crosstalk
+from inference.frame.noise import has_shot
 from inference.frame.range_prior import LEAST_INFORMATION, log_range_density, log_resolved
 from simulator.compiled import compiled
 
@@ -98,7 +99,7 @@ def _too_coarse(
             split[k - 1] = split[k - 1] or length1 > _VISIBLE * _VISIBLE
             split[k] = length2 > _VISIBLE * _VISIBLE
         x1, y1, length1 = x2, y2, length2
-    if shot is not None:
+    if has_shot(shot):
         # shot noise vanishes where a mean reading does, and the difference's where both are equal
         for k in range(split.size):
             a1, a2 = table[MEAN_1, k] + offset[0], table[MEAN_1, k + 1] + offset[0]

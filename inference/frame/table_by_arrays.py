@@ -50,7 +50,7 @@ def _too_coarse(
     split[:-1] |= turns
     split[1:] |= turns
     split &= length > _LEAST
-    if shot is not None:
+    if shot:
         a, b = table[MEAN_1] + offset[0], table[MEAN_2] + offset[1]
         split |= _changes_sign(a, unit[0]) | _changes_sign(b, unit[1])
         if pulsed:

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 _SPARE = 4  # frames beyond the unknowns: fewer say next to nothing of a variance
 _STEP = 1e-5  # of a range, for slopes
 _SURE = 0.95
-_SHOWN = float(scipy.stats.norm.ppf(_SURE)) ** 2  # of the deviance: a size is not below zero
+_SHOWN = float(scipy.special.ndtri(_SURE)) ** 2  # of the deviance: a size is not below zero
 _LEAST = 1e-6  # of a variance: next to nothing of it
 _APART = 0.25  # between logarithms of squared sizes that are tried: no maximum is as narrow
 

@@ -230,7 +230,7 @@ def in_force(
 
 def _conditioned(plan: Plan, drift: Drift, means: EmptyMeans) -> tuple[Drift, bool]:
     """Return a law that has learnt from frames without the object, and whether it had to jump."""
-    limit = scipy.stats.chi2.isf(_FALSE_ALARM, int(np.isfinite(means.sd).sum()))
+    limit = scipy.special.chdtri(int(np.isfinite(means.sd).sum()), _FALSE_ALARM)
     wide = drift
     while True:
         _, before = widened(plan, wide, means.time_s)

@@ -47,7 +47,7 @@ def withheld(model: Tracker, frames: Frames, track: Track) -> Track:
     empty = surprise_of_empty(model, frames.select(one))
     used = int(np.sum(model.observed.used))
     may = np.zeros(len(track), dtype=bool)
-    may[one] = empty <= scipy.stats.chi2.isf(_MAY_BE_EMPTY, used)
+    may[one] = empty <= scipy.special.chdtri(used, _MAY_BE_EMPTY)
     if not may.any():
         return track
     status = np.where(may, np.uint8(Status.AMBIGUOUS), track.status)
@@ -85,7 +85,7 @@ def not_free(model: Tracker, frames: Frames, empty: Frames | None, track: Track)
         used = np.asarray(model.observed.used)
         off = (frames.readings - empty.readings.mean(axis=0)) * model.observed.scale
         surprise = np.square(off[:, used]).sum(axis=1) / (1.0 + 1.0 / len(empty))
-        low &= surprise > scipy.stats.chi2.isf(_MAY_BE_EMPTY, int(used.sum()))
+        low &= surprise > scipy.special.chdtri(int(used.sum()), _MAY_BE_EMPTY)
     return dataclasses.replace(track, present=np.where(low, _LEAST, track.present))
 
 

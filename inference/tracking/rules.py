@@ -53,7 +53,7 @@ def rules_of(
         log_negligible=math.log(settings.negligible),
         same=_SAME,
         memory=1.0 - 1.0 / settings.window,
-        most_surprise=float(scipy.stats.chi2.isf(tail, observed.channels)),
+        most_surprise=float(scipy.special.chdtri(observed.channels, tail)),
         unique_above=settings.unique_above,
         from_scene=shared.from_scene,
     )
@@ -92,7 +92,7 @@ def misfit_limits(
     return MisfitLimits(
         surprise_limit(settings, rules, channels, shared),
         unsteady_limit(settings, rules),
-        float(scipy.stats.norm.isf(0.5 * settings.false_alarm)),
+        -float(scipy.special.ndtri(0.5 * settings.false_alarm)),
         outliers_limit(settings),
     )
 
@@ -132,9 +132,9 @@ def surprise_limit(
         What all frames err in common.
     """
     if is_felt(shared):
-        return float(scipy.stats.chi2.isf(settings.false_alarm, channels)) / channels
+        return float(scipy.special.chdtri(channels, settings.false_alarm)) / channels
     freedom = 0.5 * channels * (1.0 + rules.memory) / (1.0 - rules.memory)
-    return float(scipy.stats.gamma.isf(settings.false_alarm, freedom, scale=1.0 / freedom))
+    return float(scipy.special.gammainccinv(freedom, settings.false_alarm)) / freedom
 
 
 def unsteady_limit(settings: TrackingSettings, rules: Rules) -> float:
@@ -149,4 +149,4 @@ def unsteady_limit(settings: TrackingSettings, rules: Rules) -> float:
         As for `surprise_limit`.
     """
     freedom = 0.5 * (1.0 + rules.memory) / (1.0 - rules.memory) / (1.0 + 0.5 * rules.memory)
-    return float(scipy.stats.gamma.isf(settings.false_alarm, freedom, scale=1.0 / freedom))
+    return float(scipy.special.gammainccinv(freedom, settings.false_alarm)) / freedom

@@ -8,10 +8,6 @@ from typing import Any
 
 import platformdirs
 import sqlalchemy as sa
-from alembic import command
-from alembic.config import Config
-from alembic.runtime.migration import MigrationContext
-from alembic.script import ScriptDirectory
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 
 from service.service_settings import PREFIX
@@ -138,6 +134,12 @@ def ready(engine: sa.Engine) -> None:
     InvalidInputError
         Where the database does not answer, or has tables of a newer version.
     """
+    # not asked by workers, and as much to import as all of the store
+    from alembic import command
+    from alembic.config import Config
+    from alembic.runtime.migration import MigrationContext
+    from alembic.script import ScriptDirectory
+
     config = Config()
     folder = str(Path(__file__).parent / "migrations")
     config.set_main_option("script_location", folder.replace("%", "%%"))

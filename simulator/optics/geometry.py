@@ -34,7 +34,8 @@ FLAT, SPHERE, SHELL = 0.0, 1.0, 2.0
 #        base - detector 15:18, heights of emitter and detector 18, 19, shell 20:33, of a flat chart
 #        32 is 1 if it has nothing but a lobe about its base, and 31 if emitter and detector are at
 #        one point and the emitter is uniform or Lambertian
-# backdrop: detector - centre 0:3, radius 3, centre - emitter 4:7, material 7:13
+# backdrop: detector - centre 0:3, radius 3, centre - emitter 4:7, material 7:13; empty for none, so
+# that one machine code does for both
 
 
 @compiled
@@ -165,7 +166,7 @@ def density(
     head: Array,
     table: Array,
     material: Array,
-    backdrop: Array | None,
+    backdrop: Array,
     u: Vector,
     radial: float,
 ) -> tuple[float, float]:
@@ -199,7 +200,7 @@ def density(
         nx, ny, nz = nx * cosine + u[0] * sine, ny * cosine + u[1] * sine, nz * cosine + u[2] * sine
         height_i = -(ex * nx + ey * ny + ez * nz)
         height_o = -(dx * nx + dy * ny + dz * nz)
-    if backdrop is not None:
+    if backdrop.size > 0:
         if height_o <= 0.0:
             return 0.0, 0.0
         ro = math.sqrt(dx * dx + dy * dy + dz * dz)

@@ -49,7 +49,7 @@ def _observe_many(
     head: Array,
     table: Array,
     materials: Array,
-    backdrop: Array | None,
+    backdrop: Array,
     signal: Array,
     rules: tuple[Array, Array],
     tolerance: float,
@@ -60,7 +60,7 @@ def _observe_many(
     states = np.zeros((count, 2), dtype=np.int64)
     late = 1.0 / signal[1] if signal[1] > 0.0 else 0.0
     for i in range(count):
-        if backdrop is not None and surfaces.shape[1] == 0:
+        if surfaces.shape[1] == 0:
             status, chart, region, marks = shell_chart(backdrop, head)
         else:
             status, chart, region, marks = build_chart(surfaces[i], head, table, materials[i], late)
@@ -69,7 +69,7 @@ def _observe_many(
             continue
         here = signal.copy()
         here[2] = 1.0 / math.hypot(chart[15], math.hypot(chart[16], chart[17]))
-        if surfaces.shape[1] == 0 and backdrop is not None:
+        if surfaces.shape[1] == 0:
             here[2] = 1.0 / backdrop[3]
         value, error, rays = integrate(
             chart, head, table, materials[i], backdrop, here, rules, region, marks, tolerance
@@ -189,7 +189,7 @@ def observe_batch(
     materials = np.vstack([pack_material(s.material) for s in surfaces])
     head, table = _pack_head(emitter, detector)
     values, errors, states = _observe_many(
-        rows, head, table, materials, None, _pack(modulation), _rules(points), tolerance
+        rows, head, table, materials, np.empty(0), _pack(modulation), _rules(points), tolerance
     )
     return _lights(values, errors, states, modulation)
 

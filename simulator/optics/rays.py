@@ -35,7 +35,7 @@ def _ray_piece(
     head: Array,
     table: Array,
     material: Array,
-    backdrop: Array | None,
+    backdrop: Array,
     signal: Array,
     rule: Array,
     u: Vector,
@@ -51,7 +51,7 @@ def _ray_piece(
     v0 = v1 = v2 = v3 = v4 = g0 = g1 = g2 = g3 = g4 = 0.0
     # flat under a uniform or Lambertian emitter at the detector: both directions are one, which
     # leaves a third of the cost
-    plain = backdrop is None and chart[0] == FLAT and chart[31] > 0.0
+    plain = backdrop.size == 0 and chart[0] == FLAT and chart[31] > 0.0
     height = chart[18]
     diffuse = material[0] * (1.0 / math.pi)
     lobe = material[1] > 0.0
@@ -174,7 +174,7 @@ def along_ray(
     head: Array,
     table: Array,
     material: Array,
-    backdrop: Array | None,
+    backdrop: Array,
     signal: Array,
     rule: Array,
     marks: tuple[Array, Array, Array, Array, Array],

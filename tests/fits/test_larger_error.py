@@ -28,8 +28,8 @@ def test_recorded_photons_without_empty_frames_get_no_sure_answer(unit: float) -
     recording = near_recording()
     sensor, clean = pulsed(recording, calibration_of(recording), gain=GAIN)
     signal = clean.readings[int(np.argmin(np.abs(recording.distance_m - 0.2)))]
-    # from 0.1025 m, every four centimetres
-    chosen = np.searchsorted(recording.distance_m, 0.1025 + 0.04 * np.arange(8) - 1e-6)
+    # from 0.1025 m, every four and a half centimetres
+    chosen = np.searchsorted(recording.distance_m, 0.1025 + 0.045 * np.arange(6) - 1e-6)
     document = sensor.model_dump(mode="json", exclude_none=True)
     document["gain"] *= unit
     read = [unit * sd for sd in sensor.noise.read]

@@ -6,17 +6,19 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from inference.frame.arguments import Instrument
+from inference.frame.arguments import Instrument, instrument_of
 from inference.frame.noise import (
     NoiseParts,
     covariances,
     determinant,
+    has_shot,
     in_units,
     noise_of,
     root,
     whitener,
     whiteners,
 )
+from simulator.sensor import parse_sensor
 
 EPS = float(np.finfo(float).eps)
 WAVES = [None, (0.42, 0.1)]
@@ -103,3 +105,18 @@ def test_a_frame_is_one_row_of_the_array_form() -> None:
     assert noise.common1 == noise.common2 == 0.0
     found = whiteners(instrument, np.array([[0.2, 0.5]]), np.array([[0.1, 0.4]]))[0]
     assert math.isclose(found[0, 0], whitener(noise).e11, rel_tol=8 * EPS)
+
+
+def test_one_machine_code_does_for_shot_noise_relative_noise_and_both() -> None:
+    def sizes(**noise: float) -> tuple[float | None, float | None]:
+        read = {"read": [2e-3, 1e-3]}
+        sensor = {"kind": "pulsed", "pulse_width_s": 1e-7, "gain": 1.0, "noise": read | noise}
+        made = instrument_of(parse_sensor(sensor))
+        return made.shot, made.relative
+
+    assert sizes() == (None, None)
+    assert sizes(shot=3e-3) == (3e-3, 0.0)
+    assert sizes(relative=0.02) == (0.0, 0.02)
+    assert sizes(shot=3e-3, relative=0.02) == (3e-3, 0.02)
+    # a mean that vanishes makes a kink where shot noise is, not where its size is given
+    assert [has_shot(shot) for shot in (None, 0.0, 3e-3)] == [False, False, True]

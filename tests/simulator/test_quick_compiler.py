@@ -2,11 +2,15 @@
 
 import gc
 import math
+import operator
+import pickle
 from collections.abc import Callable
 from typing import Any
 
 import pytest
+from numba import types
 from numba.core import compiler, ir, postproc, targetconfig
+from numba.core.registry import cpu_target
 
 from simulator import inner_code, quick_compiler
 
@@ -127,6 +131,32 @@ def test_numbas_own_functions_for_kernels_are_inner_code(monkeypatch: pytest.Mon
         "pipeline_class": inner_code.InnerCompiler,
         "inline": "never",
     }
+
+
+@pytest.mark.parametrize(
+    "kinds", [("float64", "int64"), ("int64", "int64"), ("boolean", "float64")]
+)
+def test_the_signature_of_numbers_is_found_once(
+    monkeypatch: pytest.MonkeyPatch, kinds: tuple[str, str]
+) -> None:
+    context: Any = cpu_target.typing_context
+    context.refresh()
+    function: Any = context.resolve_value_type(operator.truediv)
+    args = tuple(getattr(types, kind) for kind in kinds)
+    wanted = quick_compiler._call_type(function, context, args, {})
+    assert function.get_call_type(context, args, {}) == wanted
+    monkeypatch.setattr(quick_compiler, "_call_type", None)
+    assert function.get_call_type(context, args, {}) == wanted
+    assert function.get_impl_key(wanted)
+
+
+def test_the_hash_of_a_type_of_tuples_holds_in_its_process() -> None:
+    made: Any = types
+    kind = made.Tuple((made.float64, made.Tuple((made.int64, made.none))))
+    assert hash(kind) == hash(kind.key) == hash(kind)
+    kind._hash = b"of another", 1  # kept on the disk
+    assert hash(kind) == hash(kind.key)
+    assert hash(pickle.loads(pickle.dumps(kind))) == hash(kind.key)  # noqa: S301
 
 
 def test_nobody_counts_how_long_the_lock_of_llvm_is_held() -> None:

@@ -10,8 +10,9 @@ import dataclasses
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg, optimize, special
+from scipy import linalg, special
 
 from inference.density.collapsed import CollapsedDensity
 from inference.posterior.sampling.coordinates import coordinates_of
@@ -111,7 +112,7 @@ def _sample(
     def surplus(power: float) -> float:
         return _effective(power * log_weights) - least
 
-    power = 1.0 if surplus(1.0) >= 0 else float(optimize.brentq(surplus, 0.0, 1.0, xtol=1e-9))
+    power = 1.0 if surplus(1.0) >= 0 else float(scipy.optimize.brentq(surplus, 0.0, 1.0, xtol=1e-9))
     weights = special.softmax(power * log_weights)
     drawn = z[rng.choice(len(z), size=_FITTED, p=weights)]
     return np.concatenate([drawn, np.repeat(beyond, max(round(_FITTED / members), 1), axis=0)])
