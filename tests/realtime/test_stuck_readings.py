@@ -148,5 +148,5 @@ def test_the_first_step_that_fits_is_the_coarsest_of_all() -> None:
         values = np.rint(values / fine) * fine if fine else values
         found = coarsest_step(values, 0.0, 1.0)
         assert found == of_all_at_once(values, 1.0)
-        late += found < 0.9 * np.ptp(values) / 3276.8
+        late += bool(found < 0.9 * np.ptp(values) / 3276.8)
     assert late >= 4
