@@ -21,6 +21,7 @@ _NONE = np.empty(0, dtype=np.intp)
 _FALSE_ALARM = 1e-6 / 4
 # steps are looked for down to that part of the noise, or of the reach of so many readings
 _FINEST, _MOST, _LOOKED_AT = 1 / 100, 3e5, 24
+_AT_ONCE = 32_768  # steps that a processor has at hand: the first that fits is the coarsest
 _FIT = 0.2  # of a step, to which multiples of it are known: they may have been rounded again
 _WORTH = 0.5  # of the stated scatter: noise that is stated twice too large is only cautious
 _FEWEST = 2  # no fewer frames scatter
@@ -126,11 +127,17 @@ def coarsest_step(values: Array, at: float, read: float) -> float:
     most = min(reach / (_FINEST * read), _MOST)
     # steps in the reach, so close that the next is off by a twentieth of a step at most; the
     # farthest is a step away, or more
-    counts = np.arange(9, int(10.0 * most) + 1) / 10.0
-    for share in away / reach:
-        turns = share * counts
-        counts = counts[np.abs(turns - np.rint(turns)) <= _FIT]
-    return reach / (float(counts[0]) if counts.size else most)
+    last = int(10.0 * most) + 1
+    for begin in range(9, last, _AT_ONCE):
+        counts = np.arange(begin, min(begin + _AT_ONCE, last)) / 10.0
+        for share in away / reach:
+            turns = share * counts
+            counts = counts[np.abs(turns - np.rint(turns)) <= _FIT]
+            if not counts.size:
+                break
+        else:
+            return reach / float(counts[0])
+    return reach / most
 
 
 def _still(sensor: Sensor, seen: _Seen, empty: NDArray[np.bool_]) -> str | None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import inference.stuck_readings
 from inference.estimate import estimate
-from inference.stuck_readings import stuck_readings
+from inference.stuck_readings import coarsest_step, stuck_readings
 from simulator.frames import Frames
 from simulator.scene import parse_scene
 from simulator.sensor import parse_sensor
@@ -124,3 +124,29 @@ def test_other_gains_are_other_frames() -> None:
     gains = np.where(np.arange(45) % 2, 2.0, 1.0)
     assert said(y) is not None
     assert said(y, gain=gains) is None
+
+
+def of_all_at_once(values: Array, read: float) -> float:
+    """The coarsest step of which all differences are multiples, to a fifth, from all of them."""
+    by_size = values[np.argsort(np.abs(values))][:24]
+    away = np.abs(by_size[1:] - by_size[0])
+    reach = float(away.max())
+    most = min(reach / (0.01 * read), 3e5)
+    counts = np.arange(9, int(10.0 * most) + 1) / 10.0
+    turns = away[:, None] / reach * counts
+    fits = (np.abs(turns - np.rint(turns)) <= 0.2).all(axis=0)
+    return reach / float(counts[np.argmax(fits)] if fits.any() else most)
+
+
+def test_the_first_step_that_fits_is_the_coarsest_of_all() -> None:
+    """Steps are tried some at a time, from the coarsest on."""
+    rng = np.random.default_rng(5)
+    late = 0
+    for k in range(12):
+        fine = 0.02 if k % 3 else 0.0  # rounded, or not
+        values = rng.normal(0.0, 150.0, 16)
+        values = np.rint(values / fine) * fine if fine else values
+        found = coarsest_step(values, 0.0, 1.0)
+        assert found == of_all_at_once(values, 1.0)
+        late += bool(found < 0.9 * np.ptp(values) / 3276.8)
+    assert late >= 4
