@@ -94,6 +94,7 @@ def test_the_shape_is_the_contract_s() -> None:
         "left_out",
         "selection",
         "runtime",
+        "assumptions",
     }
     assert set(document["parameters"]) == {
         "object.c0",
