@@ -15,7 +15,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inference.fits.answer.stated_facts import along_brightness, off_their_own, weights_of_told
+from inference.fits.answer.stated_facts import (
+    FREE,
+    along_brightness,
+    off_their_own,
+    weights_of_told,
+)
 from inference.fits.answer.succession import goes_on
 from inference.fits.likelihood.arguments import CROSSTALK
 from inference.fits.likelihood.erring import Erring
@@ -44,7 +49,6 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-_FREE = 0.05  # least share of its variance that the fit leaves of a direction that is looked at
 _SMOOTH = 0.03  # share that is left of errors of the flux by a sixth of it
 SUCCESSION = "succession"
 BRIGHTNESS, TOLD = "brightness", "known_ranges"
@@ -206,7 +210,7 @@ def model_checks(problem: FitProblem, top: Erring) -> dict[str, Check]:
     of_priors = followed[rows.target.size - d :]
     share, turn = np.linalg.eigh(np.eye(d) - of_priors @ of_priors.T)
     share = np.minimum(share, 1.0)  # rounding makes more of it where frames tell all
-    free = share > _FREE
+    free = share > FREE
     share, turn = share[free], turn[:, free]
     off = turn.T @ target[rows.target.size - d :]
     # where the unknowns lie, and what pulls them beyond: of a prior that is densest at its end the

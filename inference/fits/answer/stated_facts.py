@@ -14,11 +14,11 @@ from inference.fits.likelihood.problem import FitProblem
 from inference.fits.likelihood.told import Told
 from inference.frame.sensitivity import Value
 
-__all__ = ["along_brightness", "off_their_own", "weights_of_told"]
+__all__ = ["FREE", "along_brightness", "off_their_own", "weights_of_told"]
 
 Array = NDArray[np.float64]
 
-_FREE = 0.05  # least share of its variance that the fit leaves of a direction that is looked at
+FREE = 0.05  # least share of its variance that the fit leaves of a direction that is looked at
 _MANY = 300  # rows of which the directions are found in next to no time
 
 
@@ -95,6 +95,6 @@ def off_their_own(left: Array, followed: Array, weights: Array) -> tuple[float, 
     rows = rows[weights[rows] > 0.0]
     scaled = weights[rows, None] * followed[rows]
     share, turn = np.linalg.eigh(np.diag(np.square(weights[rows])) - scaled @ scaled.T)
-    free = share > _FREE
+    free = share > FREE
     off = turn[:, free].T @ (weights[rows] * left[rows]) / np.sqrt(share[free])
     return float(off @ off), off.size
