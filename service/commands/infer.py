@@ -95,7 +95,7 @@ def _run(args: argparse.Namespace) -> int:
     return exit_code_of(args, record, doubts(system[0], system[2]))
 
 
-def exit_code_of(args: argparse.Namespace, record: "JobRecord", said: Collection[str] = ()) -> int:
+def exit_code_of(args: argparse.Namespace, record: "JobRecord", said: Collection[str]) -> int:
     """Return the exit code of a posterior that has ended, having said on standard error why.
 
     Parameters

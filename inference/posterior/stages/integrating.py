@@ -12,6 +12,7 @@ fail.
 
 import math
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,13 +42,13 @@ from inference.posterior.stages.optima import that_matter
 from inference.posterior.stages.stage import Tempering
 from inference.posterior.streams import Stream
 
-__all__ = ["MEMBERS", "at_once", "bending", "from_moved", "moved_by"]
+__all__ = ["MEMBERS", "RANKED", "AtOnce", "at_once", "bending", "from_moved", "moved_by"]
 
 Array = NDArray[np.float64]
 
 MEMBERS = 400  # draws that are moved
 _CLIMBS = 2  # from the best of these
-_RANKED = 100
+RANKED = 100
 # draws of Laplace shapes that are followed, and errors that are beyond the first order: both tell
 # whether the response bends, not by how much
 _FOLLOWED, _TRIED = 20, 50
@@ -127,7 +128,7 @@ def from_moved(
         Whether the points are draws of the exact model, that were moved by its errors.
     """
     z = z[np.isfinite(density.parameters.log_prior(z))]
-    value = density(z[:_RANKED])  # rounds evaluate all
+    value = density(z[:RANKED])  # rounds evaluate all
     if np.isfinite(value).sum() <= 2 * z.shape[1]:
         return None
     optima: list[Optimum] = []
@@ -141,9 +142,27 @@ def from_moved(
     return Tempering(proposal, members, pending, scouted=True, near=near)
 
 
+class AtOnce(NamedTuple):
+    """What draws tell before an exact model is sampled to the end.
+
+    Attributes
+    ----------
+    bent : bool or None
+        Whether its errors are to be integrated out; None where the draws do not tell.
+    stage : Tempering or None
+        Where rounds begin then.
+    calls : int
+        Density evaluations that it took.
+    """
+
+    bent: bool | None
+    stage: Tempering | None
+    calls: int
+
+
 def at_once(
     job: Job, density: CollapsedDensity, known: Mixture | WeightedDraws, scouts: Scouts
-) -> tuple[bool | None, Tempering | None]:
+) -> AtOnce:
     """Begin with errors integrated out, where they are to be.
 
     Not where crosstalk and a background are confounded: so few points are no beginning there, and
@@ -158,27 +177,23 @@ def at_once(
         them would.
     scouts : Scouts
         Told of none of them.
-
-    Returns
-    -------
-    (bool or None, Tempering or None)
-        Whether the response bends, None where draws do not tell; and where rounds begin then.
     """
     if not job.can_integrate_error or reparametrisation_of(density) is not None:
-        return None, None
-    rng, near = job.stream(Stream.RESPONSE, 1), isinstance(known, WeightedDraws)
+        return AtOnce(None, None, 0)
+    rng = job.stream(Stream.RESPONSE, 1)
     if isinstance(known, WeightedDraws):
-        z = known.z[rng.choice(len(known.z), size=MEMBERS, p=known.weights)]
+        z, near, calls = known.z[rng.choice(len(known.z), size=MEMBERS, p=known.weights)], True, 0
         followed, tried = z[chosen_draws(len(z), len(density.frames))], MEASURED
     else:
-        z = known.draw(rng, MEMBERS)
+        z, near, calls = known.draw(rng, MEMBERS), False, MEMBERS
         z = z[np.isfinite(density(z))]
         followed, tried = z[:_FOLLOWED], _TRIED
     if len(z) < _FOLLOWED:
-        return None, None
+        return AtOnce(None, None, calls)
     found = bending(job, density, z, followed, rng, tried)
     if found is None:
-        return (False if near else None), None
+        return AtOnce(False if near else None, None, calls)
     erring = job.with_error_integrated().density()
     others = scouts.z, scouts.hot
-    return True, from_moved(erring, moved_by(found, z, rng), others, near=near)
+    stage = from_moved(erring, moved_by(found, z, rng), others, near=near)
+    return AtOnce(True, stage, calls + RANKED)

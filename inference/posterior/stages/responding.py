@@ -12,7 +12,13 @@ from inference.posterior.answer.responses import chosen_draws
 from inference.posterior.job import Job
 from inference.posterior.sample import sample_of
 from inference.posterior.stages.checkpoint import Checkpoint
-from inference.posterior.stages.integrating import MEMBERS, bending, from_moved, moved_by
+from inference.posterior.stages.integrating import (
+    MEMBERS,
+    RANKED,
+    bending,
+    from_moved,
+    moved_by,
+)
 from inference.posterior.stages.selecting import sampled
 from inference.posterior.stages.stage import (
     Drawing,
@@ -59,8 +65,8 @@ class RespondTask:
         z = flat[rng.choice(len(flat), size=min(MEMBERS, len(flat)), replace=False)]
         stage = from_moved(erring, moved_by(found, z, rng))
         if stage is None:
-            return dataclasses.replace(stands, calls=MEMBERS)
-        return Checkpoint(stage, MEMBERS, integrated=True, exact=self.stage)
+            return dataclasses.replace(stands, calls=RANKED)
+        return Checkpoint(stage, RANKED, integrated=True, exact=self.stage)
 
 
 def tasks(job: Job, checkpoint: Checkpoint) -> tuple[RespondTask, ...]:

@@ -26,7 +26,7 @@ from inference.posterior.stages.ensembles import (
     from_weighted,
     worth_wanted,
 )
-from inference.posterior.stages.integrating import MEMBERS, at_once
+from inference.posterior.stages.integrating import at_once
 from inference.posterior.stages.looking import (
     Looked,
     LookTask,
@@ -213,14 +213,15 @@ def _first_stage(
     by = warm.proposal if warm.fits else proposal
     drawn = None if warm.contradicted else warm.draws
     known = warm.draws if warm.fits else by.optima
-    bent, begun = at_once(job, density, known, scouts)
-    if begun is not None or not warm.fits:
+    begun = at_once(job, density, known, scouts)
+    calls += begun.calls
+    if begun.stage is not None or not warm.fits:
         exact = from_scouts(job, density, by, scouts, drawn) or _from_the_prior(by, drawn)
-        if begun is None:
+        if begun.stage is None:
             return Checkpoint(exact, calls)
-        return Checkpoint(begun, calls + 2 * MEMBERS, integrated=True, exact=exact)
+        return Checkpoint(begun.stage, calls, integrated=True, exact=exact)
     reached = _from_warm(job, density, warm, scouts)
-    linear = bent is False and isinstance(reached.stage, Weighted)
+    linear = begun.bent is False and isinstance(reached.stage, Weighted)
     return dataclasses.replace(reached, calls=calls + reached.calls, linear=linear)
 
 

@@ -51,5 +51,5 @@ def test_the_command_line_says_what_was_not_said_before(
     assert exit_code_of(args, record, ["another"]) == 0
     assert capsys.readouterr().err == "hybridtof: note: one thing\n"
     older: Any = SimpleNamespace(problem=None, result={"verdict": {"converged": True}})
-    assert exit_code_of(args, older) == 0
+    assert exit_code_of(args, older, ()) == 0
     assert capsys.readouterr().err == ""

@@ -16,6 +16,7 @@ from inference.posterior import fold
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages import looking, starting
 from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.integrating import AtOnce
 from inference.posterior.stages.responding import RespondTask, decided
 from inference.posterior.stages.stage import Starting, Tempering, Weighted
 from simulator.scene import parse_scene
@@ -116,7 +117,7 @@ def test_where_rounds_fail_the_exact_model_is_sampled_and_looked_at() -> None:
 def test_it_is_the_law_that_rounds_behind_an_exact_model_come_to(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(starting, "at_once", lambda *_: (None, None))
+    monkeypatch.setattr(starting, "at_once", lambda *_: AtOnce(None, None, 0))
     job = _job(seed=1)
     checkpoint = _begun(job)
     assert not checkpoint.integrated

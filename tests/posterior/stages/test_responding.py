@@ -27,6 +27,7 @@ from inference.posterior.criticism.discrepancy_check import is_bent, may_be_bent
 from inference.posterior.settings import SamplerSettings
 from inference.posterior.stages import integrating, starting
 from inference.posterior.stages.checkpoint import Checkpoint
+from inference.posterior.stages.integrating import AtOnce
 from inference.posterior.stages.responding import RespondTask, decided, tasks
 from inference.posterior.stages.setting_out import EvaluateTask, SetOutTask
 from inference.posterior.stages.stage import Settled, Starting, Tempering, Weighted
@@ -53,7 +54,7 @@ def _steps(number: int = QUICK) -> tuple[Checkpoint, ...]:
     """Every checkpoint of a job whose response is looked at around draws of the posterior."""
     job, found = _job(number), [fold.start(_job(number))]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(starting, "at_once", lambda *_: (None, None))
+        patch.setattr(starting, "at_once", lambda *_: AtOnce(None, None, 0))
         return tuple(_followed(job, found))
 
 
@@ -161,15 +162,20 @@ def test_it_is_looked_at_once_and_where_it_can_be_followed() -> None:
         fold.merge(_job(), dataclasses.replace(exact, linear=True), [])
 
 
+def _set_out(job: fold.Job) -> Checkpoint:
+    checkpoint = fold.start(job)
+    while isinstance(checkpoint.stage, Starting):
+        checkpoint = fold.merge(job, checkpoint, [fold.run(t) for t in fold.tasks(job, checkpoint)])
+    return checkpoint
+
+
 def _looked_at() -> tuple[fold.Job, Checkpoint, Checkpoint]:
     """A bright object without anything else, before its response is looked at and behind."""
     data = _set(9)
     job = fold.prepare(
         data.sensor, parse_scene(data.scene), data.frames, SamplerSettings(method="auto", seed=1)
     )
-    checkpoint = fold.start(job)
-    while isinstance(checkpoint.stage, Starting):
-        checkpoint = fold.merge(job, checkpoint, [fold.run(t) for t in fold.tasks(job, checkpoint)])
+    checkpoint = _set_out(job)
     (task,) = fold.tasks(job, checkpoint)
     return job, checkpoint, fold.merge(job, checkpoint, [fold.run(task)])
 
@@ -193,13 +199,6 @@ def test_a_prior_that_is_contradicted_is_not_explained_by_errors(
     _, before, after = _looked_at()
     assert after.linear
     assert after.stage is before.stage
-
-
-def _set_out(job: fold.Job) -> Checkpoint:
-    checkpoint = fold.start(job)
-    while isinstance(checkpoint.stage, Starting):
-        checkpoint = fold.merge(job, checkpoint, [fold.run(t) for t in fold.tasks(job, checkpoint)])
-    return checkpoint
 
 
 def test_what_a_warm_start_finds_straight_is_not_looked_at_again(
@@ -293,7 +292,7 @@ def test_crosstalk_far_from_where_an_exact_model_has_it_is_not_told_by_a_respons
 @pytest.mark.thorough
 def test_errors_of_a_shadow_are_no_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is integrated out is the flux's error: it has to be what the scale owes most to."""
-    monkeypatch.setattr(starting, "at_once", lambda *_: (None, None))
+    monkeypatch.setattr(starting, "at_once", lambda *_: AtOnce(None, None, 0))
     exact = fold.start(_job(SHEET))
     while not isinstance(exact.stage, Weighted):
         pieces = [fold.run(task) for task in fold.tasks(_job(SHEET), exact)]
